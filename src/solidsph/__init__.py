@@ -1,0 +1,1 @@
+"""Smoothed Particle Hydrodynamics for nonlinear solid mechanics."""

@@ -1,0 +1,68 @@
+"""Everything that solidsph raises on purpose, under one base class.
+
+A message says what was wrong, the value, what was expected and what to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class SolidsphError(Exception):
+    """Base of every error that solidsph raises on purpose."""
+
+
+class SceneError(SolidsphError):
+    """What the user asked for cannot be understood: an unknown word, a bad value, malformed TOML."""
+
+
+class PluginError(SolidsphError):
+    """A part that was asked for cannot be loaded, or does not keep its interface's promise."""
+
+
+class RecordError(SolidsphError):
+    """A result file is missing, is not ours, or cannot be read or written."""
+
+
+class BuildError(SolidsphError):
+    """Parts that do not fit each other. `problems` holds every one found, each with its remedy."""
+
+    def __init__(self, problems: Sequence[str]) -> None:
+        self.problems = tuple(problems)
+        count = len(self.problems)
+        head = "the simulation cannot be built" + (f", {count} problems:" if count > 1 else ":")
+        super().__init__("\n  - ".join([head, *self.problems]))
+
+
+class DivergedError(SolidsphError):
+    """A run went wrong: where, when, and the local volume ratio there."""
+
+    def __init__(self, *, step: int, time: float, particle: int, volume_ratio: float, cause: str):
+        self.step = step
+        self.time = time
+        self.particle = particle
+        self.volume_ratio = volume_ratio
+        self.cause = cause
+        super().__init__(
+            f"the run diverged at step {step}, t = {time:.6g} s: {cause} at particle {particle}, "
+            f"where J = {volume_ratio:.6g}; the record holds everything up to there. Try a smaller "
+            "time_step_factor, a smoother load, or the total Lagrangian form"
+        )
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Keyword-only arguments do not survive the default pickling between processes.
+        return _rebuild_diverged, (
+            self.step,
+            self.time,
+            self.particle,
+            self.volume_ratio,
+            self.cause,
+        )
+
+
+def _rebuild_diverged(
+    step: int, time: float, particle: int, volume_ratio: float, cause: str
+) -> DivergedError:
+    return DivergedError(
+        step=step, time=time, particle=particle, volume_ratio=volume_ratio, cause=cause
+    )

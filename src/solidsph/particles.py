@@ -1,0 +1,94 @@
+"""Particles (reference data, fixed) and State (evolving arrays): all that a run is made of.
+
+Both are plain arrays that can be stored; nothing that evolves hides anywhere else, so a restart
+is a file read and two runs never share a history.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array, Indices, Mask
+from solidsph.errors import SceneError
+
+
+@attrs.frozen(eq=False)
+class Particles:
+    """The reference configuration of every body of a scene.
+
+    Ghosts are particles beyond the surface that carry values only to complete the support of
+    those near it; they have no mass and no equation of motion.
+    """
+
+    positions: Array  # (n, d) reference positions X [m]
+    volumes: Array  # (n,) weights of the sums over neighbours [m^d]
+    spacings: Array  # (n,) particle spacing of the body that a particle belongs to [m]
+    area_vectors: Array  # (n, d) outward surface area that a particle owns, 0 inside [m^(d-1)]
+    ghosts: Mask  # (n,)
+    images: Array  # (n, d) mirror image of a ghost through the surface; otherwise X itself [m]
+    tags: Mapping[str, Mask] = attrs.field(factory=dict)  # named sets of particles, each (n,)
+    bodies: Mapping[str, slice] = attrs.field(factory=dict)  # each body is one run of particles
+
+    @property
+    def count(self) -> int:
+        """Number of particles n, ghosts included."""
+        return int(self.positions.shape[0])
+
+    @property
+    def dimension(self) -> int:
+        """Number of space dimensions d."""
+        return int(self.positions.shape[1])
+
+    @classmethod
+    def joined(cls, bodies: Mapping[str, Particles]) -> Particles:
+        """The particles of several bodies as one set; a body's name becomes a tag of its own."""
+        parts = list(bodies.values())
+        starts = np.cumsum([0, *(part.count for part in parts)])
+        slices = {
+            name: slice(int(a), int(b))
+            for name, a, b in zip(bodies, starts[:-1], starts[1:], strict=True)
+        }
+        total = int(starts[-1])
+        tags: dict[str, Mask] = {}
+        for name, part in bodies.items():
+            own = dict(part.tags)
+            own[name] = ~part.ghosts
+            for tag, mask in own.items():
+                tags.setdefault(tag, np.zeros(total, dtype=np.bool_))[slices[name]] |= mask
+        return cls(
+            positions=np.concatenate([part.positions for part in parts]),
+            volumes=np.concatenate([part.volumes for part in parts]),
+            spacings=np.concatenate([part.spacings for part in parts]),
+            area_vectors=np.concatenate([part.area_vectors for part in parts]),
+            ghosts=np.concatenate([part.ghosts for part in parts]),
+            images=np.concatenate([part.images for part in parts]),
+            tags=tags,
+            bodies=slices,
+        )
+
+    def tagged(self, name: str) -> Indices:
+        """Indices of the particles in the named set.
+
+        Raises:
+            SceneError: no particle carries that tag.
+        """
+        if name not in self.tags:
+            known = ", ".join(sorted(self.tags)) or "none"
+            raise SceneError(f"no tag {name!r} among the particles; known tags: {known}")
+        return np.flatnonzero(self.tags[name])
+
+
+@attrs.frozen(eq=False)
+class State:
+    """All that evolves. An integrator takes one and returns the next; arrays are never shared."""
+
+    time: float  # t [s]
+    step: int  # completed steps
+    positions: Array  # (n, d) current positions x [m]
+    velocities: Array  # (n, d) v [m/s]
+    accelerations: Array  # (n, d) a [m/s^2], belonging to these positions
+    memory: Mapping[str, Array] = attrs.field(factory=dict)  # what a part remembers, by its name
+    work: Mapping[str, float] = attrs.field(factory=dict)  # energy account of each part [J]
