@@ -1,0 +1,1 @@
+"""Every built-in part of solidsph, registered through the same entry points as anyone's."""

@@ -1,1 +1,52 @@
 """Smoothed Particle Hydrodynamics for nonlinear solid mechanics."""
+
+from solidsph.errors import (
+    BuildError,
+    DivergedError,
+    PluginError,
+    RecordError,
+    SceneError,
+    SolidsphError,
+)
+from solidsph.interfaces.boundary import BoundaryHandler
+from solidsph.interfaces.case import Case, Measurement
+from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.divergence import Divergence
+from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.formulation import Formulation
+from solidsph.interfaces.gradient import Gradient
+from solidsph.interfaces.integrator import Integrator
+from solidsph.interfaces.kernel import Kernel
+from solidsph.interfaces.material import Material
+from solidsph.interfaces.shape import Shape
+from solidsph.particles import Particles, State
+from solidsph.results.record import Record
+from solidsph.scene import Scene
+from solidsph.simulation import Result, Simulation
+
+__all__ = [
+    "BoundaryHandler",
+    "BuildError",
+    "Case",
+    "Discretisation",
+    "DivergedError",
+    "Divergence",
+    "Effect",
+    "Formulation",
+    "Gradient",
+    "Integrator",
+    "Kernel",
+    "Material",
+    "Measurement",
+    "Particles",
+    "PluginError",
+    "Record",
+    "RecordError",
+    "Result",
+    "Scene",
+    "SceneError",
+    "Shape",
+    "Simulation",
+    "SolidsphError",
+    "State",
+]

@@ -13,7 +13,7 @@ class SolidsphError(Exception):
 
 
 class SceneError(SolidsphError):
-    """What the user asked for cannot be understood: an unknown word, a bad value, malformed TOML."""
+    """What the user asked for cannot be understood: an unknown word, a bad value, bad TOML."""
 
 
 class PluginError(SolidsphError):

@@ -16,6 +16,14 @@ from solidsph.errors import SceneError
 
 
 @attrs.frozen(eq=False)
+class Face:
+    """A named part of a body's surface: the particles that own some of it, and how much."""
+
+    particles: Indices  # (k,)
+    area_vectors: Array  # (k, d) outward [m^(d-1)]
+
+
+@attrs.frozen(eq=False)
 class Particles:
     """The reference configuration of every body of a scene.
 
@@ -31,6 +39,7 @@ class Particles:
     images: Array  # (n, d) mirror image of a ghost through the surface; otherwise X itself [m]
     tags: Mapping[str, Mask] = attrs.field(factory=dict)  # named sets of particles, each (n,)
     bodies: Mapping[str, slice] = attrs.field(factory=dict)  # each body is one run of particles
+    faces: Mapping[str, Face] = attrs.field(factory=dict)  # a particle at an edge is on several
 
     @property
     def count(self) -> int:
@@ -53,11 +62,15 @@ class Particles:
         }
         total = int(starts[-1])
         tags: dict[str, Mask] = {}
+        faces: dict[str, list[Face]] = {}
         for name, part in bodies.items():
             own = dict(part.tags)
             own[name] = ~part.ghosts
             for tag, mask in own.items():
                 tags.setdefault(tag, np.zeros(total, dtype=np.bool_))[slices[name]] |= mask
+            for face, own_face in part.faces.items():
+                moved = own_face.particles + slices[name].start
+                faces.setdefault(face, []).append(Face(moved, own_face.area_vectors))
         return cls(
             positions=np.concatenate([part.positions for part in parts]),
             volumes=np.concatenate([part.volumes for part in parts]),
@@ -67,6 +80,13 @@ class Particles:
             images=np.concatenate([part.images for part in parts]),
             tags=tags,
             bodies=slices,
+            faces={
+                face: Face(
+                    np.concatenate([one.particles for one in several]),
+                    np.concatenate([one.area_vectors for one in several]),
+                )
+                for face, several in faces.items()
+            },
         )
 
     def tagged(self, name: str) -> Indices:
@@ -91,4 +111,32 @@ class State:
     velocities: Array  # (n, d) v [m/s]
     accelerations: Array  # (n, d) a [m/s^2], belonging to these positions
     memory: Mapping[str, Array] = attrs.field(factory=dict)  # what a part remembers, by its name
-    work: Mapping[str, float] = attrs.field(factory=dict)  # energy account of each part [J]
+    applied: Mapping[str, Array] = attrs.field(factory=dict)  # force of each account, (n, d) [N]
+    work: Mapping[str, float] = attrs.field(factory=dict)  # work done by each account so far [J]
+
+    def advanced(
+        self,
+        *,
+        time: float,
+        positions: Array,
+        velocities: Array,
+        accelerations: Array,
+        applied: Mapping[str, Array],
+        memory: Mapping[str, Array],
+    ) -> State:
+        """The state one step on; the energy accounts are settled by the trapezoidal rule."""
+        path = positions - self.positions
+        work = {
+            name: self.work[name] + 0.5 * float(np.vdot(self.applied[name] + force, path))
+            for name, force in applied.items()
+        }
+        return State(
+            time=time,
+            step=self.step + 1,
+            positions=positions,
+            velocities=velocities,
+            accelerations=accelerations,
+            memory=memory,
+            applied=applied,
+            work=work,
+        )

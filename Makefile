@@ -1,0 +1,38 @@
+# Every target does its own set-up: a virtual environment in .venv, and the install into it.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+EXAMPLE := plugins/examples/solidsph-wendland
+
+.PHONY: demo test validate lint format clean
+
+demo: $(STAMP)  ## the paper's headline experiment: table, record and picture
+	$(BIN)/solidsph run tensile-instability
+
+test: $(STAMP) lint  ## lint, types and every test but the slow physics
+	$(BIN)/pytest -n 2 -m "not validation"
+
+validate: $(STAMP)  ## the slow physics
+	$(BIN)/pytest -n 2 -m validation
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(STAMP)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+# Entry points are read from the installed metadata, so a changed pyproject means a new install.
+$(STAMP): pyproject.toml $(EXAMPLE)/pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -c "import sys; sys.exit(sys.version_info < (3, 11))" || \
+		{ echo "Python 3.11 or newer is needed; run: make PYTHON=python3.11 (after rm -r $(VENV))"; exit 1; }
+	$(BIN)/python -m pip install --quiet --editable ".[test,dev]"
+	$(BIN)/python -m pip install --quiet --editable $(EXAMPLE)
+	touch $(STAMP)
+
+clean:
+	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

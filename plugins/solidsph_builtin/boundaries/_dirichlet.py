@@ -1,0 +1,198 @@
+"""What the three ways to impose a smoothed boundary value exactly have in common.
+
+The paper's Dirichlet condition asks that the *approximation* <u> = W u takes the given value at
+the boundary particles (eqs. 9 to 12). Free to be chosen are the values that the boundary
+particles and the ghosts carry.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from typing import final
+
+import attrs
+import numpy as np
+from scipy.sparse import csc_array, csr_array
+from scipy.sparse.linalg import SuperLU, splu
+
+from solidsph.arrays import Array, Indices, Mask
+from solidsph.errors import SceneError
+from solidsph.interfaces.condition import MotionCondition, Observation
+from solidsph.motion import Component, VectorField
+from solidsph.setting import Setting
+from solidsph.where import Where
+from solidsph_builtin.boundaries._images import reflected
+from solidsph_builtin.boundaries._reports import COMPONENTS, reaction
+from solidsph_builtin.boundaries.ghost_extension import chosen_ghosts
+
+
+class Solve(ABC):
+    """Values of boundary particles and ghosts that make the approximation right."""
+
+    @abstractmethod
+    def values(self, smooth: Array, interior: Array, target: Array) -> Array:
+        """Values (b + g,) of boundary particles, then ghosts.
+
+        Args:
+            smooth: (b + g,) the targets at the boundary and their smooth extension to ghosts.
+            interior: (b + g,) what all other particles contribute to the approximation there.
+            target: (b,) what the approximation must be at the boundary.
+        """
+
+
+class Extension(ABC):
+    """A smooth extension of the field to the ghosts, which the solve starts from."""
+
+    @abstractmethod
+    def values(self, axis: int, time: float, derivative: int, column: Array) -> Array:
+        """Values at the ghosts (g,) from those of all particles (n,)."""
+
+
+@final
+@attrs.frozen(eq=False)
+class ReflectedExtension(Extension):
+    """Point reflection of the field at the surface."""
+
+    matrix: csr_array  # (g, n)
+
+    def values(self, axis: int, time: float, derivative: int, column: Array) -> Array:
+        reflection: Array = self.matrix @ column
+        return reflection
+
+
+@final
+@attrs.frozen(eq=False)
+class KnownExtension(Extension):
+    """A field that is known beyond the surface too."""
+
+    positions: Array  # (g, d)
+    field: VectorField
+    time_scale: float
+
+    def values(self, axis: int, time: float, derivative: int, column: Array) -> Array:
+        return self.field.derivative(axis, self.positions, time, derivative, self.time_scale)
+
+
+@final
+@attrs.frozen(eq=False)
+class SmoothedValue(MotionCondition):
+    """<u> = field(X, t) at the boundary particles."""
+
+    label: str
+    positions: Array  # (n, d) reference positions of all particles
+    boundary: Indices  # (b,)
+    ghosts: Indices  # (g,)
+    field: VectorField
+    time_scale: float
+    smoothing: csr_array  # (b + g, n) rows of W
+    extension: Extension  # smooth, of boundary values to ghosts
+    solve: Solve
+
+    @property
+    def _chosen(self) -> Indices:
+        return np.concatenate([self.boundary, self.ghosts])
+
+    @property
+    def held(self) -> Mask:
+        held = np.zeros(self.positions.shape, dtype=np.bool_)
+        for axis in self.field.components:
+            held[self._chosen, axis] = True
+        return held
+
+    def impose(self, time: float, derivative: int, values: Array) -> None:
+        for axis in self.field.components:
+            target = self.field.derivative(
+                axis, self.positions[self.boundary], time, derivative, self.time_scale
+            )
+            column = values[:, axis]
+            column[self.boundary] = target
+            column[self.ghosts] = self.extension.values(axis, time, derivative, column)
+            smooth = column[self._chosen]
+            column[self._chosen] = 0.0
+            interior = self.smoothing @ column
+            column[self._chosen] = self.solve.values(smooth, interior, target)
+
+    def miss(self, observation: Observation) -> float:
+        """Largest difference between the approximation at the boundary and what was asked [m]."""
+        state = observation.state
+        u = state.positions - self.positions
+        approximation = (self.smoothing @ u)[: len(self.boundary)]
+        X = self.positions[self.boundary]
+        return max(
+            float(np.max(np.abs(approximation[:, axis] - self.field.values(axis, X, state.time))))
+            for axis in self.field.components
+        )
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {
+            **reaction(observation, self.label),
+            f"{self.label} miss [m]": self.miss(observation),
+        }
+
+
+def smoothed_value(
+    setting: Setting,
+    label: str,
+    *,
+    where: Where,
+    ghosts: Where,
+    displacement: Mapping[str, Component],
+    extension: Mapping[str, Component] | None,
+    handler: str,
+    solve: Callable[[csr_array, int], Solve],
+) -> SmoothedValue:
+    """Bind one of the handlers; `solve` is given the rows and columns of W of boundary and ghosts.
+
+    Raises:
+        SceneError: nothing matches, or the equations of this solve have no unique solution.
+    """
+    field = VectorField.of(displacement, f"{handler}: displacement")
+    field.check_dimension(setting.particles.dimension, handler)
+    boundary = setting.select(where)
+    if setting.particles.ghosts[boundary].any():
+        raise SceneError(f"{handler}: where = {where!r} matches ghosts; name them under `ghosts`")
+    own_ghosts = chosen_ghosts(setting, ghosts, handler)
+    chosen = np.concatenate([boundary, own_ghosts])
+    smoothing = csr_array(setting.smoothing_matrix()[chosen])
+    return SmoothedValue(
+        label=label,
+        positions=setting.particles.positions,
+        boundary=boundary,
+        ghosts=own_ghosts,
+        field=field,
+        time_scale=setting.time_scale,
+        smoothing=smoothing,
+        extension=_extension(setting, own_ghosts, extension, field, handler),
+        solve=solve(csr_array(smoothing[:, chosen]), len(boundary)),
+    )
+
+
+def _extension(
+    setting: Setting,
+    ghosts: Indices,
+    known: Mapping[str, Component] | None,
+    field: VectorField,
+    handler: str,
+) -> Extension:
+    if known is None:
+        return ReflectedExtension(reflected(setting.particles, ghosts))
+    beyond = VectorField.of(known, f"{handler}: extension")
+    missing = set(field.components) - set(beyond.components)
+    if missing:
+        raise SceneError(
+            f"{handler}: extension lacks component {COMPONENTS[min(missing)]!r}; give every "
+            "component that displacement has"
+        )
+    return KnownExtension(setting.particles.positions[ghosts], beyond, setting.time_scale)
+
+
+def factorised(matrix: csr_array, handler: str) -> SuperLU:
+    """LU factors of a square sparse matrix; SceneError if it is singular."""
+    try:
+        return splu(csc_array(matrix))
+    except RuntimeError:
+        raise SceneError(
+            f"{handler}: the approximation at the {matrix.shape[0]} chosen particles does not "
+            "determine their values; choose fewer ghosts, or a smaller cover"
+        ) from None

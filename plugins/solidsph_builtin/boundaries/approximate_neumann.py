@@ -1,0 +1,120 @@
+"""A traction imposed on the smoothed stress at the boundary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import final
+
+import attrs
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import SuperLU
+
+from solidsph.arrays import Array, Indices
+from solidsph.interfaces.boundary import BoundaryHandler
+from solidsph.interfaces.condition import Condition, Observation, StressCondition
+from solidsph.motion import Component, VectorField
+from solidsph.setting import Setting
+from solidsph.where import Where
+from solidsph_builtin.boundaries._dirichlet import factorised
+from solidsph_builtin.boundaries._images import interpolation
+from solidsph_builtin.boundaries._reports import COMPONENTS
+from solidsph_builtin.boundaries.ghost_extension import chosen_ghosts
+from solidsph_builtin.boundaries.traction import surface_at
+
+
+@final
+@attrs.frozen
+class ApproximateNeumann(BoundaryHandler):
+    """<P> N = traction at the boundary particles, by the smallest change of the stress there.
+
+    The gradient itself cannot be set, because dW/dr = 0 at r = 0; so a second approximation, of
+    the stress computed from it, is made to satisfy the condition (Ismail & Reddy, section 2.3).
+    Exact in one dimension. In more, the stress near an edge has one normal a particle where the
+    surface has two, and only the component along the normal is set: it is approximate. Ghosts
+    must move by another handler, such as `ghost-extension`.
+    """
+
+    where: Where  # a face such as "left", or any condition that matches surface particles
+    traction: Mapping[str, Component]  # such as {x = 0, y = "-1e5"} [Pa]
+    ghosts: Where = "ghosts"  # those whose stress may change with it
+
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        particles = setting.particles
+        field = VectorField.of(self.traction, "approximate-neumann: traction")
+        field.check_dimension(particles.dimension, "approximate-neumann")
+        boundary, area_vectors = surface_at(setting, self.where, "approximate-neumann")
+        ghosts = chosen_ghosts(setting, self.ghosts, "approximate-neumann")
+        normals = area_vectors / np.linalg.norm(area_vectors, axis=1)[:, None]
+        smoothing = csr_array(setting.smoothing_matrix()[boundary])
+        rows = csr_array(smoothing[:, np.concatenate([boundary, ghosts])])
+        # Stress changes y_b (x) N_b W_bq: their products with N_c make the Gram matrix of normals.
+        gram = csr_array((rows @ rows.T).multiply(csr_array(normals @ normals.T)))
+        return [
+            SmoothedTraction(
+                label=label,
+                positions=particles.positions,
+                boundary=boundary,
+                ghosts=ghosts,
+                normals=normals,
+                field=field,
+                smoothing=smoothing,
+                rows=rows,
+                normal_equations=factorised(gram, "approximate-neumann"),
+                images=interpolation(particles, particles.images[ghosts]),
+            )
+        ]
+
+
+@final
+@attrs.frozen(eq=False)
+class SmoothedTraction(StressCondition):
+    """<P> N = field(X, t) at the boundary particles."""
+
+    label: str
+    positions: Array  # (n, d) reference positions of all particles
+    boundary: Indices  # (b,)
+    ghosts: Indices  # (g,)
+    normals: Array  # (b, d)
+    field: VectorField
+    smoothing: csr_array  # (b, n) rows of W
+    rows: csr_array  # (b, b + g) its columns of boundary and ghosts
+    normal_equations: SuperLU  # (b, b)
+    images: csr_array  # (g, n) values at the images of the ghosts
+
+    def impose_stress(self, time: float, stress: Array) -> None:
+        chosen = np.concatenate([self.boundary, self.ghosts])
+        for row in stress:
+            for component in row:
+                component[self.ghosts] = self.images @ component
+        for axis in self.field.components:
+            target = self.field.values(axis, self.positions[self.boundary], time)
+            for _ in range(2):  # the second pass wins back the digits that A A^T costs
+                missing = target - self._traction(stress, axis)
+                change = self.normal_equations.solve(missing)
+                for k, component in enumerate(stress[axis]):
+                    component[chosen] += self.rows.T @ (change * self.normals[:, k])
+
+    def _traction(self, stress: Array, axis: int) -> Array:
+        """Component of <P> N along `axis` at the boundary particles, (b,)."""
+        smoothed = self.smoothing @ stress[axis].T
+        traction: Array = np.einsum("bk,bk->b", smoothed, self.normals)
+        return traction
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        stress = np.ascontiguousarray(np.moveaxis(observation.stresses, 0, -1))
+        time = observation.state.time
+        before = [self._traction(stress, axis) for axis in self.field.components]
+        self.impose_stress(time, stress)
+        X = self.positions[self.boundary]
+        columns: dict[str, float] = {}
+        for axis, unset in zip(self.field.components, before, strict=True):
+            name = COMPONENTS[axis]
+            columns[f"{self.label} asked {name} [Pa]"] = float(
+                np.mean(self.field.values(axis, X, time))
+            )
+            columns[f"{self.label} achieved {name} [Pa]"] = float(
+                np.mean(self._traction(stress, axis))
+            )
+            columns[f"{self.label} unset {name} [Pa]"] = float(np.mean(unset))
+        return columns

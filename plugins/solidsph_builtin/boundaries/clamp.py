@@ -1,0 +1,42 @@
+"""Particles held where they are in the reference configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import final
+
+import attrs
+
+from solidsph.errors import SceneError
+from solidsph.interfaces.boundary import BoundaryHandler
+from solidsph.interfaces.condition import Condition
+from solidsph.motion import VectorField
+from solidsph.setting import Setting
+from solidsph.where import Where
+from solidsph_builtin.boundaries._imposed import ImposedMotion
+from solidsph_builtin.boundaries._reports import COMPONENTS
+
+
+@final
+@attrs.frozen
+class Clamp(BoundaryHandler):
+    """u = 0 on the chosen particles, along the chosen axes (all by default)."""
+
+    where: Where
+    axes: Sequence[str] | None = None  # such as ["x", "y"]
+
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        names = COMPONENTS[: setting.particles.dimension]
+        axes = names if self.axes is None else tuple(self.axes)
+        for name in axes:
+            if name not in names:
+                raise SceneError(f"clamp: unknown axis {name!r}; this scene has {', '.join(names)}")
+        return [
+            ImposedMotion(
+                label=label,
+                indices=setting.select(self.where),
+                positions=setting.particles.positions,
+                field=VectorField({names.index(name): 0.0 for name in axes}),
+                time_scale=setting.time_scale,
+            )
+        ]

@@ -1,0 +1,63 @@
+"""A smoothed boundary value imposed at the boundary and at every ghost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import final
+
+import attrs
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import SuperLU
+
+from solidsph.arrays import Array
+from solidsph.interfaces.boundary import BoundaryHandler
+from solidsph.interfaces.condition import Condition
+from solidsph.motion import Component
+from solidsph.setting import Setting
+from solidsph.where import Where
+from solidsph_builtin.boundaries._dirichlet import Solve, factorised, smoothed_value
+
+
+@final
+@attrs.frozen
+class FullDirichlet(BoundaryHandler):
+    """Solves W_BG,BG u_new = u_BG - W_BG,I u_I, so that the approximation equals the given value at
+    the boundary and its smooth extension at the ghosts.
+
+    Ismail & Reddy, eq. 11, with the contribution of the interior that the printed matrix leaves
+    out. Exact, but badly conditioned: for comparison with `exact-dirichlet`.
+    """
+
+    where: Where  # boundary particles
+    displacement: Mapping[str, Component]  # such as {x = "0.1*Y"} [m]
+    ghosts: Where = "ghosts"  # those that may change with them
+    extension: Mapping[str, Component] | None = None  # ghosts' values, if known; else reflected
+
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        return [
+            smoothed_value(
+                setting,
+                label,
+                where=self.where,
+                ghosts=self.ghosts,
+                displacement=self.displacement,
+                extension=self.extension,
+                handler="full-dirichlet",
+                solve=_FullSolve.of,
+            )
+        ]
+
+
+@final
+@attrs.frozen(eq=False)
+class _FullSolve(Solve):
+    """W_BG,BG u_new = u_BG - W_BG,I u_I."""
+
+    square: SuperLU  # of W_BG,BG
+
+    @classmethod
+    def of(cls, square: csr_array, boundary_count: int) -> _FullSolve:
+        return cls(factorised(square, "full-dirichlet"))
+
+    def values(self, smooth: Array, interior: Array, target: Array) -> Array:
+        return self.square.solve(smooth - interior)

@@ -1,0 +1,98 @@
+"""Ghosts that continue the body's fields smoothly beyond its surface."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import final
+
+import attrs
+import numpy as np
+from scipy.sparse import csr_array
+
+from solidsph.arrays import Array, Indices, Mask
+from solidsph.errors import SceneError
+from solidsph.interfaces.boundary import BoundaryHandler
+from solidsph.interfaces.condition import (
+    Condition,
+    ExtensionCondition,
+    Observation,
+    StressCondition,
+)
+from solidsph.setting import Setting
+from solidsph.where import Where
+from solidsph_builtin.boundaries._images import interpolation, reflected
+
+
+@final
+@attrs.frozen
+class GhostExtension(BoundaryHandler):
+    """Displacements are reflected through the surface value, stresses mirrored.
+
+    A linear field is continued exactly. By itself this imposes nothing: it completes the support
+    of particles near a surface that another handler holds or loads. Ismail & Reddy, section 2.3.
+    """
+
+    where: Where = "ghosts"
+
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        particles = setting.particles
+        ghosts = chosen_ghosts(setting, self.where, "ghost-extension")
+        return [
+            Extension(
+                label=label,
+                ghosts=ghosts,
+                shape=particles.positions.shape,
+                displacement=reflected(particles, ghosts),
+                stress=interpolation(particles, particles.images[ghosts]),
+            )
+        ]
+
+
+def chosen_ghosts(setting: Setting, where: Where, handler: str) -> Indices:
+    """The particles at `where`, all of which must be ghosts."""
+    if not setting.particles.ghosts.any():
+        raise SceneError(
+            f"{handler}: the scene has no ghosts; give its discretisation some, such as "
+            '{type = "lattice", ghosts = 3}'
+        )
+    chosen = setting.select(where)
+    real = chosen[~setting.particles.ghosts[chosen]]
+    if len(real):
+        raise SceneError(
+            f"{handler}: {len(real)} particles at where = {where!r} are not ghosts; "
+            "choose 'ghosts' or a face's, such as 'left-ghosts'"
+        )
+    return chosen
+
+
+@final
+@attrs.frozen(eq=False)
+class Extension(ExtensionCondition, StressCondition):
+    """Ghost values as linear combinations of the values of real particles."""
+
+    label: str
+    ghosts: Indices  # (k,)
+    shape: tuple[int, ...]  # (n, d)
+    displacement: csr_array  # (k, n)
+    stress: csr_array  # (k, n)
+
+    @property
+    def held(self) -> Mask:
+        held = np.zeros(self.shape, dtype=np.bool_)
+        held[self.ghosts] = True
+        return held
+
+    def impose(self, time: float, derivative: int, values: Array) -> None:
+        values[self.ghosts] = self.displacement @ values
+
+    def return_forces(self, forces: Array) -> None:
+        forces += self.displacement.T @ forces[self.ghosts]
+        forces[self.ghosts] = 0.0
+
+    def impose_stress(self, time: float, stress: Array) -> None:
+        for row in stress:
+            for component in row:
+                component[self.ghosts] = self.stress @ component
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {}

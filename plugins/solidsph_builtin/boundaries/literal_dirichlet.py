@@ -1,0 +1,62 @@
+"""The paper's boundary condition as it is printed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import final
+
+import attrs
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import SuperLU
+
+from solidsph.arrays import Array
+from solidsph.interfaces.boundary import BoundaryHandler
+from solidsph.interfaces.condition import Condition
+from solidsph.motion import Component
+from solidsph.setting import Setting
+from solidsph.where import Where
+from solidsph_builtin.boundaries._dirichlet import Solve, factorised, smoothed_value
+
+
+@final
+@attrs.frozen
+class LiteralDirichlet(BoundaryHandler):
+    """Solves W_BG,BG u_new = u_BG, whatever the interior contributes.
+
+    Ismail & Reddy, eq. 11 to the letter. The approximation misses the boundary value by what the
+    interior adds to it: kept to show that, and reported as the miss.
+    """
+
+    where: Where  # boundary particles
+    displacement: Mapping[str, Component]  # such as {x = "0.1*Y"} [m]
+    ghosts: Where = "ghosts"  # those that may change with them
+    extension: Mapping[str, Component] | None = None  # ghosts' values, if known; else reflected
+
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        return [
+            smoothed_value(
+                setting,
+                label,
+                where=self.where,
+                ghosts=self.ghosts,
+                displacement=self.displacement,
+                extension=self.extension,
+                handler="literal-dirichlet",
+                solve=_LiteralSolve.of,
+            )
+        ]
+
+
+@final
+@attrs.frozen(eq=False)
+class _LiteralSolve(Solve):
+    """W_BG,BG u_new = u_BG."""
+
+    square: SuperLU  # of W_BG,BG
+
+    @classmethod
+    def of(cls, square: csr_array, boundary_count: int) -> _LiteralSolve:
+        return cls(factorised(square, "literal-dirichlet"))
+
+    def values(self, smooth: Array, interior: Array, target: Array) -> Array:
+        return self.square.solve(smooth)

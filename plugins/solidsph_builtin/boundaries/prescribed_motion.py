@@ -1,0 +1,44 @@
+"""A displacement imposed as a function of position and time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import final
+
+import attrs
+
+from solidsph.interfaces.boundary import BoundaryHandler
+from solidsph.interfaces.condition import Condition
+from solidsph.motion import Component, VectorField
+from solidsph.setting import Setting
+from solidsph.where import Where
+from solidsph_builtin.boundaries._imposed import ImposedMotion
+
+
+@final
+@attrs.frozen
+class PrescribedMotion(BoundaryHandler):
+    """u = displacement(X, t) on the chosen particles; components not given stay free.
+
+    Velocity and acceleration of the imposed motion are its time derivatives, so the reaction
+    reported includes the inertia of the particles moved.
+    """
+
+    where: Where
+    displacement: Mapping[str, Component]  # such as {x = "0.1*t", y = 0} [m]
+
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        field = VectorField.of(self.displacement, "prescribed-motion: displacement")
+        field.check_dimension(setting.particles.dimension, "prescribed-motion")
+        indices = setting.select(self.where)
+        for axis in field.components:  # a formula out of its domain shows now, not in mid-run
+            field.values(axis, setting.particles.positions[indices], 0.0)
+        return [
+            ImposedMotion(
+                label=label,
+                indices=indices,
+                positions=setting.particles.positions,
+                field=field,
+                time_scale=setting.time_scale,
+            )
+        ]

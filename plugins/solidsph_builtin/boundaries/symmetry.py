@@ -1,0 +1,133 @@
+"""A plane of symmetry normal to an axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import final
+
+import attrs
+import numpy as np
+from scipy.sparse import csr_array
+
+from solidsph.arrays import Array, Indices, Mask
+from solidsph.errors import SceneError
+from solidsph.interfaces.boundary import BoundaryHandler
+from solidsph.interfaces.condition import (
+    Condition,
+    ExtensionCondition,
+    Observation,
+    StressCondition,
+)
+from solidsph.motion import VectorField
+from solidsph.setting import Setting
+from solidsph_builtin.boundaries._images import interpolation
+from solidsph_builtin.boundaries._imposed import ImposedMotion
+from solidsph_builtin.boundaries._reports import COMPONENTS
+
+# A particle this close to the plane, in spacings, lies on it.
+_ON_PLANE = 1e-6
+
+
+@final
+@attrs.frozen
+class Symmetry(BoundaryHandler):
+    """Mirrors the body at the plane {axis} = {at}; the rest of it lies on either side.
+
+    Particles on the plane stay on it, and ghosts beyond the plane move as mirror images. One of
+    the two must be there: particles on the plane, or ghosts to complete the supports, such as
+    those of `ghost_faces = ["left"]`.
+    """
+
+    axis: str
+    at: float = attrs.field(default=0.0, converter=float)  # [m]
+
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        particles = setting.particles
+        names = COMPONENTS[: particles.dimension]
+        if self.axis not in names:
+            raise SceneError(
+                f"symmetry: unknown axis {self.axis!r}; this scene has {', '.join(names)}"
+            )
+        normal = names.index(self.axis)
+        height = particles.positions[:, normal] - self.at
+        on_plane = np.flatnonzero(
+            ~particles.ghosts & (np.abs(height) < _on_plane_tolerance(setting))
+        )
+        beyond = _ghosts_of(setting, normal, self.at)
+        if not len(on_plane) and not len(beyond):
+            raise SceneError(
+                f"symmetry: no particle lies on the plane {self.axis} = {self.at:.6g} m and no "
+                "ghost beyond it; place particles on it (on_boundary = true) or add ghosts"
+            )
+        conditions: list[Condition] = []
+        if len(on_plane):
+            conditions.append(
+                ImposedMotion(
+                    label=label,
+                    indices=on_plane,
+                    positions=particles.positions,
+                    field=VectorField({normal: 0.0}),
+                    time_scale=setting.time_scale,
+                )
+            )
+        if len(beyond):
+            X, images = particles.positions[beyond], particles.images[beyond]
+            conditions.append(
+                Mirror(
+                    label=f"{label} (ghosts)",
+                    ghosts=beyond,
+                    shape=particles.positions.shape,
+                    images=interpolation(particles, images),
+                    # Beyond a corner of two planes a ghost is mirrored in both.
+                    signs=np.where(np.abs(X - images) > _on_plane_tolerance(setting), -1.0, 1.0),
+                )
+            )
+        return conditions
+
+
+def _on_plane_tolerance(setting: Setting) -> float:
+    return _ON_PLANE * float(setting.particles.spacings.min())
+
+
+def _ghosts_of(setting: Setting, normal: int, at: float) -> Indices:
+    """Ghosts that are mirror images in the plane; beyond a corner, in the plane of least axis."""
+    particles = setting.particles
+    tolerance = _on_plane_tolerance(setting)
+    X, images = particles.positions, particles.images
+    moved = np.abs(X - images) > tolerance
+    mirrored_here = moved[:, normal] & (np.abs(0.5 * (X + images)[:, normal] - at) < tolerance)
+    return np.flatnonzero(particles.ghosts & mirrored_here & ~moved[:, :normal].any(axis=1))
+
+
+@final
+@attrs.frozen(eq=False)
+class Mirror(ExtensionCondition, StressCondition):
+    """Ghosts as mirror images: u = R u, T = R T R with R the reflection."""
+
+    label: str
+    ghosts: Indices  # (k,)
+    shape: tuple[int, ...]  # (n, d)
+    images: csr_array  # (k, n)
+    signs: Array  # (k, d) the diagonals of R
+
+    @property
+    def held(self) -> Mask:
+        held = np.zeros(self.shape, dtype=np.bool_)
+        held[self.ghosts] = True
+        return held
+
+    def impose(self, time: float, derivative: int, values: Array) -> None:
+        values[self.ghosts] = self.signs * (self.images @ values)
+
+    def return_forces(self, forces: Array) -> None:
+        forces += self.images.T @ (self.signs * forces[self.ghosts])
+        forces[self.ghosts] = 0.0
+
+    def impose_stress(self, time: float, stress: Array) -> None:
+        for i, row in enumerate(stress):
+            for k, component in enumerate(row):
+                sign = self.signs[:, i] * self.signs[:, k]
+                component[self.ghosts] = sign * (self.images @ component)
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {}

@@ -1,0 +1,95 @@
+"""A dead load on a surface."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import final
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array, Indices
+from solidsph.errors import SceneError
+from solidsph.interfaces.boundary import BoundaryHandler
+from solidsph.interfaces.condition import Condition, ForceCondition, Observation
+from solidsph.motion import Component, VectorField
+from solidsph.setting import Setting
+from solidsph.where import Where
+from solidsph_builtin.boundaries._reports import COMPONENTS
+
+
+@final
+@attrs.frozen
+class Traction(BoundaryHandler):
+    """Force per reference area on a face, fixed in direction (a dead load).
+
+    The weak form's own natural condition: each particle receives traction times the area of the
+    face that it owns, so the total force is exact. Reported beside it is the traction that the
+    stress at those particles balances.
+    """
+
+    where: Where  # a face such as "right", or any condition that matches surface particles
+    traction: Mapping[str, Component]  # such as {x = "5e6*min(t/1e-3, 1)"} [Pa]
+
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        particles = setting.particles
+        field = VectorField.of(self.traction, "traction: traction")
+        field.check_dimension(particles.dimension, "traction")
+        indices, area_vectors = surface_at(setting, self.where, "traction")
+        for axis in field.components:
+            field.values(axis, particles.positions[indices], 0.0)
+        return [
+            DeadLoad(
+                label=label,
+                particles=indices,
+                positions=particles.positions[indices],
+                area_vectors=area_vectors,
+                field=field,
+            )
+        ]
+
+
+def surface_at(setting: Setting, where: Where, handler: str) -> tuple[Indices, Array]:
+    """Particles at `where` that own surface, (k,), and their area vectors there, (k, d)."""
+    particles = setting.particles
+    if isinstance(where, str) and where in particles.faces:
+        face = particles.faces[where]
+        return face.particles, face.area_vectors
+    chosen = setting.select(where)
+    chosen = chosen[np.linalg.norm(particles.area_vectors[chosen], axis=1) > 0.0]
+    if not len(chosen):
+        raise SceneError(
+            f"{handler}: no particle at where = {where!r} lies on the surface; name a face: "
+            f"{', '.join(particles.faces)}"
+        )
+    return chosen, particles.area_vectors[chosen]
+
+
+@final
+@attrs.frozen(eq=False)
+class DeadLoad(ForceCondition):
+    """Traction times area on each surface particle."""
+
+    label: str
+    particles: Indices  # (k,)
+    positions: Array  # (k, d) reference positions
+    area_vectors: Array  # (k, d)
+    field: VectorField
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        areas = np.linalg.norm(self.area_vectors, axis=1)
+        forces = np.zeros_like(self.area_vectors)
+        for axis in self.field.components:
+            forces[:, axis] = areas * self.field.values(axis, self.positions, time)
+        return forces
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        total_area = np.linalg.norm(self.area_vectors, axis=1).sum()
+        asked = observation.state.applied[self.label].sum(axis=0) / total_area
+        P = observation.stresses[self.particles]
+        achieved = np.einsum("pij,pj->i", P, self.area_vectors) / total_area
+        columns: dict[str, float] = {}
+        for k, name in enumerate(COMPONENTS[: len(asked)]):
+            columns[f"{self.label} asked {name} [Pa]"] = float(asked[k])
+            columns[f"{self.label} achieved {name} [Pa]"] = float(achieved[k])
+        return columns

@@ -1,0 +1,230 @@
+"""The paper's headline experiment: a bar in tension, perturbed, in both Lagrangian forms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import ClassVar, final
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array
+from solidsph.builder import Builder
+from solidsph.errors import SceneError
+from solidsph.interfaces.case import Case, Measurement
+from solidsph.results.record import Record
+from solidsph.scene import Scene
+from solidsph.studies.spectrum import spectrum
+from solidsph_builtin.materials.neo_hookean import NeoHookean
+
+FORMS = ("total-lagrangian", "updated-lagrangian")
+
+# How long the growth is watched, in e-foldings of the rate that the spectrum predicts for the
+# updated form: from the smallest deviation that rounding leaves clean to the edge of linearity.
+_WATCHED_FOLDINGS = 16.0
+
+# Deviations of the linear runs, in spacings: the start is 1e5 times the rounding of positions.
+_LINEAR_START = 1e-9
+_LINEAR_END = 1e-2
+
+# The rate is read off the last two decades below the end: by then the fastest mode has outgrown
+# those that the perturbation of a single particle starts beside it.
+_LAST_DECADES = 1e-2
+
+# A deviation that stays below this multiple of its start has not grown: waves that cross add up
+# to little more than the start, growth at any rate worth the name passes it within the watch.
+_NO_GROWTH = 1.5
+
+
+@final
+@attrs.frozen
+class TensileInstability(Case):
+    """A bar held at both ends at a uniform stretch, its centre particle displaced a little more.
+
+    In truth the disturbance spreads as waves. The total Lagrangian form does so; in the updated
+    form neighbouring particles attract each other, and the disturbance grows where it started.
+    Beside the paper's finite perturbation, one small enough for linear theory is run at several
+    stretches, and its growth compared with the spectrum of the discrete system.
+    """
+
+    title: ClassVar[str] = "A bar in tension, perturbed: total against updated Lagrangian"
+    source: ClassVar[str] = "Ismail & Reddy, section 5.2, Figs. 12 to 14"
+
+    stretch: float = attrs.field(default=1.2, converter=float)  # of the finite perturbation [-]
+    perturbation: float = attrs.field(default=0.05, converter=float)  # of the displacement [-]
+    stretches: Sequence[float] = (1.02, 1.2, 1.5)  # at which growth rates are compared [-]
+    transits: float = attrs.field(default=0.45, converter=float)  # duration [wave transits]
+    length: float = attrs.field(default=0.15, converter=float)  # [m]
+    spacing: float = attrs.field(default=2.5e-3, converter=float)  # [m]
+    cover: float = attrs.field(default=5.5, converter=float)  # [spacings]
+    youngs_modulus: float = attrs.field(default=200e9, converter=float)  # [Pa]
+    poissons_ratio: float = attrs.field(default=0.3, converter=float)  # [-]
+    density: float = attrs.field(default=8000.0, converter=float)  # [kg/m^3]
+
+    def __attrs_post_init__(self) -> None:
+        for stretch in (self.stretch, *self.stretches):
+            if not stretch > 0.0 or stretch == 1.0:
+                raise SceneError(
+                    f"case 'tensile-instability': a stretch must be positive and not 1, got "
+                    f"{stretch}; at 1 there is no displacement to perturb"
+                )
+        if round(self.length / self.spacing) % 2:
+            raise SceneError(
+                f"case 'tensile-instability': length / spacing must be even, got "
+                f"{self.length / self.spacing:.6g}, so that a particle lies at the centre"
+            )
+
+    @property
+    def material(self) -> NeoHookean:
+        """The bar's material."""
+        return NeoHookean(self.youngs_modulus, self.poissons_ratio, self.density)
+
+    @property
+    def transit(self) -> float:
+        """Time in which a small confined wave crosses the bar [s]."""
+        return self.length / self.material.wave_speed
+
+    def scenes(self) -> Mapping[str, Scene]:
+        scenes = {
+            form: self._scene(form, self.stretch, self.perturbation, self.transits * self.transit)
+            for form in FORMS
+        }
+        for stretch in self.stretches:
+            rate = self.predicted_rate("updated-lagrangian", stretch)
+            # Where nothing grows, compression for one, ten transits show it.
+            watch = min(_WATCHED_FOLDINGS / max(rate, 1e-300), 20.0 * self.transit)
+            small = _LINEAR_START * self.spacing / (0.5 * self.length * abs(stretch - 1.0))
+            for form in FORMS:
+                scenes[_rate_name(form, stretch)] = self._scene(form, stretch, small, watch)
+        return scenes
+
+    def predicted_rate(self, form: str, stretch: float) -> float:
+        """Growth rate of the fastest mode about the uniform stretch [1/s]."""
+        simulation = Builder(self._scene(form, stretch, 0.0, self.transit)).build()
+        return spectrum(simulation.dynamics, simulation.start()).growth_rate
+
+    def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
+        return [
+            *(self._spread(form, records[form]) for form in FORMS),
+            *(
+                self._growth(form, stretch, records[_rate_name(form, stretch)])
+                for stretch in self.stretches
+                for form in FORMS
+            ),
+        ]
+
+    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
+        from solidsph_builtin.cases._tensile_picture import draw_forms
+
+        path = folder / "fig-13-14-tensile-instability.png"
+        draw_forms(
+            {form: records[form] for form in FORMS},
+            stretch=self.stretch,
+            perturbation=self.perturbation,
+            transit=self.transit,
+            path=path,
+        )
+        return [path]
+
+    def _scene(self, form: str, stretch: float, perturbation: float, duration: float) -> Scene:
+        half = 0.5 * self.length
+        tolerance = 1e-6 * self.spacing
+        uniform = f"{stretch - 1.0!r}*X"
+        return (
+            Builder()
+            .title(f"{self.title}: {form} at stretch {stretch:g}")
+            .body(
+                "bar",
+                shape={"type": "interval", "length": self.length},
+                spacing=self.spacing,
+                discretisation={
+                    "type": "lattice",
+                    "on_boundary": True,
+                    "ghosts": int(np.ceil(self.cover)),
+                },
+                tags={"centre": f"abs(X - {half!r}) < {tolerance!r}"},
+            )
+            .kernel("modified-mollifier", cover=self.cover)
+            .material(
+                "neo-hookean",
+                youngs_modulus=self.youngs_modulus,
+                poissons_ratio=self.poissons_ratio,
+                density=self.density,
+            )
+            # Both forms with the paper's sums; differences keep the updated form's strain
+            # independent of where the bar stands.
+            .formulation(form, gradient="difference", divergence="plain")
+            .boundary("prescribed-motion", where="left", displacement={"x": uniform})
+            .boundary("prescribed-motion", where="right", displacement={"x": uniform})
+            .boundary("ghost-extension")
+            .initial(displacement={"x": uniform})
+            .initial(where="centre", displacement={"x": f"{uniform}*{1.0 + perturbation!r}"})
+            .integrator("central-difference", time_step_factor=0.5)
+            .duration(duration)
+            .outputs(200)
+            .scene()
+        )
+
+    def _spread(self, form: str, record: Record) -> Measurement:
+        """Largest deviation at the end of the finite perturbation, over that at the start."""
+        deviations = np.abs(deviation(record, self.stretch)).max(axis=1)
+        ratio = float(deviations[-1] / deviations[0])
+        gap = float(np.diff(_bar_positions(record), axis=1).min() / self.spacing)
+        should_grow = form == "updated-lagrangian" and self.stretch > 1.1
+        return Measurement(
+            quantity=f"{form}, stretch {self.stretch:g}: deviation at the end over the start",
+            value=ratio,
+            unit="1",
+            source="section 5.2: the total form's disturbance spreads, the updated form's clumps",
+            verdict=f"{'grew' if ratio > 1.0 else 'spread'}, closest pair {gap:.2f} spacings",
+            passed=(ratio > 1.0) == should_grow,
+        )
+
+    def _growth(self, form: str, stretch: float, record: Record) -> Measurement:
+        predicted = self.predicted_rate(form, stretch) * self.transit
+        times = record.times / self.transit
+        amplitudes = np.linalg.norm(deviation(record, stretch), axis=1)
+        grew = amplitudes.max() > _NO_GROWTH * amplitudes[0]
+        measured = growth_rate(times, amplitudes, _LINEAR_END * self.spacing) if grew else 0.0
+        unstable = predicted * times[-1] > np.log(_NO_GROWTH)
+        error = abs(measured / predicted - 1.0) if unstable else abs(measured)
+        return Measurement(
+            quantity=f"{form}, stretch {stretch:g}: growth rate",
+            value=measured,
+            unit="1/transit",
+            reference=predicted if unstable else 0.0,
+            source="spectrum of the discrete system, linearised numerically",
+            error=error,
+            verdict="unstable" if grew else "stable",
+            passed=grew == unstable == (form == "updated-lagrangian") and error < 0.1,
+        )
+
+
+def _rate_name(form: str, stretch: float) -> str:
+    return f"{form}-rate-{stretch:g}"
+
+
+def _bar_positions(record: Record) -> Array:
+    """Current positions of the bar's particles at every time, left to right, (t, n)."""
+    particles = record.particles
+    real = np.flatnonzero(~particles.ghosts)
+    order = real[np.argsort(particles.positions[real, 0])]
+    positions: Array = record.positions[:][:, order, 0]
+    return positions
+
+
+def deviation(record: Record, stretch: float) -> Array:
+    """Displacement from the uniform stretch at every time [m], left to right, (t, n)."""
+    particles = record.particles
+    X = np.sort(particles.positions[~particles.ghosts, 0])
+    return _bar_positions(record) - stretch * X
+
+
+def growth_rate(times: Array, amplitudes: Array, end: float) -> float:
+    """Slope of the logarithm of `amplitudes` over `times`, in the last decades up to `end`."""
+    past_end = np.flatnonzero(amplitudes > end)
+    last = int(past_end[0]) if len(past_end) else len(amplitudes)
+    chosen = np.zeros(len(amplitudes), dtype=np.bool_)
+    chosen[:last] = amplitudes[:last] > _LAST_DECADES * amplitudes[:last].max()
+    return float(np.polyfit(times[chosen], np.log(amplitudes[chosen]), 1)[0])

@@ -1,0 +1,125 @@
+"""Grid: equal cells over the bounding box of a shape, one lattice point to each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array, Indices, Mask
+from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.shape import Shape
+from solidsph_builtin.discretisations._checks import check_count, refusal
+from solidsph_builtin.shapes._sampling import cells_along
+
+# Points handled at once: enough for NumPy to be efficient, few enough to stay in the cache.
+_CHUNK = 1 << 15
+
+
+@attrs.frozen(eq=False)
+class Grid:
+    """Lattice points, numbered with the last axis fastest, and the cell around each."""
+
+    lower: Array  # (d,) lower corner of the bounding box [m]
+    lengths: Array  # (d,) of the bounding box [m]
+    cells: tuple[int, ...]  # how many fill the bounding box along each axis
+    first: float  # where the first point along an axis is, counted in cells from the lower corner
+    counts: tuple[int, ...]  # lattice points along each axis, those beyond the box included
+
+    @property
+    def steps(self) -> Array:
+        """Size of a cell along each axis (d,) [m]."""
+        result: Array = self.lengths / np.array(self.cells)
+        return result
+
+    @property
+    def size(self) -> int:
+        """Number of lattice points."""
+        return math.prod(self.counts)
+
+    @property
+    def cell_volume(self) -> float:
+        """Volume of one cell [m^d]."""
+        return float(np.prod(self.steps))
+
+    @property
+    def half_diagonal(self) -> float:
+        """Distance from the centre of a cell to its corners [m]."""
+        return 0.5 * float(np.linalg.norm(self.steps))
+
+    def positions(self, numbers: Indices) -> Array:
+        """Lattice points of these `numbers` (n,), (n, d) [m]."""
+        index = np.stack(np.unravel_index(numbers, self.counts), axis=1)
+        # One rounding less than with the step: the last point is on the far face exactly.
+        result: Array = self.lower + (index + self.first) / np.array(self.cells) * self.lengths
+        return result
+
+    def cell_of(self, points: Array) -> Indices:
+        """Number of the cell that holds each of `points` (n, d), or the nearest one, (n,)."""
+        index = np.rint((points - self.lower) / self.steps - self.first).astype(np.intp)
+        index = np.clip(index, 0, np.array(self.counts) - 1)
+        return np.asarray(np.ravel_multi_index(tuple(index.T), self.counts), dtype=np.intp)
+
+    def near(self, marked: Mask, layers: int) -> Mask:
+        """Points at most so many `layers` of cells away from one that is `marked`, (size,)."""
+        grown = marked.reshape(self.counts)
+        for axis in range(grown.ndim):
+            along = np.moveaxis(grown, axis, 0)
+            wider = along.copy()
+            for shift in range(1, layers + 1):
+                wider[shift:] |= along[:-shift]
+                wider[:-shift] |= along[shift:]
+            grown = np.moveaxis(wider, 0, axis)
+        return grown.ravel()
+
+
+def grid_over(
+    discretisation: Discretisation,
+    shape: Shape,
+    spacing: float,
+    *,
+    on_boundary: bool = False,
+    beyond: int = 0,
+) -> Grid:
+    """The grid that fits the bounding box of `shape`, with cells as near to `spacing` as fit.
+
+    Args:
+        discretisation: who asks, for the messages.
+        shape: what is to be covered.
+        spacing: wanted size of the cells [m].
+        on_boundary: lattice points on the faces of the bounding box, not half a cell inside.
+        beyond: layers of lattice points beyond the box.
+
+    Raises:
+        SceneError: the shape is as good as empty, or there would be too many points.
+    """
+    lower, upper = shape.bounds()
+    lengths = upper - lower
+    if not (np.isfinite(lengths).all() and (lengths > 0.0).all()):
+        raise refusal(
+            discretisation,
+            f"the shape has no extent: its bounds are {lower.tolist()} and {upper.tolist()} m; "
+            "give it sizes that do not vanish beside its coordinates",
+        )
+    extra = int(on_boundary) + 2 * beyond
+    # In floating point first: the product may be beyond any integer.
+    check_count(discretisation, math.prod(length / spacing + extra for length in lengths.tolist()))
+    cells = tuple(cells_along(length, spacing) for length in lengths.tolist())
+    return Grid(
+        lower=lower,
+        lengths=lengths,
+        cells=cells,
+        first=(0.0 if on_boundary else 0.5) - beyond,
+        counts=tuple(count + extra for count in cells),
+    )
+
+
+def in_chunks(size: int, values: Callable[[Indices], Array]) -> Array:
+    """`values` of the numbers 0 to `size`, computed some at a time to bound the memory, (size,)."""
+    result = np.empty(size)
+    for start in range(0, size, _CHUNK):
+        numbers = np.arange(start, min(start + _CHUNK, size))
+        result[start : start + _CHUNK] = values(numbers)
+    return result

@@ -1,0 +1,147 @@
+"""What particles get from the surface of their shape: area vectors, tags, mirror images."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solidsph.arrays import Array, Indices, Mask
+from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.shape import Shape, Surface
+from solidsph.particles import Face
+from solidsph_builtin.discretisations._checks import refusal
+from solidsph_builtin.discretisations._nearest import Assignment
+
+# Samples among which a ghost looks for its mirror: enough to reach round an edge.
+_NEAREST = 8
+
+
+def sampled(discretisation: Discretisation, shape: Shape, spacing: float) -> Surface:
+    """The surface of `shape`, at most `spacing` [m] between samples.
+
+    Raises:
+        SceneError: there is none.
+    """
+    surface = shape.surface(spacing)
+    if not surface.faces:
+        raise refusal(discretisation, "the shape has no surface; is anything of it left?")
+    return surface
+
+
+def faces(surface: Surface, owners: Assignment) -> dict[str, Face]:
+    """What each particle owns of each face, so that all of it together closes.
+
+    A uniform pressure over a closed surface must not push the body. Where a composite shape cuts
+    through samples, their sum is off by about the size of one; so every area A is rescaled, its
+    normal n kept, by the smallest changes that close the sum:
+
+        A <- A (1 + n . l),    (sum |A| n n^T) l = -sum A
+
+    Args:
+        surface: samples of a closed surface.
+        owners: the particles to which the samples go.
+    """
+    names = np.array(surface.faces)[owners.points]
+    areas = surface.area_vectors[owners.points] * owners.shares[:, np.newaxis]
+    found = {}
+    for name in dict.fromkeys(surface.faces):
+        own = names == name
+        particles, which = np.unique(owners.particles[own], return_inverse=True)
+        area_vectors = np.zeros((particles.size, surface.points.shape[1]))
+        np.add.at(area_vectors, which, areas[own])
+        found[name] = Face(particles, area_vectors)
+
+    vectors = np.concatenate([face.area_vectors for face in found.values()])
+    sizes = np.linalg.norm(vectors, axis=1)
+    residual = vectors.sum(axis=0)
+    # Rounding alone is left as it is, so that plane faces keep their exact areas.
+    if np.linalg.norm(residual) <= 1e-13 * sizes.sum():
+        return found
+    # A face folded within one particle may leave it no area, and then no normal.
+    normals = vectors / np.where(sizes > 0.0, sizes, 1.0)[:, np.newaxis]
+    change = np.linalg.lstsq(vectors.T @ normals, -residual)[0]
+    closed = np.split(
+        vectors * (1.0 + normals @ change)[:, np.newaxis],
+        np.cumsum([face.particles.size for face in found.values()])[:-1],
+    )
+    return {
+        name: Face(face.particles, area_vectors)
+        for (name, face), area_vectors in zip(found.items(), closed, strict=True)
+    }
+
+
+def area_vectors(faces: Mapping[str, Face], count: int, dimension: int) -> Array:
+    """All that each of `count` particles owns of the `faces`, (count, d) [m^(d-1)]."""
+    total = np.zeros((count, dimension))
+    for face in faces.values():
+        total[face.particles] += face.area_vectors
+    return total
+
+
+def tags(faces: Mapping[str, Face], ghosts: Mask, nearest_faces: Sequence[str]) -> dict[str, Mask]:
+    """Named sets of particles, each (n,).
+
+    Args:
+        faces: the particles on each face.
+        ghosts: (n,) which particles are ghosts.
+        nearest_faces: (number of ghosts,) the face nearest to each of them.
+    """
+    found = {face: _mask(len(ghosts), own.particles) for face, own in faces.items()}
+    surface = np.logical_or.reduce(list(found.values()))
+    if ghosts.any():
+        names, numbers = np.array(nearest_faces), np.flatnonzero(ghosts)
+        found |= {f"{face}-ghosts": _mask(len(ghosts), numbers[names == face]) for face in faces}
+    return {**found, "surface": surface, "interior": ~surface & ~ghosts, "ghosts": ghosts}
+
+
+def _mask(count: int, members: Indices) -> Mask:
+    mask = np.zeros(count, dtype=np.bool_)
+    mask[members] = True
+    return mask
+
+
+def mirrored(
+    shape: Shape, surface: Surface, points: Array, tolerance: float, allowed: Sequence[str] | None
+) -> tuple[Array, Indices, Mask]:
+    """Mirror images of `points` (n, d) [m], the sample of the surface nearest to each (n,), and
+    whether all its mirrors lie on `allowed` faces (n,), any face if None.
+
+    The mirror is the plane through the nearest sample. Beyond an edge or a corner an image may
+    still lie outside; it is mirrored again then, at most once for each dimension.
+    """
+    images, samples = points.copy(), np.zeros(len(points), dtype=np.intp)
+    kept = np.ones(len(points), dtype=np.bool_)
+    if not len(points):
+        return images, samples, kept
+    is_mirror = np.array([allowed is None or face in allowed for face in surface.faces])
+    tree = cKDTree(surface.points)
+    normals = surface.area_vectors / np.linalg.norm(surface.area_vectors, axis=1, keepdims=True)
+    outside = np.arange(len(points))
+    for mirror in range(2 * points.shape[1]):
+        if not outside.size:
+            break
+        nearest, gaps = _in_front(tree, surface.points, normals, images[outside])
+        if mirror == 0:
+            samples = nearest
+        kept[outside] &= is_mirror[nearest]
+        images[outside] -= 2.0 * gaps[:, np.newaxis] * normals[nearest]
+        outside = outside[shape.signed_distance(images[outside]) > tolerance]
+    return images, samples, kept
+
+
+def _in_front(
+    tree: cKDTree, samples: Array, normals: Array, points: Array
+) -> tuple[Indices, Array]:
+    """The nearest sample that each of `points` is in front of (n,), and how far (n,) [m].
+
+    Beyond an edge the nearest of all may lie on a face that the point is behind or beside.
+    """
+    count = min(_NEAREST, len(samples))
+    near = np.asarray(tree.query(points, k=np.arange(1, count + 1))[1], dtype=np.intp)
+    gaps = np.einsum("nki,nki->nk", points[:, np.newaxis, :] - samples[near], normals[near])
+    rows = np.arange(len(points))
+    # The first that is clearly in front; the nearest where none is.
+    chosen = np.argmax(gaps > 1e-6 * np.abs(gaps).max(axis=1, keepdims=True), axis=1)
+    return near[rows, chosen], gaps[rows, chosen]

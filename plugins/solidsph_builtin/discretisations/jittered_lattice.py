@@ -1,0 +1,84 @@
+"""Jittered lattice: particles a little off the centres of their cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array
+from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.shape import Shape
+from solidsph.particles import Particles
+from solidsph_builtin.discretisations._cells import lattice_particles
+from solidsph_builtin.discretisations._checks import check_ghosts, check_spacing, refusal
+from solidsph_builtin.discretisations._grid import grid_over
+from solidsph_builtin.shapes._checks import as_number
+
+# How often a displacement that leaves the shape is halved before the particle stays in place.
+_ATTEMPTS = 8
+
+
+@attrs.frozen
+class JitteredLattice(Discretisation):
+    """The particles of a lattice, each moved by a random displacement, to test without symmetry.
+
+    Along each axis the displacement is uniform in [-amplitude, amplitude] cells. One that would
+    leave the shape is halved until it does not. Volume and area of a particle are those of the
+    cell that it came from; ghosts stay on the lattice, with their images. Tags are those of the
+    lattice.
+
+    Raises:
+        SceneError: a parameter is of the wrong kind or out of range.
+    """
+
+    amplitude: float = attrs.field(converter=as_number)  # in cells, 0 <= amplitude < 1/2 [-]
+    seed: int  # of the random numbers: the same seed gives the same particles
+    ghosts: int = 0  # layers
+    ghost_faces: Sequence[str] | None = None  # where there are ghosts; behind every face if None
+
+    def __attrs_post_init__(self) -> None:
+        if not (isinstance(self.amplitude, float) and 0.0 <= self.amplitude < 0.5):
+            raise refusal(self, f"amplitude must be in [0, 0.5) cells, got {self.amplitude!r}")
+        if not isinstance(self.seed, int) or isinstance(self.seed, bool) or self.seed < 0:
+            raise refusal(self, f"seed must be a whole number of at least 0, got {self.seed!r}")
+        check_ghosts(self, self.ghosts)
+
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        """As in the interface.
+
+        Raises:
+            SceneError: the spacing is not positive, so large that no particle lies in the shape,
+                or so small that there would be too many.
+        """
+        spacing = check_spacing(self, spacing)
+        grid = grid_over(self, shape, spacing, beyond=self.ghosts)
+        regular = lattice_particles(
+            self,
+            shape,
+            grid,
+            spacing,
+            ghosts=self.ghosts,
+            ghost_faces=self.ghost_faces,
+            whole_cells=False,
+        )
+        real = np.flatnonzero(~regular.ghosts)
+        noise = np.random.default_rng(self.seed).uniform(-1.0, 1.0, (real.size, shape.dimension))
+        moved = _moved(shape, regular.positions[real], self.amplitude * grid.steps * noise)
+        positions, images = regular.positions.copy(), regular.images.copy()
+        positions[real] = images[real] = moved
+        return attrs.evolve(regular, positions=positions, images=images)
+
+
+def _moved(shape: Shape, points: Array, displacements: Array) -> Array:
+    """`points` (n, d) after as much of their `displacements` (n, d) as keeps them inside [m]."""
+    moved = points + displacements
+    scale = 1.0
+    for attempt in range(_ATTEMPTS + 1):
+        outside = np.flatnonzero(shape.signed_distance(moved) > 0.0)
+        if not outside.size:
+            break
+        scale = 0.0 if attempt == _ATTEMPTS else 0.5 * scale
+        moved[outside] = points[outside] + scale * displacements[outside]
+    return moved

@@ -1,0 +1,191 @@
+"""Points: particles wherever the user wants them."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from reprlib import repr as short
+from typing import Any
+
+import attrs
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solidsph.arrays import Array
+from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.shape import Shape
+from solidsph.particles import Particles
+from solidsph_builtin.discretisations._checks import check_spacing, refusal
+from solidsph_builtin.discretisations._grid import Grid, grid_over
+from solidsph_builtin.discretisations._nearest import nearest
+from solidsph_builtin.discretisations._surface import area_vectors, faces, sampled, tags
+
+# Closer than this, in spacings, two points are one; and so far outside a point is still inside.
+_TOLERANCE = 1e-6
+# Samples along a spacing that find out which point is the nearest, for each dimension. Even, so
+# that none lies between two points of a lattice.
+_SAMPLES = {1: 64, 2: 8, 3: 4}
+_CHUNK = 1 << 16
+
+
+def _as_array(value: Any) -> Any:
+    """Numbers as a read-only copy; anything else as it is, for the check to refuse."""
+    if value is None:
+        return None
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return value
+    array.setflags(write=False)
+    return array
+
+
+@attrs.frozen(eq=False)
+class Points(Discretisation):
+    """Given points, in the order in which they are given.
+
+    They are either listed as `positions`, or read from a `file` with a row for each point and a
+    column for each dimension: .npy, .csv with commas, or text with blanks; comments begin
+    with #. A relative path starts from the working directory.
+
+    Volumes are given, and taken as they are, or else what part of the shape is nearest to each
+    point, found by sampling and scaled to the exact total where the shape knows its own. Each
+    sample of the surface goes to the point nearest to it. Tags are those of a lattice. There are
+    no ghosts.
+
+    Raises:
+        SceneError: not exactly one of `positions` and `file` is given, or one cannot be read.
+    """
+
+    positions: Array | None = attrs.field(default=None, converter=_as_array)  # (n, d) [m]
+    file: str | Path | None = None
+    volumes: Array | None = attrs.field(default=None, converter=_as_array)  # (n,) [m^d]
+
+    def __attrs_post_init__(self) -> None:
+        if (self.positions is None) == (self.file is None):
+            given = "neither" if self.file is None else "both"
+            raise refusal(self, f"give one of positions and file, got {given}")
+        for name, value in (("positions", self.positions), ("volumes", self.volumes)):
+            if value is not None and not isinstance(value, np.ndarray):
+                raise refusal(self, f"{name} must be numbers in equal rows, got {short(value)}")
+
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        """As in the interface; `spacing` is what the points are said to have.
+
+        Raises:
+            SceneError: the spacing is not positive, the file cannot be read, or a point is not
+                finite, outside the shape, at the same place as another, or without a volume.
+        """
+        spacing = check_spacing(self, spacing)
+        positions = self._positions(shape.dimension)
+        self._check_places(shape, positions, spacing)
+        tree = cKDTree(positions)
+        surface = sampled(self, shape, spacing)
+        owners = nearest(tree, surface.points)
+        count = len(positions)
+        own = faces(surface, owners)
+        none = np.zeros(count, dtype=np.bool_)
+        return Particles(
+            positions=positions,
+            volumes=self._volumes(shape, tree, spacing),
+            spacings=np.full(count, spacing),
+            area_vectors=area_vectors(own, count, shape.dimension),
+            ghosts=none,
+            images=positions.copy(),
+            tags=tags(own, none, ()),
+            faces=own,
+        )
+
+    def _positions(self, dimension: int) -> Array:
+        """The points as an array of our own (n, d) [m]."""
+        given = self._read(Path(self.file)) if self.file is not None else self.positions
+        points = np.array(given, dtype=np.float64, order="C")
+        if points.ndim == 1 and dimension == 1:
+            points = points[:, np.newaxis]
+        if points.ndim != 2 or points.shape[1] != dimension or not len(points):
+            raise refusal(
+                self,
+                f"the positions must be rows of {dimension} coordinates, as the shape has "
+                f"dimensions, got an array of shape {points.shape}",
+            )
+        bad = ~np.isfinite(points).all(axis=1)
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise refusal(self, f"row {row} of the positions is not finite: {points[row].tolist()}")
+        return points
+
+    def _read(self, path: Path) -> Array:
+        try:
+            with warnings.catch_warnings():
+                # A file without any number is only warned about.
+                warnings.simplefilter("error", UserWarning)
+                if path.suffix == ".npy":
+                    return np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
+                delimiter = "," if path.suffix == ".csv" else None
+                return np.loadtxt(path, delimiter=delimiter, ndmin=2)
+        except (OSError, ValueError, TypeError, EOFError, UserWarning) as error:
+            raise refusal(
+                self, f"cannot read positions from {str(path)!r}: {error}; expected rows of numbers"
+            ) from error
+
+    def _check_places(self, shape: Shape, positions: Array, spacing: float) -> None:
+        distance = shape.signed_distance(positions)
+        outside = distance > _TOLERANCE * spacing
+        if outside.any():
+            row = int(np.argmax(outside))
+            raise refusal(
+                self,
+                f"point {row} at {positions[row].tolist()} m lies outside the shape, "
+                f"{distance[row]:.3g} m from its surface ({outside.sum()} of {len(positions)} "
+                "points do); move the points or the shape",
+            )
+        pairs = cKDTree(positions).query_pairs(_TOLERANCE * spacing, output_type="ndarray")
+        if len(pairs):
+            a, b = min(map(tuple, np.sort(pairs, axis=1).tolist()))
+            raise refusal(
+                self,
+                f"points {a} and {b} are at the same place, {positions[a].tolist()} m; drop one",
+            )
+
+    def _volumes(self, shape: Shape, tree: cKDTree, spacing: float) -> Array:
+        if self.volumes is None:
+            return self._nearest_volumes(shape, tree, spacing)
+        if self.volumes.shape != (tree.n,):
+            raise refusal(
+                self,
+                f"volumes must be one number for each of the {tree.n} points, got an array of "
+                f"shape {self.volumes.shape}",
+            )
+        bad = ~(np.isfinite(self.volumes) & (self.volumes > 0.0))
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise refusal(
+                self,
+                f"volumes must be positive and finite, got {self.volumes[row]} for point {row}",
+            )
+        return self.volumes.copy()
+
+    def _nearest_volumes(self, shape: Shape, tree: cKDTree, spacing: float) -> Array:
+        """What part of the shape is nearest to each point (n,) [m^d]."""
+        grid: Grid = grid_over(self, shape, spacing)
+        fine = _SAMPLES[shape.dimension]
+        samples = attrs.evolve(
+            grid,
+            cells=tuple(fine * count for count in grid.cells),
+            counts=tuple(fine * count for count in grid.counts),
+        )
+        hits = np.zeros(tree.n)
+        for start in range(0, samples.size, _CHUNK):
+            points = samples.positions(np.arange(start, min(start + _CHUNK, samples.size)))
+            points = points[shape.signed_distance(points) <= 0.0]
+            hits += nearest(tree, points).sums(np.ones(len(points)), tree.n)
+        if not hits.all():
+            point = int(np.argmin(hits > 0.0))
+            raise refusal(
+                self,
+                f"point {point} is too close to others to be given a volume at a spacing of "
+                f"{spacing:g} m; use a smaller spacing, or give volumes",
+            )
+        total = shape.volume()
+        volumes: Array = hits * (samples.cell_volume if total is None else total / hits.sum())
+        return volumes

@@ -1,0 +1,67 @@
+"""A force on every part of a body's mass: gravity, for one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import final
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array, Indices
+from solidsph.interfaces.condition import ForceCondition, Observation
+from solidsph.interfaces.effect import Effect
+from solidsph.motion import Component, VectorField
+from solidsph.setting import Setting
+from solidsph.where import Where
+
+
+@final
+@attrs.frozen
+class BodyForce(Effect):
+    """f = m b(X, t). Ismail & Reddy, eq. 14, whose b they neglect."""
+
+    acceleration: Mapping[str, Component]  # b such as {y = -9.81} [m/s^2]
+    where: Where = "all"
+
+    def bind(self, setting: Setting, label: str) -> ForceCondition:
+        field = VectorField.of(self.acceleration, "body-force: acceleration")
+        field.check_dimension(setting.particles.dimension, "body-force")
+        indices = setting.select(self.where)
+        return _MassTimesField(
+            label=label,
+            particles=indices,
+            positions=setting.particles.positions[indices],
+            masses=setting.masses[indices],
+            field=field,
+        )
+
+    def arrays(self, setting: Setting) -> Mapping[str, int]:
+        count = len(setting.select(self.where))
+        d = setting.particles.dimension
+        return {"chosen particles": 8 * count, "positions": 8 * count * d, "masses": 8 * count}
+
+    def damping_rate(self) -> float:
+        return 0.0
+
+    def stiffness_rate(self) -> float:
+        return 0.0
+
+
+@final
+@attrs.frozen(eq=False)
+class _MassTimesField(ForceCondition):
+    label: str
+    particles: Indices  # (k,)
+    positions: Array  # (k, d) reference positions
+    masses: Array  # (k,)
+    field: VectorField
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        forces = np.zeros_like(self.positions)
+        for axis in self.field.components:
+            forces[:, axis] = self.masses * self.field.values(axis, self.positions, time)
+        return forces
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {}

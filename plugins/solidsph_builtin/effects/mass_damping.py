@@ -1,0 +1,60 @@
+"""Damping in proportion to mass and velocity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import final
+
+import attrs
+
+from solidsph.arrays import Array, Indices
+from solidsph.errors import SceneError
+from solidsph.interfaces.condition import ForceCondition, Observation
+from solidsph.interfaces.effect import Effect
+from solidsph.setting import Setting
+from solidsph.where import Where
+
+
+@final
+@attrs.frozen
+class MassDamping(Effect):
+    """f = -c m v: every free vibration decays as exp(-c t / 2). Rayleigh's first term."""
+
+    rate: float = attrs.field(converter=float)  # c [1/s]
+    where: Where = "all"
+
+    def __attrs_post_init__(self) -> None:
+        if not (isfinite(self.rate) and self.rate > 0.0):
+            raise SceneError(
+                f"mass-damping: rate must be positive and finite, got {self.rate}; leave the "
+                "effect out to have none"
+            )
+
+    def bind(self, setting: Setting, label: str) -> ForceCondition:
+        indices = setting.select(self.where)
+        return _Drag(label, indices, self.rate * setting.masses[indices])
+
+    def arrays(self, setting: Setting) -> Mapping[str, int]:
+        count = len(setting.select(self.where))
+        return {"chosen particles": 8 * count, "drag": 8 * count}
+
+    def damping_rate(self) -> float:
+        return self.rate
+
+    def stiffness_rate(self) -> float:
+        return 0.0
+
+
+@final
+@attrs.frozen(eq=False)
+class _Drag(ForceCondition):
+    label: str
+    particles: Indices  # (k,)
+    drag: Array  # c m, (k,) [kg/s]
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return -self.drag[:, None] * velocities[self.particles]
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {}

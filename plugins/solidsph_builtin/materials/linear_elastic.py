@@ -1,0 +1,57 @@
+"""Linear elasticity, for small displacements."""
+
+from __future__ import annotations
+
+from typing import ClassVar, final
+
+import attrs
+
+from solidsph.arrays import Scalar, Tensor
+from solidsph.interfaces.material import Material
+from solidsph.tensors import add, contraction, identity, scale, small_strain, trace, transpose
+from solidsph_builtin.materials._lame import checked_lame
+
+
+@final
+@attrs.frozen
+class LinearElastic(Material):
+    """psi = lambda/2 (tr e)^2 + mu e : e, P = lambda tr(e) I + 2 mu e, with e = (F + F^T)/2 - I.
+
+    Hooke's law. A rigid rotation strains it, so it says that it is not objective.
+    """
+
+    youngs_modulus: float = attrs.field(converter=float)  # E [Pa]
+    poissons_ratio: float = attrs.field(converter=float)  # nu [-]
+    density: float = attrs.field(converter=float)  # rho_0 [kg/m^3]
+
+    objective: ClassVar[bool] = False
+
+    def __attrs_post_init__(self) -> None:
+        checked_lame("linear-elastic", self.youngs_modulus, self.poissons_ratio, self.density)
+
+    @property
+    def lame_parameters(self) -> tuple[float, float]:
+        return checked_lame(
+            "linear-elastic", self.youngs_modulus, self.poissons_ratio, self.density
+        )
+
+    @property
+    def params(self) -> tuple[float, ...]:
+        return self.lame_parameters
+
+    @staticmethod
+    def energy(F: Tensor, params: tuple[float, ...]) -> Scalar:
+        lam, mu = params
+        e = small_strain(F)
+        return 0.5 * lam * trace(e) ** 2 + mu * contraction(e, e)
+
+    @staticmethod
+    def first_piola(F: Tensor, params: tuple[float, ...]) -> Tensor:
+        lam, mu = params
+        e = small_strain(F)
+        return add(scale(lam * trace(e), identity(F)), scale(2.0 * mu, e))
+
+    @staticmethod
+    def tangent(F: Tensor, dF: Tensor, params: tuple[float, ...]) -> Tensor:
+        lam, mu = params
+        return add(scale(lam * trace(dF), identity(F)), scale(mu, add(dF, transpose(dF))))

@@ -1,0 +1,68 @@
+"""The compressible neo-Hookean law of the paper."""
+
+from __future__ import annotations
+
+from typing import final
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Scalar, Tensor
+from solidsph.interfaces.material import Material
+from solidsph.tensors import (
+    add,
+    contraction,
+    determinant,
+    inverse_transpose,
+    product,
+    scale,
+    transpose,
+)
+from solidsph_builtin.materials._lame import checked_lame
+
+
+@final
+@attrs.frozen
+class NeoHookean(Material):
+    """psi = mu/2 (tr C - d) - mu ln J + lambda/2 (ln J)^2, P = mu (F - F^-T) + lambda ln J F^-T.
+
+    Ismail & Reddy, eq. 15, where F C^-1 = F^-T; with the stretches across the plane equal to 1.
+    """
+
+    youngs_modulus: float = attrs.field(converter=float)  # E [Pa]
+    poissons_ratio: float = attrs.field(converter=float)  # nu [-]
+    density: float = attrs.field(converter=float)  # rho_0 [kg/m^3]
+
+    def __attrs_post_init__(self) -> None:
+        checked_lame("neo-hookean", self.youngs_modulus, self.poissons_ratio, self.density)
+
+    @property
+    def lame_parameters(self) -> tuple[float, float]:
+        return checked_lame("neo-hookean", self.youngs_modulus, self.poissons_ratio, self.density)
+
+    @property
+    def params(self) -> tuple[float, ...]:
+        return self.lame_parameters
+
+    @staticmethod
+    def energy(F: Tensor, params: tuple[float, ...]) -> Scalar:
+        lam, mu = params
+        ln_J = np.log(determinant(F))
+        return 0.5 * mu * (contraction(F, F) - len(F)) - mu * ln_J + 0.5 * lam * ln_J**2
+
+    @staticmethod
+    def first_piola(F: Tensor, params: tuple[float, ...]) -> Tensor:
+        lam, mu = params
+        ln_J = np.log(determinant(F))
+        return add(scale(mu, F), scale(lam * ln_J - mu, inverse_transpose(F)))
+
+    @staticmethod
+    def tangent(F: Tensor, dF: Tensor, params: tuple[float, ...]) -> Tensor:
+        lam, mu = params
+        ln_J = np.log(determinant(F))
+        B = inverse_transpose(F)
+        dB = scale(-1.0, product(B, product(transpose(dF), B)))  # change of F^-T
+        return add(
+            scale(mu, dF),
+            add(scale(lam * contraction(B, dF), B), scale(lam * ln_J - mu, dB)),
+        )

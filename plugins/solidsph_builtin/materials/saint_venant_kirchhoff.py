@@ -1,0 +1,72 @@
+"""The Saint Venant-Kirchhoff law: Hooke's law in Green-Lagrange strain."""
+
+from __future__ import annotations
+
+from typing import final
+
+import attrs
+
+from solidsph.arrays import Scalar, Tensor
+from solidsph.interfaces.material import Material
+from solidsph.tensors import (
+    add,
+    contraction,
+    green_lagrange,
+    identity,
+    product,
+    scale,
+    trace,
+    transpose,
+)
+from solidsph_builtin.materials._lame import checked_lame
+
+
+@final
+@attrs.frozen
+class SaintVenantKirchhoff(Material):
+    """psi = lambda/2 (tr E)^2 + mu E : E, P = F S, S = lambda tr(E) I + 2 mu E.
+
+    For large rotations at small to moderate strain: it softens in compression, and its stress
+    vanishes again as J goes to 0.
+    """
+
+    youngs_modulus: float = attrs.field(converter=float)  # E [Pa]
+    poissons_ratio: float = attrs.field(converter=float)  # nu [-]
+    density: float = attrs.field(converter=float)  # rho_0 [kg/m^3]
+
+    def __attrs_post_init__(self) -> None:
+        checked_lame(
+            "saint-venant-kirchhoff", self.youngs_modulus, self.poissons_ratio, self.density
+        )
+
+    @property
+    def lame_parameters(self) -> tuple[float, float]:
+        return checked_lame(
+            "saint-venant-kirchhoff", self.youngs_modulus, self.poissons_ratio, self.density
+        )
+
+    @property
+    def params(self) -> tuple[float, ...]:
+        return self.lame_parameters
+
+    @staticmethod
+    def energy(F: Tensor, params: tuple[float, ...]) -> Scalar:
+        lam, mu = params
+        E = green_lagrange(F)
+        return 0.5 * lam * trace(E) ** 2 + mu * contraction(E, E)
+
+    @staticmethod
+    def first_piola(F: Tensor, params: tuple[float, ...]) -> Tensor:
+        return product(F, _hooke(green_lagrange(F), params))
+
+    @staticmethod
+    def tangent(F: Tensor, dF: Tensor, params: tuple[float, ...]) -> Tensor:
+        half = product(transpose(F), dF)
+        dE = scale(0.5, add(half, transpose(half)))
+        S = _hooke(green_lagrange(F), params)
+        return add(product(dF, S), product(F, _hooke(dE, params)))
+
+
+def _hooke(E: Tensor, params: tuple[float, ...]) -> Tensor:
+    lam, mu = params
+    return add(scale(lam * trace(E), identity(E)), scale(2.0 * mu, E))

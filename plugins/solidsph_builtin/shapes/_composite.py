@@ -1,0 +1,68 @@
+"""What shapes made of other shapes share: which parts they hold, and what is left of a boundary."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from reprlib import repr as short
+from typing import Any
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Mask
+from solidsph.interfaces.shape import Shape, Surface
+from solidsph_builtin.shapes._checks import as_tuple, refusal
+from solidsph_builtin.shapes._sampling import unit
+
+
+def as_parts(value: Any) -> Any:
+    """One shape, or a list of them, as a tuple; anything else as it is."""
+    return (value,) if isinstance(value, Shape) else as_tuple(value, lambda part: part)
+
+
+def check_parts(shape: Shape, field: attrs.Attribute[Any], value: object) -> None:
+    """Refuse what is not one or several shapes of equal dimension."""
+    if not (isinstance(value, tuple) and value and all(isinstance(p, Shape) for p in value)):
+        raise refusal(shape, field.name, "one or several shapes", short(value))
+    dimensions = tuple(part.dimension for part in value)
+    if len(set(dimensions)) > 1:
+        raise refusal(shape, field.name, "shapes of equal dimension", f"dimensions {dimensions}")
+
+
+def remaining(
+    whole: Shape, parts: Sequence[Shape], surfaces: Sequence[Surface], spacing: float
+) -> Surface:
+    """Those samples of the parts' boundaries that lie on the boundary of the `whole`.
+
+    A sample stays if the whole is right behind it and nothing of it right before it: that drops
+    what lies inside another part as well as a face that two parts share back to back. A face that
+    two parts have in common side by side stays once, from the first of them.
+
+    Args:
+        whole: the shape made of the parts.
+        parts: its parts.
+        surfaces: the boundary of each part, with normals that point out of the whole.
+        spacing: that of the samples [m].
+    """
+    # Far above rounding, far below what the samples resolve.
+    step = 1e-6 * spacing
+    kept: list[Mask] = []
+    for i, surface in enumerate(surfaces):
+        ahead = step * unit(surface.area_vectors)
+        keep = whole.signed_distance(surface.points + ahead) > 0.0
+        keep &= whole.signed_distance(surface.points - ahead) < 0.0
+        for earlier in parts[:i]:
+            keep &= np.abs(earlier.signed_distance(surface.points)) > step
+        kept.append(keep)
+    return Surface(
+        points=np.concatenate([s.points[k] for s, k in zip(surfaces, kept, strict=True)]),
+        area_vectors=np.concatenate(
+            [s.area_vectors[k] for s, k in zip(surfaces, kept, strict=True)]
+        ),
+        faces=tuple(
+            face
+            for surface, keep in zip(surfaces, kept, strict=True)
+            for face, stays in zip(surface.faces, keep.tolist(), strict=True)
+            if stays
+        ),
+    )

@@ -1,0 +1,75 @@
+"""Annulus: a ring in the plane."""
+
+from __future__ import annotations
+
+import math
+from reprlib import repr as short
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array
+from solidsph.interfaces.shape import Shape, Surface
+from solidsph_builtin.shapes._checks import (
+    as_number,
+    as_numbers,
+    check_coordinates,
+    check_length,
+    refusal,
+)
+from solidsph_builtin.shapes._sampling import ON_LINE, Piece, circle, joined
+
+
+@attrs.frozen
+class Annulus(Shape):
+    """The points of the plane from `inner_radius` to `outer_radius` away from `centre`.
+
+    Faces: inner, outer.
+
+    Raises:
+        SceneError: a radius is not a positive finite number, the inner one is not the smaller
+            one, or the centre is not two numbers.
+    """
+
+    inner_radius: float = attrs.field(converter=as_number, validator=check_length)  # [m]
+    outer_radius: float = attrs.field(converter=as_number, validator=check_length)  # [m]
+    centre: tuple[float, ...] = attrs.field(  # [m]
+        default=(0.0, 0.0), converter=as_numbers, validator=check_coordinates(2)
+    )
+
+    def __attrs_post_init__(self) -> None:
+        if self.inner_radius >= self.outer_radius:
+            expected = f"less than outer_radius = {self.outer_radius!r} m"
+            raise refusal(self, "inner_radius", expected, short(self.inner_radius))
+
+    @property
+    def dimension(self) -> int:
+        """2."""
+        return 2
+
+    def bounds(self) -> tuple[Array, Array]:
+        """As in the interface."""
+        centre = np.array(self.centre)
+        return centre - self.outer_radius, centre + self.outer_radius
+
+    def signed_distance(self, points: Array) -> Array:
+        """As in the interface; exact everywhere."""
+        radius = np.hypot(*(points - np.array(self.centre)).T)
+        distance: Array = np.maximum(self.inner_radius - radius, radius - self.outer_radius)
+        return distance
+
+    def surface(self, spacing: float) -> Surface:
+        """As in the interface; the arc lengths add up to the exact circumferences."""
+        pieces: list[Piece] = []
+        for name, radius, sign in (
+            ("inner", self.inner_radius, -1.0),
+            ("outer", self.outer_radius, 1.0),
+        ):
+            normals, arcs = circle(radius, spacing, ON_LINE)
+            points = np.array(self.centre) + radius * normals
+            pieces.append((name, points, sign * normals * arcs[:, np.newaxis]))
+        return joined(pieces)
+
+    def volume(self) -> float:
+        """Area [m^2]."""
+        return math.pi * (self.outer_radius**2 - self.inner_radius**2)

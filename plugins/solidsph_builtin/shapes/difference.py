@@ -1,0 +1,77 @@
+"""Difference: a shape with holes and cuts."""
+
+from __future__ import annotations
+
+from reprlib import repr as short
+from typing import Any
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array
+from solidsph.interfaces.shape import Shape, Surface
+from solidsph_builtin.shapes._checks import refusal
+from solidsph_builtin.shapes._composite import as_parts, check_parts, remaining
+
+
+def _check_shape(shape: Shape, field: attrs.Attribute[Any], value: object) -> None:
+    if not isinstance(value, Shape):
+        raise refusal(shape, field.name, "a shape", short(value))
+
+
+@attrs.frozen
+class Difference(Shape):
+    """The points of the shape `of` that are in none of the shapes `minus`.
+
+    A face of a removed shape keeps its name, unless `of` has a face of that name: a box out of a
+    box leaves left and hole-left.
+
+    Raises:
+        SceneError: one is not a shape, nothing is removed, or the dimensions differ.
+    """
+
+    of: Shape = attrs.field(validator=_check_shape, metadata={"part": "shapes"})
+    minus: tuple[Shape, ...] = attrs.field(
+        converter=as_parts, validator=check_parts, metadata={"part": "shapes"}
+    )
+
+    def __attrs_post_init__(self) -> None:
+        dimension = self.minus[0].dimension
+        if dimension != self.of.dimension:
+            expected = f"of dimension {self.of.dimension}, as the shape that it is taken from"
+            raise refusal(self, "minus", expected, f"dimension {dimension}")
+
+    @property
+    def dimension(self) -> int:
+        """That of the shapes."""
+        return self.of.dimension
+
+    def bounds(self) -> tuple[Array, Array]:
+        """The bounds of `of`, whatever is removed."""
+        return self.of.bounds()
+
+    def signed_distance(self, points: Array) -> Array:
+        """As in the interface; outside, no more than the distance."""
+        distance = self.of.signed_distance(points)
+        for part in self.minus:
+            distance = np.maximum(distance, -part.signed_distance(points))
+        return distance
+
+    def surface(self, spacing: float) -> Surface:
+        """As in the interface, closed but for a sample wherever two boundaries cross."""
+        outer = self.of.surface(spacing)
+        taken = frozenset(outer.faces)
+        surfaces = [outer, *(_inverted(part.surface(spacing), taken) for part in self.minus)]
+        return remaining(self, (self.of, *self.minus), surfaces, spacing)
+
+    def volume(self) -> None:
+        """None: how much of the removed shapes lies inside is not known."""
+
+
+def _inverted(surface: Surface, taken: frozenset[str]) -> Surface:
+    """The boundary of a hole: normals point into it."""
+    return Surface(
+        points=surface.points,
+        area_vectors=-surface.area_vectors,
+        faces=tuple(f"hole-{face}" if face in taken else face for face in surface.faces),
+    )

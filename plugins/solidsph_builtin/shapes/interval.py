@@ -1,0 +1,48 @@
+"""Interval: a straight bar in one dimension."""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array
+from solidsph.interfaces.shape import Shape, Surface
+from solidsph_builtin.shapes._checks import as_number, check_coordinate, check_length
+
+
+@attrs.frozen
+class Interval(Shape):
+    """The points `origin` <= X <= `origin + length`. Faces: left, right.
+
+    Raises:
+        SceneError: a parameter is not a finite number, or the length is not positive.
+    """
+
+    length: float = attrs.field(converter=as_number, validator=check_length)  # [m]
+    origin: float = attrs.field(  # left end [m]
+        default=0.0, converter=as_number, validator=check_coordinate
+    )
+
+    @property
+    def dimension(self) -> int:
+        """1."""
+        return 1
+
+    def bounds(self) -> tuple[Array, Array]:
+        """As in the interface."""
+        return np.array([self.origin]), np.array([self.origin + self.length])
+
+    def signed_distance(self, points: Array) -> Array:
+        """As in the interface; exact everywhere."""
+        centre = self.origin + 0.5 * self.length
+        distance: Array = np.abs(points[:, 0] - centre) - 0.5 * self.length
+        return distance
+
+    def surface(self, spacing: float) -> Surface:
+        """The two ends; their area is 1."""
+        ends = np.array([[self.origin], [self.origin + self.length]])
+        return Surface(ends, np.array([[-1.0], [1.0]]), ("left", "right"))
+
+    def volume(self) -> float:
+        """Length [m]."""
+        return self.length

@@ -1,0 +1,305 @@
+"""Assembly: names -> parts -> a checked Simulation.
+
+This is the edge where names end. Every part is made and every pair of parts is checked here, all
+problems are reported together, and what comes out holds objects only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import ceil, sqrt
+from typing import Any
+
+import attrs
+import numpy as np
+import pluggy
+
+from solidsph import compatibility, registry
+from solidsph.body import Body
+from solidsph.dynamics import Dynamics
+from solidsph.engines.engine import Engine
+from solidsph.engines.select import engine_named
+from solidsph.errors import SceneError
+from solidsph.interfaces.condition import (
+    Condition,
+    ForceCondition,
+    MotionCondition,
+    StressCondition,
+)
+from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.formulation import Formulation
+from solidsph.interfaces.integrator import Integrator
+from solidsph.interfaces.kernel import Kernel
+from solidsph.interfaces.material import Material
+from solidsph.interfaces.shape import Shape
+from solidsph.motion import VectorField
+from solidsph.neighbours import neighbour_pairs
+from solidsph.particles import Particles, State
+from solidsph.parts import construct
+from solidsph.problems import Problems
+from solidsph.scene import BodyScene, ImposedScene, PartLike, Scene
+from solidsph.setting import Setting
+from solidsph.simulation import Simulation
+from solidsph.smoothing import smoothing_kernel
+from solidsph.where import EVERYWHERE, select
+
+
+class Assembly:
+    """One build of one scene."""
+
+    def __init__(self, scene: Scene, manager: pluggy.PluginManager) -> None:
+        self._scene = scene
+        self._manager = manager
+        self._problems = Problems()
+        self._used: dict[registry.Entry, None] = {}  # plugins in the order of their use, each once
+
+    def simulation(self) -> Simulation:
+        """Build it.
+
+        Raises:
+            BuildError: with every problem found, each with its remedy.
+        """
+        scene, problems = self._scene, self._problems
+        problems.add(compatibility.numbers(scene))
+        kernel: Kernel | None = self._make("kernels", scene.kernel)
+        formulation: Formulation | None = self._make("formulations", scene.formulation)
+        integrator: Integrator | None = self._make("integrators", scene.integrator)
+        engine: Engine | None = problems.attempt(engine_named, scene.engine)
+        handlers = self._labelled("boundaries", scene.boundaries)
+        effects: dict[str, Effect] = self._labelled("effects", scene.effects)
+        shapes, sets, materials = self._body_parts()
+        problems.stop_if_any()
+
+        problems.add(compatibility.dimensions(shapes, scene.cover))
+        problems.stop_if_any()
+        particles = self._tagged(Particles.joined(sets))
+        problems.add(compatibility.apart(shapes, particles))
+        bodies = [
+            problems.attempt(self._body, name, particles, own, material, kernel, formulation)
+            for (name, own), material in zip(sets.items(), materials.values(), strict=True)
+        ]
+        problems.stop_if_any()
+
+        setting = _setting(particles, [problems.settled(body) for body in bodies])
+        conditions = self._bound(handlers, effects, setting)
+        motions = _in_order([c for c in conditions if isinstance(c, MotionCondition)], particles)
+        stresses = [c for c in conditions if isinstance(c, StressCondition)]
+        problems.add(compatibility.motions(motions, particles))
+        problems.add(compatibility.stresses(stresses, problems.settled(formulation)))
+        initial = problems.attempt(self._initial_state, particles)
+        chosen_engine = problems.settled(engine)
+        internal = problems.attempt(chosen_engine.prepare, setting.bodies, stresses)
+        scheme = problems.settled(integrator)
+        step = problems.attempt(self._step_size, scheme, effects, setting.time_scale)
+        problems.stop_if_any()
+
+        steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
+        return Simulation(
+            scene=scene,
+            setting=setting,
+            dynamics=Dynamics(
+                particles=particles,
+                masses=setting.masses,
+                internal=problems.settled(internal),
+                motions=motions,
+                loads=[c for c in conditions if isinstance(c, ForceCondition)],
+            ),
+            conditions=tuple(conditions),
+            effects=effects,
+            integrator=scheme,
+            engine=chosen_engine,
+            initial=problems.settled(initial),
+            step_size=scene.duration / steps,
+            steps=steps,
+            parts=tuple(self._used),
+            manager=self._manager,
+        )
+
+    def _make(self, kind: str, wanted: PartLike) -> Any:
+        part = self._problems.attempt(construct, kind, wanted)
+        if part is not None:
+            self._note(kind, part)
+        return part
+
+    def _note(self, kind: str, part: Any) -> None:
+        """Remember which plugins a part, and the parts inside it, came from."""
+        self._used[registry.entry_of(kind, part)] = None
+        if not attrs.has(type(part)):
+            return
+        for field in attrs.fields(type(part)):
+            nested = field.metadata.get("part")
+            if nested is not None:
+                value = getattr(part, field.name)
+                for one in value if isinstance(value, (list, tuple)) else [value]:
+                    self._note(nested, one)
+
+    def _labelled(self, kind: str, entries: Sequence[ImposedScene]) -> dict[str, Any]:
+        """Parts by the label of their account: the one given, or one made of name and place."""
+        made: dict[str, Any] = {}
+        for entry in entries:
+            part = self._make(kind, entry.part)
+            if part is None:
+                continue
+            label = entry.label or _label(kind, part)
+            if label in made and entry.label:
+                self._problems.add(
+                    [f"two {kind} are labelled {label!r}; give each a label of its own"]
+                )
+            while label in made:
+                label = f"{label}'"
+            made[label] = part
+        return made
+
+    def _body_parts(
+        self,
+    ) -> tuple[dict[str, Shape], dict[str, Particles], dict[str, Material]]:
+        """Shape, particles and material of every body, by its name."""
+        shapes: dict[str, Shape] = {}
+        sets: dict[str, Particles] = {}
+        materials: dict[str, Material] = {}
+        for name, body in self._scene.bodies.items():
+            shape: Shape | None = self._make("shapes", body.shape)
+            discretisation: Discretisation | None = self._make(
+                "discretisations", body.discretisation
+            )
+            material = self._material(name, body)
+            if shape is None or discretisation is None or material is None:
+                continue
+            particles = self._problems.attempt(discretisation.particles, shape, body.spacing)
+            if particles is not None:
+                shapes[name], sets[name], materials[name] = shape, particles, material
+        return shapes, sets, materials
+
+    def _material(self, name: str, body: BodyScene) -> Material | None:
+        wanted = body.material if body.material is not None else self._scene.material
+        if wanted is None:
+            self._problems.add(
+                [f"body {name!r} has no material; give it one, or one to the whole scene"]
+            )
+            return None
+        material: Material | None = self._make("materials", wanted)
+        return material
+
+    def _body(
+        self,
+        name: str,
+        particles: Particles,
+        own: Particles,
+        material: Material,
+        kernel: Kernel,
+        formulation: Formulation,
+    ) -> Body:
+        radius = self._scene.cover * float(own.spacings.max())
+        return Body(
+            name=name,
+            extent=particles.bodies[name],
+            particles=own,
+            smoothing=smoothing_kernel(kernel, own.dimension, radius),
+            pairs=neighbour_pairs(own.positions, radius),
+            material=material,
+            formulation=formulation,
+        )
+
+    def _tagged(self, particles: Particles) -> Particles:
+        """Particles with the tags that the scene adds to its bodies."""
+        tags = dict(particles.tags)
+        for name, body in self._scene.bodies.items():
+            extent = particles.bodies[name]
+            for tag, where in body.tags.items():
+                if tag in particles.tags or tag == EVERYWHERE:
+                    self._problems.add(
+                        [f"body {name!r}: tag {tag!r} exists already; choose another name"]
+                    )
+                    continue
+                chosen = self._problems.attempt(select, particles, where)
+                if chosen is not None:
+                    mask = tags.get(tag, np.zeros(particles.count, dtype=np.bool_)).copy()
+                    mask[chosen[(chosen >= extent.start) & (chosen < extent.stop)]] = True
+                    tags[tag] = mask
+        return attrs.evolve(particles, tags=tags)
+
+    def _bound(
+        self,
+        handlers: Mapping[str, Any],
+        effects: Mapping[str, Effect],
+        setting: Setting,
+    ) -> list[Condition]:
+        conditions: list[Condition] = []
+        for label, handler in handlers.items():
+            conditions += self._problems.attempt(handler.bind, setting, label) or []
+        for label, effect in effects.items():
+            bound = self._problems.attempt(effect.bind, setting, label)
+            conditions += [] if bound is None else [bound]
+        return conditions
+
+    def _initial_state(self, particles: Particles) -> State:
+        displacements = np.zeros_like(particles.positions)
+        velocities = np.zeros_like(particles.positions)
+        for entry in self._scene.initial:
+            chosen = select(particles, entry.where)
+            for table, values, what in (
+                (entry.displacement, displacements, "initial: displacement"),
+                (entry.velocity, velocities, "initial: velocity"),
+            ):
+                if table is None:
+                    continue
+                field = VectorField.of(table, what)
+                field.check_dimension(particles.dimension, what)
+                X = particles.positions[chosen]
+                for axis in field.components:
+                    values[chosen, axis] = field.values(axis, X, 0.0)
+        return State(
+            time=0.0,
+            step=0,
+            positions=particles.positions + displacements,
+            velocities=velocities,
+            accelerations=np.zeros_like(velocities),
+        )
+
+    def _step_size(
+        self, integrator: Integrator, effects: Mapping[str, Effect], wave_time: float
+    ) -> float:
+        """Time step [s] from the confined wave speed and whatever the effects add."""
+        scene = self._scene
+        # A lattice of point masses and springs has its highest frequency at 2 c / spacing.
+        frequency = sqrt(
+            (2.0 / wave_time) ** 2 + sum(e.stiffness_rate() ** 2 for e in effects.values())
+        )
+        rate = sum(e.damping_rate() for e in effects.values())
+        largest = integrator.stability_limit / (frequency + rate)
+        if scene.time_step is None:
+            return scene.time_step_factor * largest
+        if scene.time_step > largest:
+            raise SceneError(
+                f"time_step = {scene.time_step:.6g} s exceeds the largest stable step, "
+                f"{largest:.6g} s by confined wave speed and spacing; take a smaller one, or state "
+                "time_step_factor instead"
+            )
+        return scene.time_step
+
+
+def _setting(particles: Particles, bodies: Sequence[Body]) -> Setting:
+    return Setting(
+        particles=particles,
+        masses=np.concatenate([body.masses for body in bodies]),
+        bodies=bodies,
+        time_scale=min(
+            float(body.particles.spacings.min()) / body.material.wave_speed for body in bodies
+        ),
+    )
+
+
+def _in_order(
+    motions: Sequence[MotionCondition], particles: Particles
+) -> tuple[MotionCondition, ...]:
+    """Motions of particles first, then those of ghosts, which follow particles."""
+    return tuple(sorted(motions, key=lambda m: bool(m.held[particles.ghosts].any())))
+
+
+def _label(kind: str, part: object) -> str:
+    name = registry.entry_of(kind, part).name or type(part).__name__
+    where = getattr(part, "where", None)
+    if isinstance(where, str) and where not in (EVERYWHERE, "ghosts"):
+        return f"{name} {where}"
+    return name

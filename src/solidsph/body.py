@@ -1,0 +1,31 @@
+"""Body: one run of particles with its own material, kernel support and neighbours."""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array
+from solidsph.interfaces.formulation import Formulation
+from solidsph.interfaces.material import Material
+from solidsph.neighbours import Pairs
+from solidsph.particles import Particles
+from solidsph.smoothing import SmoothingKernel
+
+
+@attrs.frozen(eq=False)
+class Body:
+    """What an engine needs to know to find the internal forces of one body."""
+
+    name: str
+    extent: slice  # its place among all particles
+    particles: Particles  # its own only
+    smoothing: SmoothingKernel
+    pairs: Pairs  # in the reference configuration, numbered within the body
+    material: Material
+    formulation: Formulation
+
+    @property
+    def masses(self) -> Array:
+        """(n,) [kg, per unit of the missing dimensions]; ghosts have none."""
+        return np.where(self.particles.ghosts, 0.0, self.material.density * self.particles.volumes)

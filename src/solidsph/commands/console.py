@@ -1,0 +1,94 @@
+"""How commands speak: tables and progress for people, one JSON object for programs."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from solidsph.hooks import implementation
+
+if TYPE_CHECKING:
+    from solidsph.interfaces.condition import Observation
+    from solidsph.simulation import Simulation
+
+# Where no terminal gives a width, a file or a pipe has room for the widest table.
+out = Console(highlight=False, width=None if sys.stdout.isatty() else 170)
+err = Console(stderr=True, highlight=False)
+
+
+def say(text: str) -> None:
+    """One line of plain text, whatever brackets it holds."""
+    out.print(escape(text), soft_wrap=True)
+
+
+def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+    """A table; numbers are right-aligned and shortened to what a person reads."""
+    table = Table(title=escape(title), title_justify="left", header_style="bold")
+    for index, column in enumerate(columns):
+        numeric = bool(rows) and all(_is_number(row[index]) or row[index] == "" for row in rows)
+        # Numbers are never cut to fit; words may wrap.
+        table.add_column(escape(column), justify="right" if numeric else "left", no_wrap=numeric)
+    for row in rows:
+        table.add_row(*(escape(_shown(cell)) for cell in row))
+    out.print(table)
+
+
+def show_json(data: Mapping[str, Any]) -> None:
+    """One JSON object on the standard output."""
+    sys.stdout.write(json.dumps(_jsonable(data), indent=2, allow_nan=False) + "\n")
+
+
+@contextmanager
+def progress(shown: bool) -> Iterator[Progress | None]:
+    """A progress display on the standard error, if it is wanted and someone watches."""
+    if not (shown and err.is_terminal):
+        yield None
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, TimeRemainingColumn(), console=err, transient=True) as display:
+        yield display
+
+
+class ProgressObserver:
+    """Moves a progress bar on at every output of a run."""
+
+    def __init__(self, display: Progress, description: str, steps: int) -> None:
+        self._display = display
+        self._task = display.add_task(description, total=steps)
+
+    @implementation
+    def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
+        self._display.update(self._task, completed=observation.state.step)
+
+
+def _is_number(cell: Any) -> bool:
+    return isinstance(cell, (int, float)) and not isinstance(cell, bool)
+
+
+def _shown(cell: Any) -> str:
+    if isinstance(cell, bool):
+        return "yes" if cell else "no"
+    if isinstance(cell, float):
+        return f"{cell:.5g}"
+    return "" if cell is None else str(cell)
+
+
+def _jsonable(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _jsonable(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_jsonable(one) for one in value]
+    if isinstance(value, (bool, int, str)) or value is None:
+        return value
+    if isinstance(value, float):
+        return value if isfinite(value) else str(value)  # JSON has no infinity
+    return str(value)

@@ -1,0 +1,131 @@
+"""solidsph explain: what a run would simulate, why, and at what cost, without running it."""
+
+from __future__ import annotations
+
+import time as clock
+from typing import Any
+
+import click
+
+from solidsph import registry
+from solidsph.commands.console import say, show_json, show_table
+from solidsph.commands.target import resolve
+from solidsph.interfaces.case import Case
+from solidsph.scene import Scene
+from solidsph.simulation import Simulation
+
+_TIMED_STEPS = 5
+
+
+@click.command()
+@click.argument("target", metavar="SCENE|CASE")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A case's parameter.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
+def explain(target: str, settings: tuple[str, ...], as_json: bool) -> None:
+    """Say what would be simulated, why, and at what cost. Nothing is run or written."""
+    wanted = resolve(target, settings)
+    scenes = wanted.scenes() if isinstance(wanted, Case) else {target: wanted}
+    explanations = {name: _explained(scene) for name, scene in scenes.items()}
+    if as_json:
+        show_json({"scenes": explanations})
+        return
+    for name, facts in explanations.items():
+        say(f"\n{name}: {scenes[name].title}" if scenes[name].title else f"\n{name}")
+        show_table(
+            "parts", ["kind", "name", "from"], [list(row.values()) for row in facts["parts"]]
+        )
+        show_table(
+            "numbers", ["", "value", "why"], [list(row.values()) for row in facts["numbers"]]
+        )
+        show_table(
+            "effects",
+            ["effect", "simulated", "why", "arrays [bytes]"],
+            [list(row.values()) for row in facts["effects"]],
+        )
+
+
+def _explained(scene: Scene) -> dict[str, Any]:
+    from solidsph.builder import Builder
+
+    simulation = Builder(scene).build()
+    return {
+        "parts": [
+            {
+                "kind": registry.singular(entry.kind),
+                "name": entry.name or entry.target,
+                "from": f"{entry.distribution} {entry.version}".strip() or "this Python session",
+            }
+            for entry in simulation.parts
+        ],
+        "numbers": _numbers(simulation),
+        "effects": _effects(simulation),
+    }
+
+
+def _numbers(simulation: Simulation) -> list[dict[str, Any]]:
+    scene, setting = simulation.scene, simulation.setting
+    particles = setting.particles
+    pairs = sum(body.pairs.count for body in setting.bodies)
+    neighbours = pairs / particles.count - 1.0
+    speed = max(body.material.wave_speed for body in setting.bodies)
+    per_step = _seconds_per_step(simulation)
+    stated = scene.time_step is not None
+    outputs = len(simulation.output_steps()) + 1
+    d = particles.dimension
+    rows = [
+        ("dimensions", d, "1 is uniaxial strain, 2 is plane strain"),
+        ("particles", int((~particles.ghosts).sum()), "from shapes and spacings"),
+        ("ghosts", int(particles.ghosts.sum()), "complete the support of those near a surface"),
+        ("neighbours", neighbours, f"a particle's, on average, within {scene.cover:g} spacings"),
+        ("confined wave speed [m/s]", speed, "sqrt((lambda + 2 mu) / rho), the fastest body's"),
+        (
+            "time step [s]",
+            simulation.step_size,
+            "as the scene states it"
+            if stated
+            else f"{scene.time_step_factor:g} of the largest stable step by wave speed and spacing",
+        ),
+        ("steps", simulation.steps, f"for {scene.duration:g} s"),
+        ("engine", type(simulation.engine).__name__, f'engine = "{scene.engine}"'),
+        (
+            "predicted wall time [s]",
+            per_step * simulation.steps,
+            f"{_TIMED_STEPS} steps timed here and now, outputs not counted",
+        ),
+        (
+            "record [MiB]",
+            outputs * particles.count * 8 * (7 + d + d * d) / 2**20,
+            f"{outputs} outputs of position, velocity, stress and volume ratio, about",
+        ),
+    ]
+    return [{"quantity": name, "value": value, "why": why} for name, value, why in rows]
+
+
+def _seconds_per_step(simulation: Simulation) -> float:
+    state = simulation.start()
+    begun = clock.perf_counter()
+    for _ in range(_TIMED_STEPS):
+        state = simulation.integrator.advance(state, simulation.dynamics, simulation.step_size)
+    return (clock.perf_counter() - begun) / _TIMED_STEPS
+
+
+def _effects(simulation: Simulation) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+    named = set()
+    for label, effect in simulation.effects.items():
+        name = registry.entry_of("effects", effect).name
+        named.add(name)
+        rows.append(
+            {
+                "effect": label,
+                "simulated": True,
+                "why": "named by the scene",
+                "arrays": sum(effect.arrays(simulation.setting).values()),
+            }
+        )
+    rows += [
+        {"effect": name, "simulated": False, "why": "not named by the scene", "arrays": 0}
+        for name in registry.names("effects")
+        if name not in named
+    ]
+    return rows

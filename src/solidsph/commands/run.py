@@ -1,0 +1,159 @@
+"""solidsph run: carry out a scene or a case."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from solidsph.commands.console import ProgressObserver, progress, say, show_json, show_table
+from solidsph.commands.target import resolve
+from solidsph.interfaces.case import Case, Measurement
+from solidsph.scene import Scene
+
+
+@click.command()
+@click.argument("target", metavar="SCENE|CASE")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A case's parameter.")
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Folder for records and pictures.  [default: results/NAME]",
+)
+@click.option(
+    "--write",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write the scene to this file instead of running it.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
+@click.option("--quiet", is_flag=True, help="Show no progress.")
+def run(
+    target: str,
+    settings: tuple[str, ...],
+    output: Path | None,
+    write: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Run a scene file, or a case by its name, and record it."""
+    wanted = resolve(target, settings)
+    if write is not None:
+        _write(wanted, write)
+        return
+    folder = output or Path("results") / Path(target).stem
+    shown = not (as_json or quiet)
+    if isinstance(wanted, Case):
+        _run_case(target, wanted, folder, shown=shown, as_json=as_json)
+    else:
+        _run_scene(target, wanted, folder, shown=shown, as_json=as_json)
+
+
+def _write(wanted: Scene | Case, path: Path) -> None:
+    scenes = wanted.scenes() if isinstance(wanted, Case) else {"": wanted}
+    for name, scene in scenes.items():
+        own = path if len(scenes) == 1 else path.with_stem(f"{path.stem}-{name}")
+        own.parent.mkdir(parents=True, exist_ok=True)
+        own.write_text(scene.to_toml(), encoding="utf-8")
+        say(f"wrote {own}")
+
+
+def _run_scene(target: str, scene: Scene, folder: Path, *, shown: bool, as_json: bool) -> None:
+    from solidsph.builder import Builder
+    from solidsph.results.record import Record
+    from solidsph.studies.case_run import peak_memory
+
+    simulation = Builder(scene).build()
+    path = folder / "record.h5"
+    with progress(shown) as display:
+        observers = (
+            [ProgressObserver(display, Path(target).stem, simulation.steps)] if display else []
+        )
+        result = simulation.run(record=path, observers=observers)
+    with Record(path) as record:
+        history = {name: float(values[-1]) for name, values in record.history.items()}
+    facts: dict[str, Any] = {
+        "particles": simulation.particles.count,
+        "pairs": sum(body.pairs.count for body in simulation.setting.bodies),
+        "steps": simulation.steps,
+        "step size [s]": simulation.step_size,
+        "wall time [s]": result.seconds,
+        "peak memory [MiB]": peak_memory() / 2**20,
+    }
+    if as_json:
+        show_json({"scene": target, "record": str(path), **facts, "final": history})
+        return
+    show_table(target, ["", "value"], [[key, value] for key, value in facts.items()])
+    show_table("at the end", ["quantity", "value"], [[k, v] for k, v in history.items()])
+    say(f"record: {path} (ParaView opens it; so does: solidsph plot {path})")
+
+
+def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bool) -> None:
+    from solidsph.studies.case_run import run_case
+
+    with progress(shown) as display:
+
+        def begin(name: str, simulation: Any) -> Sequence[object]:
+            return [ProgressObserver(display, name, simulation.steps)] if display else []
+
+        result = run_case(case, folder, begin=begin)
+    if as_json:
+        show_json(
+            {
+                "case": target,
+                "passed": result.passed,
+                "peak memory [bytes]": result.peak_memory,
+                "measurements": [_row(m) for m in result.measurements],
+                "runs": [
+                    {
+                        "scene": r.name,
+                        "outcome": r.outcome,
+                        "wall time [s]": r.seconds,
+                        "steps": r.steps,
+                        "particles": r.particles,
+                        "pairs": r.pairs,
+                        "record": str(r.record),
+                    }
+                    for r in result.runs
+                ],
+                "pictures": [str(path) for path in result.pictures],
+            }
+        )
+    else:
+        say(f"{case.title}. {case.source}.")
+        show_table(
+            "measured",
+            ["quantity", "measured", "reference", "unit", "error", "verdict", "as expected"],
+            [
+                [m.quantity, m.value, m.reference, m.unit, m.error, m.verdict, m.passed]
+                for m in result.measurements
+            ],
+        )
+        show_table(
+            "runs",
+            ["scene", "outcome", "wall time [s]", "steps", "particles", "pairs"],
+            [[r.name, r.outcome, r.seconds, r.steps, r.particles, r.pairs] for r in result.runs],
+        )
+        sources = {m.source for m in result.measurements if m.source}
+        for source in sorted(sources):
+            say(f"reference: {source}")
+        for path in result.pictures:
+            say(f"picture: {path}")
+        say(f"records: {folder}/*.h5 (ParaView opens them; so does: solidsph plot FILE)")
+        say("verdict: " + ("as the source predicts" if result.passed else "NOT as predicted"))
+    if not result.passed:
+        raise SystemExit(1)
+
+
+def _row(measurement: Measurement) -> dict[str, Any]:
+    return {
+        "quantity": measurement.quantity,
+        "value": measurement.value,
+        "unit": measurement.unit,
+        "reference": measurement.reference,
+        "source": measurement.source,
+        "error": measurement.error,
+        "verdict": measurement.verdict,
+        "as expected": measurement.passed,
+    }

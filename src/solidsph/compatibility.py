@@ -1,0 +1,110 @@
+"""Whether parts fit each other: each check yields problems, each with its remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import ceil, isfinite, sqrt
+
+import numpy as np
+
+from solidsph.arrays import Mask
+from solidsph.interfaces.condition import MotionCondition, StressCondition
+from solidsph.interfaces.formulation import Formulation
+from solidsph.interfaces.shape import Shape
+from solidsph.particles import Particles
+from solidsph.scene import Scene
+
+# Deeper than this inside another body, in spacings, a particle is not merely touching it.
+_TOUCHING = 1e-6
+
+
+def numbers(scene: Scene) -> Iterator[str]:
+    """Durations, factors and counts."""
+    for name, value, unit in (
+        ("duration", scene.duration, "s"),
+        ("cover", scene.cover, "particle spacings"),
+        ("time_step_factor", scene.time_step_factor, "the largest stable step"),
+        ("time_step", scene.time_step, "s"),
+    ):
+        if value is not None and not (isfinite(value) and value > 0.0):
+            yield f"{name} must be positive and finite, got {value}; give it in {unit}"
+    if scene.time_step_factor > 1.0:
+        yield f"time_step_factor must not exceed 1, got {scene.time_step_factor}; 0.5 is safe"
+    if scene.outputs < 1:
+        yield f"outputs must be at least 1, got {scene.outputs}; the last state is always recorded"
+
+
+def dimensions(shapes: Mapping[str, Shape], cover: float) -> Iterator[str]:
+    """One dimension for all bodies, and a cover that reaches far enough in it."""
+    each = {name: shape.dimension for name, shape in shapes.items()}
+    if len(set(each.values())) > 1:
+        listed = ", ".join(f"{name!r} {d}D" for name, d in each.items())
+        yield f"bodies of different dimension in one scene: {listed}; use shapes of one dimension"
+        return
+    d = next(iter(each.values()))
+    least = sqrt(d)
+    if cover <= least:
+        yield (
+            f"cover = {cover:.6g} is too small in {d}D: a particle must reach its diagonal "
+            f"neighbours, {least:.4g} spacings away; take at least {ceil(10 * least + 5) / 10:g}"
+        )
+
+
+def apart(shapes: Mapping[str, Shape], particles: Particles) -> Iterator[str]:
+    """No two bodies in one place."""
+    for name, extent in particles.bodies.items():
+        X = particles.positions[extent][~particles.ghosts[extent]]
+        spacing = particles.spacings[extent].min()
+        for other, shape in shapes.items():
+            if other == name:
+                continue
+            inside = int(np.sum(shape.signed_distance(X) < -_TOUCHING * spacing))
+            if inside:
+                yield (
+                    f"bodies {name!r} and {other!r} are in one place: {inside} particles of "
+                    f"{name!r} lie inside {other!r}; move one, or cut it out with a 'difference'"
+                )
+
+
+def motions(held_by: Sequence[MotionCondition], particles: Particles) -> Iterator[str]:
+    """No degree of freedom determined twice, and no ghost left adrift."""
+    seen: dict[str, Mask] = {}
+    for motion in held_by:
+        own = motion.held
+        for other, theirs in seen.items():
+            both = own & theirs
+            if both.any():
+                first, axis = (int(k) for k in np.argwhere(both)[0])
+                yield (
+                    f"{motion.label!r} and {other!r} both determine the motion of "
+                    f"{int(both.any(axis=1).sum())} particles (the first: {first}, along "
+                    f"{'xyz'[axis]}); narrow the `where` of one"
+                )
+        seen[motion.label] = own
+    covered = np.zeros(particles.positions.shape, dtype=np.bool_)
+    for own in seen.values():
+        covered |= own
+    adrift = particles.ghosts & ~covered.all(axis=1)
+    if adrift.any():
+        tags = [
+            tag
+            for tag, mask in particles.tags.items()
+            if tag.endswith("-ghosts") and (mask & adrift).any()
+        ]
+        yield (
+            f"{int(adrift.sum())} ghosts ({', '.join(tags)}) have no motion; add 'symmetry' or "
+            "'ghost-extension' for them, or leave them out of the discretisation"
+        )
+
+
+def stresses(imposed: Sequence[StressCondition], formulation: Formulation) -> Iterator[str]:
+    """Stress imposed on ghosts must be of use to the formulation."""
+    if formulation.divergence.uses_ghost_stress:
+        return
+    for condition in imposed:
+        if not isinstance(condition, MotionCondition):
+            yield (
+                f"{condition.label!r} sets the stress of ghosts, which the formulation's "
+                f"divergence ({type(formulation.divergence).__name__}) does not use; take "
+                "divergence = 'plain', or load the surface with 'traction'"
+            )

@@ -1,0 +1,98 @@
+"""Dynamics: the equation of motion of a whole scene, assembled from its parts.
+
+It knows no part by name: internal forces come from an engine, and what is imposed comes from
+conditions, each called only for what its type can do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array
+from solidsph.engines.engine import InternalForces
+from solidsph.interfaces.condition import (
+    ExtensionCondition,
+    ForceCondition,
+    MotionCondition,
+    Observation,
+)
+from solidsph.particles import Particles, State
+
+
+@attrs.frozen(eq=False)
+class Response:
+    """What the scene answers to positions and velocities."""
+
+    accelerations: Array  # (n, d) [m/s^2]
+    applied: Mapping[str, Array]  # by account: force that it exerts on every particle, (n, d) [N]
+
+
+@attrs.frozen(eq=False)
+class Dynamics:
+    """Right-hand side of the equation of motion."""
+
+    particles: Particles
+    masses: Array  # (n,) [kg]
+    internal: InternalForces
+    motions: Sequence[MotionCondition]
+    loads: Sequence[ForceCondition]
+
+    def place(self, time: float, positions: Array) -> Array:
+        """Positions (n, d) with every imposed motion applied at `time` [s]."""
+        if not self.motions:
+            return positions
+        displacements = positions - self.particles.positions
+        for motion in self.motions:
+            motion.impose(time, 0, displacements)
+        return self.particles.positions + displacements
+
+    def carry(self, time: float, velocities: Array) -> Array:
+        """Velocities (n, d) with every imposed motion applied at `time` [s]."""
+        if not self.motions:
+            return velocities
+        carried = velocities.copy()
+        for motion in self.motions:
+            motion.impose(time, 1, carried)
+        return carried
+
+    def respond(self, time: float, positions: Array, velocities: Array) -> Response:
+        """Accelerations, and the force that each imposed part exerts.
+
+        Free degrees of freedom follow f = m a. Held ones follow the imposed motion, and what is
+        missing of m a is the reaction.
+        """
+        internal = self.internal.forces(time, positions - self.particles.positions)
+        applied: dict[str, Array] = {}
+        total = internal
+        for load in self.loads:
+            force = np.zeros_like(positions)
+            force[load.particles] = load.forces(time, positions, velocities)
+            applied[load.label] = force
+            total = total + force
+        for motion in self.motions:
+            if isinstance(motion, ExtensionCondition):
+                motion.return_forces(total)
+        real = ~self.particles.ghosts
+        accelerations = np.zeros_like(positions)
+        accelerations[real] = total[real] / self.masses[real, None]
+        for motion in self.motions:
+            motion.impose(time, 2, accelerations)
+        for motion in self.motions:
+            missing = self.masses[:, None] * accelerations - total
+            applied[motion.label] = np.where(motion.held & real[:, None], missing, 0.0)
+        return Response(accelerations, applied)
+
+    def observe(self, state: State) -> Observation:
+        """The state with its deformation, stress and energy."""
+        fields = self.internal.fields(state.positions - self.particles.positions)
+        return Observation(
+            state=state,
+            particles=self.particles,
+            masses=self.masses,
+            deformation_gradients=fields.deformation_gradients,
+            stresses=fields.stresses,
+            energy_densities=fields.energy_densities,
+        )

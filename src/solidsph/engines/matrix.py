@@ -1,0 +1,168 @@
+"""The matrix engine: the paper's form (section 2.2), sums as products of sparse matrices.
+
+It needs no compilation and is the reference that every other engine is compared with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import final
+
+import attrs
+import numpy as np
+from scipy.sparse import csr_array, hstack, vstack
+
+from solidsph.arrays import Array, Mask, Tensor
+from solidsph.body import Body
+from solidsph.engines.engine import Engine, InternalForces, StressFields
+from solidsph.interfaces.condition import StressCondition
+from solidsph.interfaces.formulation import Configuration
+from solidsph.neighbours import Pairs, neighbour_pairs
+from solidsph.tensors import identity, particles_first
+
+
+@attrs.frozen(eq=False)
+class Operators:
+    """Gradient and force matrices of one body in one configuration."""
+
+    gradient: csr_array  # (d n, n): row k n + p gives the derivative along axis k at p [1/m]
+    force: csr_array  # (n, d n): from stress components along axis k to force [m^(d-1)]
+
+
+def operators(body: Body, pairs: Pairs, volumes: Array) -> Operators:
+    """The matrices X_k of the paper's eq. 10, and those of the divergence."""
+    kernel_gradients = body.smoothing.gradient(pairs.offsets, pairs.distances)
+    gradient = body.formulation.gradient.weights(pairs, kernel_gradients, volumes)
+    force = body.formulation.divergence.weights(pairs, gradient, volumes)
+    axes = range(gradient.shape[1])
+    return Operators(
+        gradient=csr_array(vstack([pairs.matrix(gradient[:, k]) for k in axes], format="csr")),
+        force=csr_array(hstack([pairs.matrix(force[:, k]) for k in axes], format="csr")),
+    )
+
+
+@final
+@attrs.frozen(eq=False)
+class _FixedBody:
+    """A body whose sums are taken in the reference configuration: the matrices are constant."""
+
+    body: Body
+    constant: Operators
+
+    def operators(self, displacements: Array) -> Operators:
+        return self.constant
+
+
+@final
+@attrs.frozen(eq=False)
+class _FollowedBody:
+    """A body whose neighbours, kernel and volumes are found anew at every step."""
+
+    body: Body
+    reference_sums: Array  # (n,) sum of V_q W at the start, the measure of a full neighbourhood
+
+    def operators(self, displacements: Array) -> Operators:
+        body, particles = self.body, self.body.particles
+        positions = particles.positions + displacements
+        pairs = neighbour_pairs(positions, body.smoothing.support_radius)
+        # The volume follows the crowding of particles, relative to that of the reference
+        # configuration, so that the deficit at a surface cancels.
+        volumes = particles.volumes * self.reference_sums / kernel_sums(body, pairs)
+        return operators(body, pairs, volumes)
+
+
+def kernel_sums(body: Body, pairs: Pairs) -> Array:
+    """Sum over neighbours of V_q W_pq with reference volumes, (n,) [-]."""
+    weights = body.smoothing.value(pairs.distances) * body.particles.volumes[pairs.columns]
+    return pairs.row_sums(weights)
+
+
+@final
+@attrs.frozen(eq=False)
+class MatrixForces(InternalForces):
+    """Internal forces by sparse products."""
+
+    parts: Sequence[_FixedBody | _FollowedBody]
+    conditions: Sequence[StressCondition]
+
+    def forces(self, time: float, displacements: Array) -> Array:
+        n, d = displacements.shape
+        stress = np.empty((d, d, n))
+        all_operators = []
+        with np.errstate(all="ignore"):  # a run that leaves the material's domain is caught later
+            for part in self.parts:
+                body = part.body
+                matrices = part.operators(displacements[body.extent])
+                F = _deformation_gradient(body, matrices, displacements[body.extent])
+                P = body.material.first_piola(F, body.material.params)
+                T = body.formulation.flux(F, P)
+                for i in range(d):
+                    for k in range(d):
+                        stress[i, k, body.extent] = np.where(body.particles.ghosts, 0.0, T[i][k])
+                all_operators.append(matrices)
+        for condition in self.conditions:
+            condition.impose_stress(time, stress)
+        for part in self.parts:
+            if not part.body.formulation.divergence.uses_ghost_stress:
+                stress[:, :, part.body.extent][:, :, part.body.particles.ghosts] = 0.0
+        forces = np.empty((n, d))
+        for part, matrices in zip(self.parts, all_operators, strict=True):
+            own = stress[:, :, part.body.extent]
+            # Components along axis k stand in block k, as the columns of the force matrix do.
+            stacked = own.transpose(1, 2, 0).reshape(-1, d)
+            force = matrices.force @ stacked
+            if part.body.formulation.divergence.uses_ghost_stress:
+                # Ghosts have acted through their stress; nothing acts on them.
+                force[part.body.particles.ghosts] = 0.0
+            forces[part.body.extent] = force
+        return forces
+
+    def fields(self, displacements: Array) -> StressFields:
+        n, d = displacements.shape
+        fields = StressFields(np.empty((n, d, d)), np.zeros((n, d, d)), np.zeros(n))
+        for part in self.parts:
+            body, extent = part.body, part.body.extent
+            ghosts = body.particles.ghosts
+            with np.errstate(all="ignore"):
+                F = _deformation_gradient(
+                    body, part.operators(displacements[extent]), displacements[extent]
+                )
+                F = _without_ghosts(F, ghosts)
+                count = len(ghosts)
+                P = body.material.first_piola(F, body.material.params)
+                energy = body.material.energy(F, body.material.params)
+            fields.deformation_gradients[extent] = particles_first(F, count)
+            fields.stresses[extent] = particles_first(P, count)
+            fields.energy_densities[extent] = energy
+        return fields
+
+
+def _deformation_gradient(body: Body, matrices: Operators, displacements: Array) -> Tensor:
+    n, d = displacements.shape
+    along = (matrices.gradient @ displacements).reshape(d, n, d)
+    H = along.transpose(2, 0, 1)  # H[i][k] = du_i / dx_k
+    return body.formulation.deformation_gradient(H)
+
+
+def _without_ghosts(F: Tensor, ghosts: Mask) -> Tensor:
+    one = identity(F)
+    axes = range(len(F))
+    return tuple(tuple(np.where(ghosts, one[i][k], F[i][k]) for k in axes) for i in axes)
+
+
+@final
+@attrs.frozen
+class MatrixEngine(Engine):
+    """Sums as sparse matrix products."""
+
+    def prepare(
+        self, bodies: Sequence[Body], conditions: Sequence[StressCondition]
+    ) -> InternalForces:
+        parts: list[_FixedBody | _FollowedBody] = []
+        for body in bodies:
+            if body.formulation.configuration is Configuration.REFERENCE:
+                matrices = operators(body, body.pairs, body.particles.volumes)
+                parts.append(_FixedBody(body, matrices))
+            else:
+                parts.append(_FollowedBody(body, kernel_sums(body, body.pairs)))
+        return MatrixForces(tuple(parts), tuple(conditions))

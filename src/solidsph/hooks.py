@@ -1,0 +1,74 @@
+"""Moments in the life of a run at which plugins may listen.
+
+Entry points provide nouns, parts of which one is chosen by name; hooks provide verbs, moments
+that any number of listeners hear. Hooks never choose parts and never run inside a step.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from typing import TYPE_CHECKING
+
+import pluggy
+
+from solidsph.errors import PluginError
+from solidsph.registry import hook_points
+
+if TYPE_CHECKING:
+    from solidsph.builder import Builder
+    from solidsph.interfaces.condition import Observation
+    from solidsph.simulation import Simulation
+
+STRICT = "SOLIDSPH_STRICT_PLUGINS"
+"""Environment variable: if set to 1, a hook plugin that cannot be loaded is an error."""
+
+specification = pluggy.HookspecMarker("solidsph")
+implementation = pluggy.HookimplMarker("solidsph")
+
+
+class Moments:
+    """The moments, in the order in which they come."""
+
+    @specification
+    def solidsph_configure(self, builder: Builder) -> None:
+        """Before a scene is built: the builder may still be changed."""
+
+    @specification
+    def solidsph_setup(self, simulation: Simulation) -> None:
+        """Before the first step of a run."""
+
+    @specification
+    def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
+        """At every output, the first state included. Read only."""
+
+    @specification
+    def solidsph_finish(self, simulation: Simulation, outcome: str) -> None:
+        """After the last step, or after the run stopped on an error: `outcome` says which."""
+
+
+def listeners() -> pluggy.PluginManager:
+    """A manager with every installed hook plugin registered.
+
+    A plugin that cannot be loaded is left out with a warning that names it.
+
+    Raises:
+        PluginError: instead of that warning, where SOLIDSPH_STRICT_PLUGINS is 1.
+    """
+    manager = pluggy.PluginManager("solidsph")
+    manager.add_hookspecs(Moments)
+    for point in hook_points():
+        distribution = f"{point.dist.name} {point.dist.version}" if point.dist else "unknown"
+        try:
+            manager.register(point.load(), name=point.name)
+            manager.check_pending()
+        except Exception as cause:
+            manager.unregister(name=point.name)
+            message = (
+                f"hook plugin {point.name!r} ({point.value}, from {distribution}) is left out: "
+                f"{type(cause).__name__}: {cause}; repair or uninstall it"
+            )
+            if os.environ.get(STRICT) == "1":
+                raise PluginError(message) from cause
+            warnings.warn(message, stacklevel=2)
+    return manager

@@ -1,0 +1,24 @@
+"""BoundaryHandler: what is imposed, and where."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+from solidsph.interfaces.condition import Condition
+from solidsph.setting import Setting
+
+
+class BoundaryHandler(ABC):
+    """Parameters of what is imposed; `bind` makes it act on particles.
+
+    An implementation is a frozen attrs class whose fields are the TOML keys of the handler.
+    """
+
+    @abstractmethod
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        """The conditions that impose it, reporting under `label`.
+
+        Raises:
+            SceneError: it matches no particle, or cannot be imposed on those it matches.
+        """

@@ -1,0 +1,90 @@
+"""Conditions: boundary handlers and effects once they are bound to particles.
+
+A handler or an effect is a frozen set of parameters; bound to a setting it becomes one or more
+conditions that hold arrays. What a condition can do is its type: determine motion, change the
+stress, or add forces. A run calls only those that are there.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+
+import attrs
+
+from solidsph.arrays import Array, Indices, Mask
+from solidsph.particles import Particles, State
+
+
+@attrs.frozen(eq=False)
+class Observation:
+    """A state with the fields that belong to it, as reports and records see it."""
+
+    state: State
+    particles: Particles
+    masses: Array  # (n,) [kg]
+    deformation_gradients: Array  # (n, d, d) F [-]
+    stresses: Array  # (n, d, d) first Piola-Kirchhoff stress P [Pa]
+    energy_densities: Array  # (n,) psi [J/m^3]
+
+
+class Condition(ABC):
+    """Something imposed on some of the particles."""
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """Name of its account in energies, reports and errors."""
+
+    @abstractmethod
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        """What was asked for and what was achieved: columns "quantity [unit]" of numbers."""
+
+
+class MotionCondition(Condition):
+    """Determines the motion of some degrees of freedom."""
+
+    @property
+    @abstractmethod
+    def held(self) -> Mask:
+        """Degrees of freedom that this condition determines, (n, d)."""
+
+    @abstractmethod
+    def impose(self, time: float, derivative: int, values: Array) -> None:
+        """Overwrite the held entries of `values` (n, d) in place.
+
+        `values` is the displacement u = x - X for derivative 0, the velocity for 1, the
+        acceleration for 2.
+        """
+
+
+class ExtensionCondition(MotionCondition):
+    """Makes ghosts follow other particles, linearly: u_ghost = E u."""
+
+    @abstractmethod
+    def return_forces(self, forces: Array) -> None:
+        """Move the forces (n, d) on the ghosts to those they follow, in place: f += E^T f_ghost.
+
+        The transpose makes the forces the derivative of the energy by the free motion alone.
+        """
+
+
+class StressCondition(Condition):
+    """Determines the stress of some particles, ghosts among them."""
+
+    @abstractmethod
+    def impose_stress(self, time: float, stress: Array) -> None:
+        """Overwrite entries of `stress` (d, d, n) [Pa] in place, after the material's law."""
+
+
+class ForceCondition(Condition):
+    """Adds forces to some particles."""
+
+    @property
+    @abstractmethod
+    def particles(self) -> Indices:
+        """Those that it acts on, (k,)."""
+
+    @abstractmethod
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        """Forces on these particles, (k, d) [N], from positions and velocities (n, d) of all."""

@@ -1,0 +1,31 @@
+"""Divergence: how forces are formed from the stresses at the neighbours."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+from solidsph.arrays import Array
+from solidsph.neighbours import Pairs
+
+
+class Divergence(ABC):
+    """Weights d_pq of the discrete force, f_p = sum over q of T_q d_pq."""
+
+    conserves_momentum: ClassVar[bool]
+    """Whether the forces of a free body add up to zero whatever the stresses are, provided that
+    the gradient of a constant is zero."""
+
+    uses_ghost_stress: ClassVar[bool]
+    """Whether ghosts carry a stress of their own into the sums. Where they do not, the forces on
+    ghosts go back to the particles that the ghosts follow."""
+
+    @abstractmethod
+    def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:
+        """Weight vector of every pair, (m, d) [m^(d-1)].
+
+        Args:
+            pairs: neighbours, each particle among its own.
+            gradient_weights: (m, d), those of the formulation's gradient [1/m].
+            volumes: (n,) [m^d].
+        """

@@ -1,0 +1,36 @@
+"""Effect: one optional term of the equation of motion."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+
+from solidsph.interfaces.condition import ForceCondition
+from solidsph.setting import Setting
+
+
+class Effect(ABC):
+    """A term that a scene names, and pays for; a scene that does not name it runs none of it.
+
+    An implementation is a frozen attrs class whose fields are the TOML keys of the effect.
+    """
+
+    @abstractmethod
+    def bind(self, setting: Setting, label: str) -> ForceCondition:
+        """The term acting on particles; its energy account is called `label`.
+
+        Raises:
+            SceneError: it matches no particle, or its parameters do not fit the setting.
+        """
+
+    @abstractmethod
+    def arrays(self, setting: Setting) -> Mapping[str, int]:
+        """Arrays that it keeps, by name, in bytes."""
+
+    @abstractmethod
+    def damping_rate(self) -> float:
+        """Largest rate at which it damps velocities [1/s], for the stable step; 0 if none."""
+
+    @abstractmethod
+    def stiffness_rate(self) -> float:
+        """Angular frequency that its stiffness adds at most [rad/s]; 0 if none."""

@@ -1,0 +1,72 @@
+"""Neighbour pairs within the support radius."""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
+
+from solidsph.arrays import Array, Indices
+
+
+@attrs.frozen(eq=False)
+class Pairs:
+    """Ordered pairs (p, q) in rows: the neighbours of p stand together, sorted by q, p among them.
+
+    The relation is symmetric, so every pair has its reverse in the list.
+    """
+
+    starts: Indices  # (n + 1,) row p is starts[p] : starts[p + 1]
+    rows: Indices  # (m,) p
+    columns: Indices  # (m,) q
+    offsets: Array  # (m, d) x_q - x_p [m]
+    distances: Array  # (m,) [m]
+
+    @property
+    def particle_count(self) -> int:
+        """Number of particles n."""
+        return len(self.starts) - 1
+
+    @property
+    def count(self) -> int:
+        """Number of ordered pairs m, n self pairs included."""
+        return len(self.columns)
+
+    def reversed_order(self) -> Indices:
+        """For every pair (p, q) the place of (q, p), (m,)."""
+        # In column order the pairs of column p appear as (q, p) with q rising: row p's order.
+        return np.lexsort((self.rows, self.columns))
+
+    def row_sums(self, values: Array) -> Array:
+        """Sum of `values` (m, ...) over each particle's pairs, (n, ...)."""
+        # Every row holds its self pair, so no segment is empty and reduceat is safe.
+        return np.add.reduceat(values, self.starts[:-1], axis=0)
+
+    def matrix(self, values: Array) -> csr_array:
+        """Sparse n x n matrix with `values` (m,) at (p, q)."""
+        n = self.particle_count
+        return csr_array((values, self.columns, self.starts), shape=(n, n))
+
+    @property
+    def self_pairs(self) -> Indices:
+        """Places of the pairs (p, p), (n,)."""
+        return np.flatnonzero(self.rows == self.columns)
+
+
+def neighbour_pairs(positions: Array, radius: float) -> Pairs:
+    """All pairs closer than `radius` [m] among `positions` (n, d), self pairs included."""
+    found = cKDTree(positions).query_pairs(radius, output_type="ndarray")
+    own = np.arange(len(positions), dtype=np.intp)
+    rows = np.concatenate([found[:, 0], found[:, 1], own]).astype(np.intp)
+    columns = np.concatenate([found[:, 1], found[:, 0], own]).astype(np.intp)
+    order = np.lexsort((columns, rows))
+    rows, columns = rows[order], columns[order]
+    offsets = positions[columns] - positions[rows]
+    return Pairs(
+        starts=np.searchsorted(rows, np.arange(len(positions) + 1)).astype(np.intp),
+        rows=rows,
+        columns=columns,
+        offsets=offsets,
+        distances=np.linalg.norm(offsets, axis=1),
+    )

@@ -1,0 +1,49 @@
+"""Problems: everything that is wrong with a scene, found before any of it is reported."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+from solidsph.errors import BuildError, PluginError, SolidsphError
+
+T = TypeVar("T")
+
+
+class Problems:
+    """Collects problems, each with its remedy, until it makes no sense to look further."""
+
+    def __init__(self) -> None:
+        self._found: list[str] = []
+
+    def add(self, problems: Iterable[str]) -> None:
+        """Note some problems."""
+        self._found += problems
+
+    def attempt(self, make: Callable[..., T], *arguments: object) -> T | None:
+        """The value of `make(*arguments)`, or None with its problem noted."""
+        try:
+            return make(*arguments)
+        except BuildError as cause:
+            self.add(cause.problems)
+        except SolidsphError as cause:
+            self.add([str(cause)])
+        except Exception as cause:  # a plugin's code may fail in any way
+            owner = type(getattr(make, "__self__", make))
+            raise PluginError(
+                f"{owner.__module__}.{owner.__qualname__} failed: {type(cause).__name__}: {cause}; "
+                "this is a fault of that part, which should explain what it was given"
+            ) from cause
+        return None
+
+    def stop_if_any(self) -> None:
+        """Raise BuildError with all problems noted so far, if there are any."""
+        if self._found:
+            raise BuildError(self._found)
+
+    def settled(self, value: T | None) -> T:
+        """A value that an attempt has made; raises BuildError with its problems if it has not."""
+        if value is None:
+            self.stop_if_any()
+            raise AssertionError("an attempt gave no value and noted no problem")
+        return value

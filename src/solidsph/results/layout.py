@@ -1,0 +1,93 @@
+"""What a record holds and where: the names that its writer and its reader share.
+
+A record is one HDF5 file. `/VTKHDF` is an UnstructuredGrid of one vertex a particle, with time,
+that ParaView opens as it is; `/solidsph`, which VTK ignores, holds all else. VTK knows three
+dimensions only, so a vector is padded with zeros to 3 components and a tensor to 9.
+
+| where | rows | what |
+| --- | --- | --- |
+| `/VTKHDF/Points`, `/VTKHDF/PointData/<field>` | n every step, step after step | what evolves |
+| `/VTKHDF/PointData/<other>` | n | reference data, shared by all steps |
+| `/VTKHDF/Steps` | 1 every step | times, and the first row of each step in the above |
+| `/VTKHDF/Steps`, attribute `NSteps` | | how many steps are complete: written last |
+| `/solidsph/step`, `/solidsph/history` | 1 every step | step numbers; named columns |
+| the rest of `/solidsph` | | scene, plugins, versions, bodies, tags, faces, outcome |
+"""
+
+from __future__ import annotations
+
+import re
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array
+
+FORMAT = 1  # a reader refuses a higher number than its own
+VTKHDF_VERSION = (2, 0)  # the first with time; higher ones add nothing that is used here
+RUNNING = "running"  # the outcome until the writer is closed
+OUTCOME_BYTES = 1024  # of fixed length, since nothing can be allocated for it at the end
+
+# What h5py raises for a file that is damaged, not ours, or on a device that fails.
+HDF5_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError)
+
+
+@attrs.frozen
+class Field:
+    """One array over the particles that every step of a record holds."""
+
+    name: str
+    components: tuple[int, ...]  # () scalar, (d,) vector, (d, d) tensor
+    unit: str  # SI; "-" if dimensionless
+
+
+@attrs.frozen
+class PluginUsed:
+    """Where one part of a run came from."""
+
+    group: str  # "solidsph.kernels"
+    name: str  # "cubic-spline"
+    distribution: str
+    version: str
+    target: str  # "package.module:Class"
+
+
+def static_fields(dimension: int) -> tuple[Field, ...]:
+    """The reference data of the particles, by the name and shape that they have in a record."""
+    d = dimension
+    return (
+        Field("reference_position", (d,), "m"),
+        Field("volume", (), f"m^{d}" if d > 1 else "m"),
+        Field("spacing", (), "m"),
+        Field("area_vector", (d,), {1: "-", 2: "m"}.get(d, f"m^{d - 1}")),
+        Field("ghost", (), "-"),  # 1 for a ghost
+        Field("image", (d,), "m"),
+        Field("body", (), "-"),  # number of the body, -1 outside all
+    )
+
+
+def tag_name(tag: str) -> str:
+    """Name of the array that marks a tag's particles; `/` would be a group to HDF5."""
+    return "tag " + tag.replace("%", "%25").replace("/", "%2F")
+
+
+def padded(values: Array, components: tuple[int, ...]) -> Array:
+    """Rows as VTK wants them: (n,) stays, (n, d) becomes (n, 3), (n, d, d) becomes (n, 9)."""
+    if not components or components == (3,):
+        return values
+    cubic = np.zeros((len(values), *(3 for _ in components)))
+    cubic[(slice(None), *(slice(size) for size in components))] = values
+    return cubic.reshape(len(values), 3 ** len(components))
+
+
+def unpadded(rows: Array, components: tuple[int, ...]) -> Array:
+    """The inverse of `padded`, for any number of rows."""
+    cubic = rows.reshape(len(rows), *(3 for _ in components))
+    return np.ascontiguousarray(cubic[(slice(None), *(slice(size) for size in components))])
+
+
+def reason(error: BaseException) -> str:
+    """What an error of HDF5 or of the system says, in one line and without internals."""
+    text = " ".join(str(error).split())
+    system = re.search("error message = '([^']*)'", text)
+    return system[1] if system else text

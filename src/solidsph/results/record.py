@@ -1,0 +1,319 @@
+"""Reads the record of a run: finished, still running, or killed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from types import MappingProxyType, TracebackType
+from typing import Any, TypeVar, overload
+
+import attrs
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from solidsph.arrays import Array
+from solidsph.errors import RecordError
+from solidsph.particles import Face, Particles
+from solidsph.results.layout import (
+    FORMAT,
+    HDF5_ERRORS,
+    PluginUsed,
+    reason,
+    static_fields,
+    tag_name,
+    unpadded,
+)
+from solidsph.results.unclosed import SIGNATURE, Unclosed, is_unclosed
+
+T = TypeVar("T")
+
+# A block of the file may be met half written while the run goes on, or the file be just replaced.
+_ATTEMPTS = 4
+_PAUSE = 0.02  # s
+
+
+@attrs.frozen(eq=False)
+class TimeSeries:
+    """One array over the steps of a record; only what is asked for is read, anew each time.
+
+    `series[i]` is (n, *components), from the end for negative i, and a slice (k, n, *components);
+    `len`, `for` and `np.asarray` work too.
+
+    Raises:
+        IndexError: there is no such step.
+        RecordError: the file is damaged or closed.
+    """
+
+    shape: tuple[int, ...]  # (steps, n, *components)
+    unit: str
+    _read: Callable[[int, int], Array]  # first and stop -> the steps between
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    @overload
+    def __getitem__(self, index: int) -> Array: ...
+    @overload
+    def __getitem__(self, index: slice) -> Array: ...
+    def __getitem__(self, index: int | slice) -> Array:
+        if isinstance(index, slice):
+            chosen = range(len(self))[index]
+            if chosen.step == 1:
+                return self._read(chosen.start, max(chosen.start, chosen.stop))
+            series = np.empty((len(chosen), *self.shape[1:]))
+            for place, step in enumerate(chosen):
+                series[place] = self[step]
+            return series
+        try:
+            step = range(len(self))[index]
+        except IndexError:
+            raise IndexError(f"no step {index} in a record of {len(self)} steps") from None
+        first: Array = self._read(step, step + 1)[0]
+        return first
+
+    def __iter__(self) -> Iterator[Array]:
+        return (self[step] for step in range(len(self)))
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.asarray(self[:], dtype=dtype)
+
+
+class Record:
+    """One run, read from its file. Small things are read at once, arrays over time when asked for.
+
+    It shows the steps that were complete when it was opened; of a run that goes on, open the
+    record again to see more. Use it as a context manager, or `close` it.
+
+    Attributes:
+        path: the file.
+        times: (steps,) t [s].
+        steps: (steps,) number of completed steps of the integrator at each time.
+        dimension: number of space dimensions d.
+        particles: reference data of all particles.
+        positions: (steps, n, d) current positions [m], lazily.
+        field_names: the fields that each step holds.
+        units: unit of each field, by its name.
+        history: column -> (steps,) values.
+        history_units: unit of each column.
+        scene: what was asked for, as TOML text.
+        plugins: every part used.
+        versions: of the software that produced the run, by its name.
+        outcome: "finished", "diverged: ...", "stopped: ..."; "running" if it runs or was killed.
+
+        is_closed_by_writer: False while the run goes on, and for ever if it was killed.
+
+    Raises:
+        RecordError: there is no such file, it is no record, or it is damaged.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = Path(path)
+        self._file: Any = None
+        self._source: Unclosed | None = None
+        self._is_complete = False
+        self._patiently(self._open)
+        self._is_complete = True
+
+    def _open(self) -> None:
+        self.close()
+        self.is_closed_by_writer = not is_unclosed(_head(self.path))
+        if not self.is_closed_by_writer:
+            self._source = Unclosed(self.path)
+        try:
+            # A lock of ours would keep nobody out, and one of others not us.
+            self._file = h5py.File(self._source or self.path, "r", locking=False)
+            self._read_all()
+        except BaseException:
+            self.close()
+            raise
+
+    def _read_all(self) -> None:
+        run = self._file.get("solidsph")
+        if run is None or "format" not in run.attrs:
+            raise RecordError(f"{self.path} is an HDF5 file, but not a record of solidsph")
+        written = int(run.attrs["format"])
+        if written > FORMAT:
+            raise RecordError(
+                f"the record {self.path} has format {written}, this solidsph reads up to {FORMAT}; "
+                "update solidsph"
+            )
+        grid = self._file["VTKHDF"]
+        announced = int(grid["Steps"].attrs["NSteps"])  # first, since the run goes on meanwhile
+        self.dimension = int(run.attrs["dimension"])
+        self.scene = bytes(run["scene"][()]).decode()
+        self.plugins = tuple(
+            PluginUsed(*(text.decode() for text in row)) for row in run["plugins"][()]
+        )
+        self.versions = dict(line.rsplit(" ", 1) for line in _lines(run, "versions"))
+        self.outcome = bytes(run["outcome"][()]).decode(errors="ignore")
+        self.particles = self._particles(run, grid["PointData"])
+        self.field_names = _lines(run, "fields")
+        sets = {name: grid["PointData"][name] for name in self.field_names}
+        self.units = {name: _word(dataset, "units") for name, dataset in sets.items()}
+
+        count = self._readable(announced, [grid["Points"], *sets.values()])
+        self.times: Array = _first(grid["Steps/Values"], count)
+        self.steps: NDArray[np.int64] = _first(run["step"], count)
+        self.positions = self._series(grid["Points"], count)
+        self._fields = {name: self._series(dataset, count) for name, dataset in sets.items()}
+        table = run.get("history")
+        names = table.dtype.names if table is not None else ()
+        self.history: Mapping[str, Array] = MappingProxyType(
+            {name: np.ascontiguousarray(_first(table, count)[name]) for name in names}
+        )
+        units = table.attrs["units"] if table is not None else ()
+        self.history_units = {name: unit.decode() for name, unit in zip(names, units, strict=True)}
+
+    def field(self, name: str) -> TimeSeries:
+        """The named field over time: (steps, n, *components), lazily.
+
+        Raises:
+            RecordError: the record has no such field.
+        """
+        if name not in self._fields:
+            near = get_close_matches(name, self.field_names, n=1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            known = ", ".join(self.field_names) or "none"
+            raise RecordError(f"no field {name!r} in {self.path}; {hint}fields: {known}")
+        return self._fields[name]
+
+    @property
+    def count(self) -> int:
+        """Number of steps."""
+        return len(self.times)
+
+    def close(self) -> None:
+        """Releases the file. What was read stays; nothing more can be read."""
+        file, self._file = self._file, None
+        source, self._source = self._source, None
+        if file is not None:
+            file.close()
+        if source is not None:
+            source.close()
+
+    def __enter__(self) -> Record:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _particles(self, run: Any, data: Any) -> Particles:
+        values = {
+            field.name: unpadded(data[field.name][()], field.components)
+            for field in static_fields(self.dimension)
+        }
+        return Particles(
+            positions=values["reference_position"],
+            volumes=values["volume"],
+            spacings=values["spacing"],
+            area_vectors=values["area_vector"],
+            ghosts=values["ghost"].astype(np.bool_),
+            images=values["image"],
+            tags={tag: data[tag_name(tag)][()].astype(np.bool_) for tag in _lines(run, "tags")},
+            bodies={
+                name: slice(int(start), int(stop))
+                for name, (start, stop) in zip(
+                    _lines(run, "bodies"), run["body_ranges"][()], strict=True
+                )
+            },
+            faces=dict(_face(group) for group in _numbered(run.get("faces"))),
+        )
+
+    def _readable(self, count: int, datasets: list[Any]) -> int:
+        """How many of `count` steps can be read: of a file that lost its end, those before."""
+        n = self.particles.count
+        for dataset in datasets:
+            _check_rows(dataset, count * n)
+        if self.is_closed_by_writer:
+            return count
+        while count and n:
+            try:
+                for dataset in datasets:
+                    dataset[count * n - 1]
+                break
+            except HDF5_ERRORS:
+                count -= 1
+        return count
+
+    def _series(self, dataset: Any, count: int) -> TimeSeries:
+        components = tuple(int(size) for size in dataset.attrs["components"])
+        n = self.particles.count
+
+        def read(first: int, stop: int) -> Array:
+            rows: Array = self._patiently(lambda: dataset[first * n : stop * n])
+            return unpadded(rows, components).reshape(stop - first, n, *components)
+
+        return TimeSeries((count, n, *components), _word(dataset, "units"), read)
+
+    def _patiently(self, read: Callable[[], T]) -> T:
+        """What `read` returns, if need be at a later attempt."""
+        for _ in range(_ATTEMPTS):
+            try:
+                return read()
+            except HDF5_ERRORS as error:
+                failure = reason(error)
+            if self._is_complete and self._file is None:
+                raise RecordError(f"the record {self.path} is closed; open it again")
+            if not _may_change(self.path):
+                break
+            time.sleep(_PAUSE)
+        raise RecordError(
+            f"the record {self.path} cannot be read: {failure}; "
+            "if it is damaged, run its scene again"
+        )
+
+
+def _head(path: Path) -> bytes:
+    """The first bytes of an HDF5 file."""
+    if path.is_dir():
+        raise RecordError(f"{path} is a folder, not a record; name the file in it")
+    if not path.exists():
+        raise RecordError(f"there is no record {path}; check the path, or run the scene first")
+    with path.open("rb") as file:
+        head = file.read(64)
+    if not head.startswith(SIGNATURE):
+        raise RecordError(f"{path} is not an HDF5 file, so no record of solidsph")
+    return head
+
+
+def _may_change(path: Path) -> bool:
+    try:
+        return is_unclosed(_head(path))
+    except (OSError, RecordError):
+        return False
+
+
+def _check_rows(dataset: Any, rows: int) -> None:
+    if dataset.shape[0] < rows:
+        # Damage, or something read just before the run went on: then a new attempt helps.
+        raise OSError(f"{dataset.name} has {dataset.shape[0]} rows instead of {rows}")
+
+
+def _first(dataset: Any, rows: int) -> Any:
+    _check_rows(dataset, rows)
+    return dataset[:rows]
+
+
+def _lines(group: Any, name: str) -> tuple[str, ...]:
+    return tuple(line.decode() for line in group[name][()])
+
+
+def _word(item: Any, name: str) -> str:
+    return bytes(item.attrs[name]).decode()
+
+
+def _numbered(group: Any) -> list[Any]:
+    return [] if group is None else [group[str(number)] for number in range(len(group))]
+
+
+def _face(group: Any) -> tuple[str, Face]:
+    indices = group["particles"][()].astype(np.intp)
+    return _word(group, "name"), Face(indices, group["area_vectors"][()])

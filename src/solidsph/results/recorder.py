@@ -1,0 +1,91 @@
+"""Recorder: the observer that writes a run's record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solidsph.errors import SceneError
+from solidsph.hooks import implementation
+from solidsph.interfaces.condition import Observation
+from solidsph.results.energy import kinetic_energy, ledger, strain_energy
+from solidsph.results.record_writer import Field, PluginUsed, RecordWriter
+
+if TYPE_CHECKING:
+    from solidsph.arrays import Array
+    from solidsph.simulation import Simulation
+
+
+class Recorder:
+    """Writes every observation to one HDF5 file."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._writer: RecordWriter | None = None
+        self._initial_energy = 0.0
+
+    @implementation
+    def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
+        if self._writer is None:
+            self._initial_energy = kinetic_energy(observation) + strain_energy(observation)
+            self._writer = self._open(simulation, observation)
+        state = observation.state
+        self._writer.append(
+            state.time,
+            state.step,
+            state.positions,
+            _fields(observation),
+            self._history(simulation, observation),
+        )
+
+    @implementation
+    def solidsph_finish(self, simulation: Simulation, outcome: str) -> None:
+        if self._writer is not None:
+            self._writer.close(outcome)
+
+    def _open(self, simulation: Simulation, observation: Observation) -> RecordWriter:
+        d = simulation.particles.dimension
+        columns = self._history(simulation, observation)
+        return RecordWriter(
+            self._path,
+            simulation.particles,
+            scene=scene_text(simulation),
+            plugins=[
+                PluginUsed(e.kind, e.name, e.distribution, e.version, e.target)
+                for e in simulation.parts
+            ],
+            fields=[
+                Field("velocity", (d,), "m/s"),
+                Field("cauchy_stress", (d, d), "Pa"),
+                Field("volume_ratio", (), "-"),
+            ],
+            columns={name: name.rpartition(" [")[2].rstrip("]") for name in columns},
+        )
+
+    def _history(self, simulation: Simulation, observation: Observation) -> dict[str, float]:
+        columns = dict(ledger(observation, self._initial_energy))
+        for condition in simulation.conditions:
+            columns |= condition.report(observation)
+        return columns
+
+
+def scene_text(simulation: Simulation) -> str:
+    """The scene as TOML, or why it has no such form."""
+    try:
+        return simulation.scene.to_toml()
+    except SceneError as cause:
+        # A scene of Python objects runs all the same; its record says why it cannot be rerun.
+        return f"# this scene was composed in Python and has no file form: {cause}\n"
+
+
+def _fields(observation: Observation) -> dict[str, Array]:
+    F, P = observation.deformation_gradients, observation.stresses
+    J = np.linalg.det(F)
+    sigma = np.einsum("pik,pjk->pij", P, F) / J[:, None, None]
+    return {
+        "velocity": observation.state.velocities,
+        "cauchy_stress": sigma,
+        "volume_ratio": J,
+    }

@@ -1,0 +1,42 @@
+"""Setting: what a part sees of the discrete problem when it is bound to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import attrs
+from scipy.sparse import block_diag, csr_array
+
+from solidsph.arrays import Array, Indices
+from solidsph.body import Body
+from solidsph.particles import Particles
+from solidsph.where import Where, select
+
+
+@attrs.frozen(eq=False)
+class Setting:
+    """The particles of all bodies, their masses, and the bodies themselves."""
+
+    particles: Particles
+    masses: Array  # (n,) [kg], 0 for ghosts
+    bodies: Sequence[Body]
+    time_scale: float  # spacing over wave speed, the shortest time that is resolved [s]
+
+    def select(self, where: Where) -> Indices:
+        """Indices of the particles at `where`.
+
+        Raises:
+            SceneError: no particle is there, or `where` cannot be understood.
+        """
+        return select(self.particles, where)
+
+    def smoothing_matrix(self) -> csr_array:
+        """W of the paper's eq. 8, sparse: its product with values gives their approximation."""
+        blocks = [
+            body.pairs.matrix(
+                body.smoothing.value(body.pairs.distances)
+                * body.particles.volumes[body.pairs.columns]
+            )
+            for body in self.bodies
+        ]
+        return csr_array(block_diag(blocks, format="csr"))

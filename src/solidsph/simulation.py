@@ -1,0 +1,150 @@
+"""Simulation: a checked scene, ready to run; the time loop, and nothing else."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import attrs
+import numpy as np
+import pluggy
+
+from solidsph.dynamics import Dynamics
+from solidsph.engines.engine import Engine
+from solidsph.errors import DivergedError
+from solidsph.interfaces.condition import Condition, Observation
+from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.integrator import Integrator
+from solidsph.particles import Particles, State
+from solidsph.registry import Entry
+from solidsph.scene import Scene
+from solidsph.setting import Setting
+
+if TYPE_CHECKING:
+    from solidsph.builder import Builder
+
+
+@attrs.frozen(eq=False)
+class Result:
+    """What a run leaves behind."""
+
+    state: State  # the last one
+    record: Path | None  # the file written, if one was asked for
+    seconds: float  # wall time of the loop [s]
+
+
+@attrs.frozen(eq=False)
+class Simulation:
+    """Everything that a run needs. Running does not change it, so it can be run again."""
+
+    scene: Scene
+    setting: Setting
+    dynamics: Dynamics
+    conditions: Sequence[Condition]
+    effects: Mapping[str, Effect]
+    integrator: Integrator
+    engine: Engine
+    initial: State
+    step_size: float  # [s]
+    steps: int
+    parts: tuple[Entry, ...]  # every plugin used
+    manager: pluggy.PluginManager
+
+    @staticmethod
+    def builder(scene: Scene | None = None) -> Builder:
+        """A builder, empty or holding a scene."""
+        from solidsph.builder import Builder  # the builder imports this module
+
+        return Builder(scene)
+
+    @property
+    def particles(self) -> Particles:
+        """The reference configuration."""
+        return self.dynamics.particles
+
+    def start(self) -> State:
+        """The state at the first step, with imposed motions, accelerations and accounts."""
+        positions = self.dynamics.place(self.initial.time, self.initial.positions)
+        velocities = self.dynamics.carry(self.initial.time, self.initial.velocities)
+        state = attrs.evolve(self.initial, positions=positions, velocities=velocities)
+        return self.integrator.start(state, self.dynamics, self.step_size)
+
+    def run(self, *, record: Path | str | None = None, observers: Sequence[object] = ()) -> Result:
+        """Advance from the start to the end of the duration.
+
+        Args:
+            record: HDF5 file to write; the folder is made if it is missing.
+            observers: objects with methods of `solidsph.hooks.Moments`, heard in this run only.
+
+        Raises:
+            DivergedError: the run went wrong; what was recorded before stays readable.
+        """
+        path = None if record is None else Path(record)
+        heard = list(observers)
+        if path is not None:
+            from solidsph.results.recorder import Recorder  # brings the file library with it
+
+            heard.append(Recorder(path))
+        for listener in heard:
+            self.manager.register(listener)
+        hook = self.manager.hook
+        outcome = "stopped"
+        begun = clock.perf_counter()
+        try:
+            hook.solidsph_setup(simulation=self)
+            state = self.start()
+            hook.solidsph_step_end(simulation=self, observation=self._observe(state))
+            for stop in self.output_steps():
+                state = self._advance(state, stop)
+                hook.solidsph_step_end(simulation=self, observation=self._observe(state))
+            outcome = "finished"
+        except BaseException as cause:
+            kind = "diverged" if isinstance(cause, DivergedError) else type(cause).__name__
+            outcome = f"{kind}: {cause}"
+            raise
+        finally:
+            hook.solidsph_finish(simulation=self, outcome=outcome)
+            for listener in heard:
+                self.manager.unregister(listener)
+        return Result(state=state, record=path, seconds=clock.perf_counter() - begun)
+
+    def output_steps(self) -> tuple[int, ...]:
+        """Steps after which the state is observed, evenly spread, the last one among them."""
+        count = min(self.scene.outputs, self.steps)
+        marks = np.linspace(0, self.steps, count + 1)[1:]
+        return tuple(int(step) for step in np.unique(np.rint(marks)))
+
+    def _advance(self, state: State, stop: int) -> State:
+        while state.step < stop:
+            state = self.integrator.advance(state, self.dynamics, self.step_size)
+            # One sum tells whether any entry is not finite, at a fraction of a step's cost.
+            if not np.isfinite(state.accelerations.sum()):
+                raise self._diverged(state, "the acceleration is not finite")
+        return state
+
+    def _observe(self, state: State) -> Observation:
+        observation = self.dynamics.observe(state)
+        with np.errstate(all="ignore"):
+            J = np.linalg.det(observation.deformation_gradients)
+        turned = ~(J > 0.0) & ~self.particles.ghosts
+        if turned.any():
+            raise self._diverged(state, "the volume has vanished or turned inside out")
+        return observation
+
+    def _diverged(self, state: State, cause: str) -> DivergedError:
+        with np.errstate(all="ignore"):
+            F = self.dynamics.observe(state).deformation_gradients
+            J = np.linalg.det(F)
+        real = np.flatnonzero(~self.particles.ghosts)
+        finite = np.isfinite(J[real])
+        # The first particle whose volume ratio is no number, or else the most compressed one.
+        worst = real[np.argmin(finite)] if not finite.all() else real[np.argmin(J[real])]
+        return DivergedError(
+            step=state.step,
+            time=state.time,
+            particle=int(worst),
+            volume_ratio=float(J[worst]),
+            cause=cause,
+        )

@@ -1,0 +1,93 @@
+"""Running a case: its scenes, its measurements and its pictures."""
+
+from __future__ import annotations
+
+import resource
+import time as clock
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+import attrs
+
+from solidsph.builder import Builder
+from solidsph.errors import DivergedError
+from solidsph.interfaces.case import Case, Measurement
+from solidsph.results.record import Record
+from solidsph.simulation import Simulation
+
+
+@attrs.frozen
+class SceneRun:
+    """What one scene of a case took."""
+
+    name: str
+    record: Path
+    seconds: float
+    steps: int
+    particles: int
+    pairs: int
+    outcome: str
+
+
+@attrs.frozen
+class CaseResult:
+    """What a case measured, and what it left behind."""
+
+    measurements: Sequence[Measurement]
+    runs: Sequence[SceneRun]
+    pictures: Sequence[Path]
+    peak_memory: int  # of this process so far [bytes]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every measurement came out as its source predicts."""
+        return all(m.passed for m in self.measurements)
+
+
+def run_case(
+    case: Case,
+    folder: Path,
+    *,
+    begin: Callable[[str, Simulation], Sequence[object]] = lambda name, simulation: (),
+) -> CaseResult:
+    """Run every scene of `case`, record it in `folder`, measure and draw.
+
+    A scene that diverges does not end the case: what it recorded is measured, because for some
+    combinations of parts to diverge is the result.
+
+    Args:
+        begin: called before each scene; returns observers of its run.
+    """
+    runs = []
+    for name, scene in case.scenes().items():
+        simulation = Builder(scene).build()
+        path = folder / f"{name}.h5"
+        outcome, begun = "finished", clock.perf_counter()
+        try:
+            simulation.run(record=path, observers=begin(name, simulation))
+        except DivergedError as cause:
+            outcome = f"diverged at step {cause.step}: {cause.cause}"
+        runs.append(
+            SceneRun(
+                name=name,
+                record=path,
+                seconds=clock.perf_counter() - begun,
+                steps=simulation.steps,
+                particles=simulation.particles.count,
+                pairs=sum(body.pairs.count for body in simulation.setting.bodies),
+                outcome=outcome,
+            )
+        )
+    with ExitStack() as stack:
+        records: Mapping[str, Record] = {
+            run.name: stack.enter_context(Record(run.record)) for run in runs
+        }
+        measurements = case.measure(records)
+        pictures = case.draw(records, folder)
+    return CaseResult(measurements, runs, pictures, peak_memory())
+
+
+def peak_memory() -> int:
+    """Largest resident size of this process so far [bytes]."""
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -1,0 +1,73 @@
+"""A check measures one promise of a part; a kit is the tuple of checks for one kind of part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from inspect import getdoc
+from typing import Any, TypeAlias, TypeVar
+
+import attrs
+
+Part = TypeVar("Part")
+
+
+@attrs.frozen
+class CheckResult:
+    """What one check found."""
+
+    name: str
+    passed: bool
+    measured: str
+    required: str
+
+
+Check: TypeAlias = Callable[[Any], CheckResult]
+"""A plain function of a part; it never raises."""
+
+
+@attrs.frozen
+class Verdict:
+    """A measurement and whether it keeps the promise."""
+
+    passed: bool
+    measured: str
+
+
+def check(measure: Callable[[Part], Verdict]) -> Callable[[Part], CheckResult]:
+    """Make a check of a function that measures: its name and docstring say what is required.
+
+    An exception becomes a failed result that carries its message.
+    """
+    name = measure.__name__.replace("_", " ")
+    required = " ".join((getdoc(measure) or name).split("\n\n")[0].split()).rstrip(".")
+
+    @wraps(measure)
+    def checked(part: Part) -> CheckResult:
+        try:
+            verdict = measure(part)
+        except Exception as cause:
+            verdict = Verdict(False, f"{type(cause).__name__}: {cause}")
+        return CheckResult(name, verdict.passed, verdict.measured, required)
+
+    return checked
+
+
+def at_most(error: float, limit: float) -> Verdict:
+    """Passed if `error` is a number no larger than `limit`."""
+    return Verdict(bool(error <= limit), f"{error:.1e} (at most {limit:g})")
+
+
+def more_than(value: float, limit: float) -> Verdict:
+    """Passed if `value` is a number larger than `limit`: a declared shortcoming must be there."""
+    return Verdict(bool(value > limit), f"{value:.1e} (more than {limit:g})")
+
+
+def not_promised(reason: str) -> Verdict:
+    """Passed: the part declares that it does not promise this."""
+    return Verdict(True, f"not promised: {reason}")
+
+
+def worst(verdicts: list[Verdict]) -> Verdict:
+    """The first that failed, or else the last."""
+    return next((one for one in verdicts if not one.passed), verdicts[-1])

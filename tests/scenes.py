@@ -1,0 +1,60 @@
+"""Small scenes that several tests start from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from solidsph import Simulation
+from solidsph.builder import Builder
+
+SOFT = {"youngs_modulus": 1e6, "poissons_ratio": 0.3, "density": 1000.0}
+
+
+def box(d: int, cells: int = 6, **body: Any) -> Builder:
+    """A box of unit length with `cells` particles along each axis, without boundaries."""
+    shape = {"type": "interval", "length": 1.0} if d == 1 else {"type": "box", "lengths": [1.0] * d}
+    return (
+        Simulation.builder()
+        .body("block", shape=shape, spacing=1.0 / cells, **body)
+        .kernel("modified-mollifier", cover=3.0)
+        .material("neo-hookean", **SOFT)
+        .formulation("total-lagrangian")
+        .duration(1e-2)
+    )
+
+
+SCENE_TOML = """
+title = "a block pulled to the right"
+duration = 0.01
+outputs = 5
+
+[body.block]
+shape = {type = "box", lengths = [1.0, 0.5]}
+spacing = 0.125
+
+[kernel]
+type = "modified-mollifier"
+cover = 3.0
+
+[material]
+type = "neo-hookean"
+youngs_modulus = 1e6
+poissons_ratio = 0.3
+density = 1000.0
+
+[formulation]
+type = "total-lagrangian"
+gradient = "corrected"
+
+[[boundary]]
+type = "clamp"
+where = "left"
+
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {x = "1e3*min(t/0.005, 1)"}
+
+[integrator]
+type = "central-difference"
+"""

@@ -1,0 +1,156 @@
+"""The command line as a person or a program meets it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.scenes import SCENE_TOML
+
+
+def solidsph(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-m", "solidsph", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        check=False,
+    )
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "pull.toml"
+    path.write_text(SCENE_TOML)
+    return path
+
+
+def test_help_on_every_verb(tmp_path: Path) -> None:
+    done = solidsph("--help", cwd=tmp_path)
+    assert done.returncode == 0
+    for verb in ("run", "explain", "cases", "plugins", "check", "plot"):
+        assert verb in done.stdout
+        own = solidsph(verb, "--help", cwd=tmp_path)
+        assert own.returncode == 0
+        assert "--json" in own.stdout
+
+
+def test_run_a_scene_then_plot_it(scene: Path) -> None:
+    folder = scene.parent
+    done = solidsph("run", str(scene), cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "energy residual" in done.stdout
+    record = folder / "results/pull/record.h5"
+    assert record.exists()
+    done = solidsph("plot", str(record), "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    for picture in json.loads(done.stdout)["pictures"]:
+        assert Path(folder / picture).read_bytes().startswith(b"\x89PNG")
+
+
+def test_run_gives_one_json_object(scene: Path) -> None:
+    done = solidsph("run", scene.name, "--json", "--output", "here", cwd=scene.parent)
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert facts["particles"] == 32
+    assert facts["final"]["work of traction right [J]"] > 0.0
+    assert (scene.parent / "here/record.h5").exists()
+
+
+def test_explain_runs_nothing_and_names_what_is_not_simulated(scene: Path) -> None:
+    done = solidsph("explain", scene.name, "--json", cwd=scene.parent)
+    assert done.returncode == 0, done.stderr
+    (facts,) = json.loads(done.stdout)["scenes"].values()
+    assert {"kind": "kernel", "name": "modified-mollifier"}.items() <= facts["parts"][0].items()
+    assert {row["effect"]: row["simulated"] for row in facts["effects"]} == {
+        "body-force": False,
+        "mass-damping": False,
+    }
+    assert not (scene.parent / "results").exists()
+    assert solidsph("explain", scene.name, cwd=scene.parent).returncode == 0
+
+
+def test_cases_and_plugins(tmp_path: Path) -> None:
+    cases = json.loads(solidsph("cases", "--json", cwd=tmp_path).stdout)["cases"]
+    assert "tensile-instability" in [case["case"] for case in cases]
+    plugins = json.loads(solidsph("plugins", "--load", "--json", cwd=tmp_path).stdout)["plugins"]
+    assert len(plugins) > 35
+    assert {plugin["status"] for plugin in plugins} == {"ok"}
+    assert "wendland-c2" in [plugin["name"] for plugin in plugins]
+    assert solidsph("plugins", cwd=tmp_path).returncode == 0
+    assert solidsph("cases", cwd=tmp_path).returncode == 0
+
+
+def test_check_certifies_a_third_partys_kernel(tmp_path: Path) -> None:
+    done = solidsph("check", "wendland-c2", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "certified" in done.stdout
+    assert "FAIL" not in done.stdout
+    facts = json.loads(solidsph("check", "wendland-c2", "--json", cwd=tmp_path).stdout)
+    assert facts["passed"]
+    assert facts["distribution"].startswith("solidsph-wendland")
+
+
+def test_write_a_cases_scenes_and_run_one(tmp_path: Path) -> None:
+    done = solidsph(
+        "run", "tensile-instability", "--set", "stretches=[]", "--write", "scene.toml", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    written = sorted(path.name for path in tmp_path.glob("*.toml"))
+    assert written == ["scene-total-lagrangian.toml", "scene-updated-lagrangian.toml"]
+    assert solidsph("run", written[0], cwd=tmp_path).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("run", "absent.toml"), "cannot be read"),
+        (("run", "folder/absent"), "no file"),
+        (("run", "tensile-instabilty"), "did you mean 'tensile-instability'"),
+        (("run", "tensile-instability", "--set", "strech=1.2"), "did you mean 'stretch'"),
+        (("run", "tensile-instability", "--set", "stretch"), "not of the form name=value"),
+        (("run", "tensile-instability", "--set", "stretch=wide"), "could not convert"),
+        (("run", "tensile-instability", "--set", "stretch=1"), "must be positive and not 1"),
+        (("run", "pull.toml", "--set", "a=1"), "edit it"),
+        (("run",), "Missing argument"),
+        (("fly",), "No such command"),
+        (("check", "wendland"), "did you mean 'wendland-c2'"),
+        (("check", "modified-mollifier", "--kind", "colour"), "unknown kind"),
+        (("plot", "absent.h5"), "absent.h5"),
+        (("plot", "pull.toml"), "pull.toml"),
+    ],
+)
+def test_bad_input_is_one_message_and_code_2(
+    scene: Path, arguments: tuple[str, ...], expected: str
+) -> None:
+    done = solidsph(*arguments, cwd=scene.parent)
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert expected in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_diverging_run_is_code_1_and_its_record_can_be_plotted(scene: Path) -> None:
+    text = SCENE_TOML.replace(
+        'type = "clamp"\nwhere = "left"',
+        'type = "prescribed-motion"\nwhere = "left"\ndisplacement = {x = "300*t", y = 0}',
+    )
+    scene.write_text(text.replace("outputs = 5", "outputs = 100"))
+    done = solidsph("run", scene.name, cwd=scene.parent)
+    assert done.returncode == 1
+    assert "diverged at step" in done.stderr
+    assert "J = " in done.stderr
+    assert "Traceback" not in done.stderr
+    done = solidsph("plot", "results/pull/record.h5", cwd=scene.parent)
+    assert done.returncode == 0, done.stderr
+
+
+def test_an_output_folder_that_cannot_be_made(scene: Path) -> None:
+    (scene.parent / "blocked").write_text("a file, not a folder")
+    done = solidsph("run", scene.name, "--output", "blocked", cwd=scene.parent)
+    assert done.returncode == 2
+    assert "blocked" in done.stderr
+    assert "Traceback" not in done.stderr
