@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from typing import Any
 
+import attrs
 import click
 
 from solidsph import registry
@@ -54,12 +55,26 @@ def _explained(scene: Scene) -> dict[str, Any]:
                 "kind": registry.singular(entry.kind),
                 "name": entry.name or entry.target,
                 "from": f"{entry.distribution} {entry.version}".strip() or "this Python session",
+                "why": _why(scene, entry),
             }
             for entry in simulation.parts
         ],
         "numbers": _numbers(simulation),
         "effects": _effects(simulation),
     }
+
+
+# Kinds of which a scene has one, and the field of the scene that holds it.
+_SINGLE = {"kernels": "kernel", "formulations": "formulation", "integrators": "integrator"}
+_INSIDE = {"gradients": "part of the formulation", "divergences": "part of the formulation"}
+
+
+def _why(scene: Scene, entry: registry.Entry) -> str:
+    if entry.kind in _SINGLE:
+        wanted = getattr(scene, _SINGLE[entry.kind])
+        if wanted == getattr(attrs.fields(Scene), _SINGLE[entry.kind]).default:
+            return "the default: the scene names no other"
+    return _INSIDE.get(entry.kind, "named by the scene")
 
 
 def _numbers(simulation: Simulation) -> list[dict[str, Any]]:

@@ -25,13 +25,9 @@ def draw(record: Record, folder: Path, stem: str) -> Sequence[Path]:
     return [motion, energy]
 
 
-def von_mises(stress: Array) -> Array:
-    """Equivalent stress of Cauchy stresses (n, d, d) without the components across the plane."""
-    d = stress.shape[1]
-    deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(d)
-    across = (3 - d) * (np.trace(stress, axis1=1, axis2=2) / 3.0) ** 2
-    equivalent: Array = np.sqrt(1.5 * (np.sum(deviator**2, axis=(1, 2)) + across))
-    return equivalent
+def largest_principal(stress: Array) -> Array:
+    """Largest principal value of symmetric stresses (n, d, d), in the plane if d = 2, (n,)."""
+    return np.asarray(np.linalg.eigvalsh(stress)[:, -1], dtype=np.float64)
 
 
 def _draw_histories(record: Record, path: Path) -> None:
@@ -56,23 +52,24 @@ def _draw_histories(record: Record, path: Path) -> None:
 def _draw_bodies(record: Record, path: Path) -> None:
     particles = record.particles
     real = ~particles.ghosts
-    figure = Figure(figsize=(11.0, 5.0), layout="constrained")
+    spans = [np.ptp(record.positions[k][real], axis=0) for k in (0, -1)]
+    extent = float(np.max(spans)) or 1.0
+    height = 1.5 + 4.0 * min(1.2, max(0.4, float(max(span[1] for span in spans)) / extent))
+    figure = Figure(figsize=(11.0, height), layout="constrained")
     solid = {"projection": "3d"} if record.dimension == 3 else {}
     axes = figure.subplots(1, 2, subplot_kw=solid)
-    stresses = [von_mises(record.field("cauchy_stress")[k][real]) for k in (0, -1)]
-    top = max(float(stress.max()) for stress in stresses)
+    stresses = [largest_principal(record.field("cauchy_stress")[k][real]) for k in (0, -1)]
+    low, high = min(s.min() for s in stresses), max(s.max() for s in stresses)
     # Marker size that about fills a spacing, in points, on an axis some 300 points wide.
-    first = record.positions[0][real]
-    extent = float(np.ptp(first, axis=0).max()) or 1.0
     size = max(1.0, (280.0 * float(particles.spacings[0]) / extent) ** 2)
     for axis, k, stress in zip(axes, (0, -1), stresses, strict=True):
         x = record.positions[k][real]
-        dots = axis.scatter(*x.T, c=stress, s=size, cmap="cividis", vmin=0.0, vmax=top or 1.0)
+        dots = axis.scatter(*x.T, c=stress, s=size, cmap="cividis", vmin=low, vmax=high)
         axis.set_title(f"t = {record.times[k]:.4g} s", fontsize=10)
         axis.set_xlabel("x [m]")
         axis.set_ylabel("y [m]")
         axis.set_aspect("equal")
-    figure.colorbar(dots, ax=axes, label="equivalent (von Mises) Cauchy stress [Pa]")
+    figure.colorbar(dots, ax=axes, shrink=0.8, label="largest principal Cauchy stress [Pa]")
     figure.savefig(path, dpi=150)
 
 

@@ -142,7 +142,7 @@ def pointwise(kernel: Kernel) -> Verdict:
         together = f(q, kernel.params)
         if together is None:
             continue  # the author gives no slope
-        alone = np.array([float(f(float(one), kernel.params)) for one in q])
+        alone = np.array([f(float(one), kernel.params) for one in q], dtype=np.float64)
         errors.append(float(np.abs(together - alone).max()) / np.abs(together).max())
     # Elementary functions of arrays and of numbers may round differently.
     return at_most(max(errors), 1e-14)

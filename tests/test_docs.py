@@ -1,0 +1,68 @@
+"""The documentation shows code that is run, and lists what there is."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+from solidsph import Scene, Simulation, registry
+
+ROOT = Path(__file__).parents[1]
+EXAMPLE = ROOT / "plugins/examples/solidsph-wendland"
+
+
+def blocks(page: str, language: str) -> list[str]:
+    text = (ROOT / page).read_text()
+    return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
+
+
+def test_first_kernel_shows_the_example_plugin() -> None:
+    kernel, tests = blocks("docs/first-kernel.md", "python")
+    assert kernel == (EXAMPLE / "src/solidsph_wendland/wendland_c2.py").read_text()
+    assert tests == (EXAMPLE / "tests/test_wendland_c2.py").read_text()
+    shown = tomllib.loads(blocks("docs/first-kernel.md", "toml")[0])
+    real = tomllib.loads((EXAMPLE / "pyproject.toml").read_text())
+    assert shown["project"]["entry-points"] == real["project"]["entry-points"]
+
+
+def test_the_scene_shown_can_be_built() -> None:
+    (scene,) = blocks("docs/scenes.md", "toml")
+    simulation = Simulation.builder(Scene.from_toml(scene)).build()
+    assert simulation.steps > 0
+
+
+def test_every_builtin_part_is_listed() -> None:
+    text = (ROOT / "docs/scenes.md").read_text()
+    missing = [
+        entry.name
+        for kind in registry.INTERFACES
+        if kind != "cases"
+        for entry in registry.available(kind)
+        if entry.distribution == "solidsph" and f"`{entry.name}`" not in text
+    ]
+    assert missing == []
+
+
+def test_the_readmes_python_runs(tmp_path, monkeypatch) -> None:
+    (code,) = blocks("README.md", "python")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(compile(code, "README.md", "exec"), names)
+    assert (tmp_path / "results/plate/record.h5").exists()
+
+
+def test_every_verb_is_in_the_readme() -> None:
+    from solidsph.cli import VERBS
+
+    text = (ROOT / "README.md").read_text()
+    assert all(f"solidsph {verb}" in text for verb in VERBS)
+
+
+def test_every_module_of_the_core_is_in_the_architecture() -> None:
+    text = (ROOT / "docs/architecture.md").read_text()
+    core = ROOT / "src/solidsph"
+    named = [path.name for path in core.glob("*.py") if not path.name.startswith("__")]
+    folders = [f"{path.name}/" for path in core.iterdir() if (path / "__init__.py").exists()]
+    small = {"arrays.py", "errors.py", "problems.py"}
+    assert [name for name in [*named, *folders] if name not in text and name not in small] == []
