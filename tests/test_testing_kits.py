@@ -455,6 +455,7 @@ def with_false_gradient() -> Formulation:
 @attrs.frozen
 class ClaimsToConserve(Divergence):
     conserves_momentum: ClassVar[bool] = True
+    adjoint: ClassVar[bool] = False
     uses_ghost_stress: ClassVar[bool] = True
 
     def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:

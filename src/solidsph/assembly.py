@@ -34,7 +34,6 @@ from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.material import Material
 from solidsph.interfaces.shape import Shape
 from solidsph.motion import VectorField
-from solidsph.neighbours import neighbour_pairs
 from solidsph.particles import Particles, State
 from solidsph.parts import construct
 from solidsph.problems import Problems
@@ -196,7 +195,6 @@ class Assembly:
             extent=particles.bodies[name],
             particles=own,
             smoothing=smoothing_kernel(kernel, own.dimension, radius),
-            pairs=neighbour_pairs(own.positions, radius),
             material=material,
             formulation=formulation,
         )

@@ -8,7 +8,7 @@ import numpy as np
 from solidsph.arrays import Array
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.material import Material
-from solidsph.neighbours import Pairs
+from solidsph.neighbours import Pairs, neighbour_pairs
 from solidsph.particles import Particles
 from solidsph.smoothing import SmoothingKernel
 
@@ -21,9 +21,15 @@ class Body:
     extent: slice  # its place among all particles
     particles: Particles  # its own only
     smoothing: SmoothingKernel
-    pairs: Pairs  # in the reference configuration, numbered within the body
     material: Material
     formulation: Formulation
+
+    def pairs(self) -> Pairs:
+        """Neighbours in the reference configuration, numbered within the body.
+
+        Found anew at every call: an engine that needs them for longer keeps what it needs.
+        """
+        return neighbour_pairs(self.particles.positions, self.smoothing.support_radius)
 
     @property
     def masses(self) -> Array:

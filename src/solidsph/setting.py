@@ -32,11 +32,10 @@ class Setting:
 
     def smoothing_matrix(self) -> csr_array:
         """W of the paper's eq. 8, sparse: its product with values gives their approximation."""
-        blocks = [
-            body.pairs.matrix(
-                body.smoothing.value(body.pairs.distances)
-                * body.particles.volumes[body.pairs.columns]
-            )
-            for body in self.bodies
-        ]
-        return csr_array(block_diag(blocks, format="csr"))
+        return csr_array(block_diag([_smoothing(body) for body in self.bodies], format="csr"))
+
+
+def _smoothing(body: Body) -> csr_array:
+    pairs = body.pairs()
+    weights = body.smoothing.value(pairs.distances)
+    return pairs.matrix(weights * body.particles.volumes[pairs.columns])

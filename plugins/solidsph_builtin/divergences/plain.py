@@ -22,6 +22,7 @@ class Plain(Divergence):
     """
 
     conserves_momentum: ClassVar[bool] = False
+    adjoint: ClassVar[bool] = False
     uses_ghost_stress: ClassVar[bool] = True
 
     def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:

@@ -23,6 +23,7 @@ class Variational(Divergence):
     """
 
     conserves_momentum: ClassVar[bool] = True
+    adjoint: ClassVar[bool] = True
     uses_ghost_stress: ClassVar[bool] = False
 
     def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:

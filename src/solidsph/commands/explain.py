@@ -80,7 +80,7 @@ def _why(scene: Scene, entry: registry.Entry) -> str:
 def _numbers(simulation: Simulation) -> list[dict[str, Any]]:
     scene, setting = simulation.scene, simulation.setting
     particles = setting.particles
-    pairs = sum(body.pairs.count for body in setting.bodies)
+    pairs = simulation.dynamics.internal.pair_count
     neighbours = pairs / particles.count - 1.0
     speed = max(body.material.wave_speed for body in setting.bodies)
     per_step = _seconds_per_step(simulation)

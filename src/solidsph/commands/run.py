@@ -75,7 +75,7 @@ def _run_scene(target: str, scene: Scene, folder: Path, *, shown: bool, as_json:
         history = {name: float(values[-1]) for name, values in record.history.items()}
     facts: dict[str, Any] = {
         "particles": simulation.particles.count,
-        "pairs": sum(body.pairs.count for body in simulation.setting.bodies),
+        "pairs": simulation.dynamics.internal.pair_count,
         "steps": simulation.steps,
         "step size [s]": simulation.step_size,
         "wall time [s]": result.seconds,

@@ -24,6 +24,11 @@ class StressFields:
 class InternalForces(ABC):
     """The forces that bodies exert on themselves, as a function of where their particles are."""
 
+    @property
+    @abstractmethod
+    def pair_count(self) -> int:
+        """Ordered pairs of neighbours that one evaluation sums over, self pairs included."""
+
     @abstractmethod
     def forces(self, time: float, displacements: Array) -> Array:
         """Force on every particle, (n, d) [N], from displacements u = x - X (n, d) [m]."""

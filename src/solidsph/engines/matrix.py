@@ -84,6 +84,7 @@ class MatrixForces(InternalForces):
 
     parts: Sequence[_FixedBody | _FollowedBody]
     conditions: Sequence[StressCondition]
+    pair_count: int
 
     def forces(self, time: float, displacements: Array) -> Array:
         n, d = displacements.shape
@@ -159,10 +160,13 @@ class MatrixEngine(Engine):
         self, bodies: Sequence[Body], conditions: Sequence[StressCondition]
     ) -> InternalForces:
         parts: list[_FixedBody | _FollowedBody] = []
+        count = 0
         for body in bodies:
+            pairs = body.pairs()
+            count += pairs.count
             if body.formulation.configuration is Configuration.REFERENCE:
-                matrices = operators(body, body.pairs, body.particles.volumes)
+                matrices = operators(body, pairs, body.particles.volumes)
                 parts.append(_FixedBody(body, matrices))
             else:
-                parts.append(_FollowedBody(body, kernel_sums(body, body.pairs)))
-        return MatrixForces(tuple(parts), tuple(conditions))
+                parts.append(_FollowedBody(body, kernel_sums(body, pairs)))
+        return MatrixForces(tuple(parts), tuple(conditions), count)

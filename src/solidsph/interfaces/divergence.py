@@ -16,6 +16,10 @@ class Divergence(ABC):
     """Whether the forces of a free body add up to zero whatever the stresses are, provided that
     the gradient of a constant is zero."""
 
+    adjoint: ClassVar[bool]
+    """Whether the weights are -V_q g_qp: an engine may then scatter with the gradient's own
+    weights and store no others."""
+
     uses_ghost_stress: ClassVar[bool]
     """Whether ghosts carry a stress of their own into the sums. Where they do not, the forces on
     ghosts go back to the particles that the ghosts follow."""

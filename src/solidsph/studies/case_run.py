@@ -75,7 +75,7 @@ def run_case(
                 seconds=clock.perf_counter() - begun,
                 steps=simulation.steps,
                 particles=simulation.particles.count,
-                pairs=sum(body.pairs.count for body in simulation.setting.bodies),
+                pairs=simulation.dynamics.internal.pair_count,
                 outcome=outcome,
             )
         )

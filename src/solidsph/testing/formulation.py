@@ -241,7 +241,7 @@ def _strain_energy(sample: _Sample, displacements: Array) -> Array:
 
 def _is_transpose(body: Body) -> bool:
     """Whether d_pq = -V_q g_qp for every pair."""
-    pairs, volumes = body.pairs, body.particles.volumes
+    pairs, volumes = body.pairs(), body.particles.volumes
     slopes = body.smoothing.gradient(pairs.offsets, pairs.distances)
     g = body.formulation.gradient.weights(pairs, slopes, volumes)
     found = body.formulation.divergence.weights(pairs, g, volumes)

@@ -37,6 +37,10 @@ _ORDER_TOLERANCE = 0.1
 class _Spring(InternalForces):
     """f = -m omega^2 u on every particle."""
 
+    @property
+    def pair_count(self) -> int:
+        return 0
+
     def forces(self, time: float, displacements: Array) -> Array:
         return -_MASS * _FREQUENCY**2 * displacements
 
@@ -60,6 +64,10 @@ class _Damper(ForceCondition):
     @property
     def particles(self) -> Indices:
         return np.array([0])
+
+    @property
+    def pair_count(self) -> int:
+        return 0
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         return -_MASS * _RATE * velocities[:1]
