@@ -44,7 +44,7 @@ def free_body(
             spacing=spacing,
             discretisation=discretisation,
         )
-        .kernel("modified-mollifier", cover=2.6)
+        .kernel("modified-mollifier", cover=3.5)
         .material(example_part("materials", "neo-hookean"))
         .formulation(formulation)
         .integrator(integrator)

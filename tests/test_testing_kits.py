@@ -453,9 +453,9 @@ def with_false_gradient() -> Formulation:
 
 
 @attrs.frozen
-class ClaimsToConserve(Divergence):
+class ClaimsEverything(Divergence):
     conserves_momentum: ClassVar[bool] = True
-    adjoint: ClassVar[bool] = False
+    adjoint: ClassVar[bool] = True
     uses_ghost_stress: ClassVar[bool] = True
 
     def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:
@@ -463,7 +463,7 @@ class ClaimsToConserve(Divergence):
 
 
 def with_false_divergence() -> Formulation:
-    return GoodFormulation(divergence=ClaimsToConserve())
+    return GoodFormulation(divergence=ClaimsEverything())
 
 
 FORMULATIONS = [
@@ -473,7 +473,7 @@ FORMULATIONS = [
     (WeakStress, {"energy gradient"}),
     (WrongStressInCurrent, {"angular momentum"}),
     (with_false_gradient, {"translation"}),
-    (with_false_divergence, {"linear momentum", "angular momentum"}),
+    (with_false_divergence, {"linear momentum", "angular momentum", "adjoint"}),
 ]
 
 WRONG = {

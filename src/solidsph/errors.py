@@ -66,3 +66,63 @@ def _rebuild_diverged(
     return DivergedError(
         step=step, time=time, particle=particle, volume_ratio=volume_ratio, cause=cause
     )
+
+
+class ConvergenceError(SolidsphError):
+    """No equilibrium was found: at which load, how far from balance, and where."""
+
+    def __init__(
+        self,
+        *,
+        load_factor: float,
+        tried: float,
+        residual: float,
+        particle: int,
+        volume_ratio: float,
+        cause: str,
+        remedy: str,
+    ):
+        self.load_factor = load_factor  # the last at which there was an equilibrium
+        self.tried = tried  # the next, at which none was found
+        self.residual = residual
+        self.particle = particle
+        self.volume_ratio = volume_ratio
+        self.cause = cause
+        self.remedy = remedy
+        super().__init__(
+            f"no equilibrium beyond load factor {load_factor:.6g}: {cause} at {tried:.6g}; the "
+            f"forces miss balance by {residual:.3g} of what is applied, most at particle "
+            f"{particle}, where J = {volume_ratio:.6g}. Remedy: {remedy}"
+        )
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Keyword-only arguments do not survive the default pickling between processes.
+        return _rebuild_unbalanced, (
+            self.load_factor,
+            self.tried,
+            self.residual,
+            self.particle,
+            self.volume_ratio,
+            self.cause,
+            self.remedy,
+        )
+
+
+def _rebuild_unbalanced(
+    load_factor: float,
+    tried: float,
+    residual: float,
+    particle: int,
+    volume_ratio: float,
+    cause: str,
+    remedy: str,
+) -> ConvergenceError:
+    return ConvergenceError(
+        load_factor=load_factor,
+        tried=tried,
+        residual=residual,
+        particle=particle,
+        volume_ratio=volume_ratio,
+        cause=cause,
+        remedy=remedy,
+    )

@@ -14,18 +14,19 @@ from solidsph.arrays import Array, Indices
 class Pairs:
     """Ordered pairs (p, q) in rows: the neighbours of p stand together, sorted by q, p among them.
 
-    The relation is symmetric, so every pair has its reverse in the list.
+    The list may hold the rows of some of the particles only, as long as they follow each other;
+    rows and columns keep their numbers among all. In a list of all rows every pair has its reverse.
     """
 
-    starts: Indices  # (n + 1,) row p is starts[p] : starts[p + 1]
+    starts: Indices  # (n + 1,) the row of the k-th particle listed is starts[k] : starts[k + 1]
     rows: Indices  # (m,) p
     columns: Indices  # (m,) q
     offsets: Array  # (m, d) x_q - x_p [m]
     distances: Array  # (m,) [m]
 
     @property
-    def particle_count(self) -> int:
-        """Number of particles n."""
+    def row_count(self) -> int:
+        """Number of particles n whose rows are listed."""
         return len(self.starts) - 1
 
     @property
@@ -43,9 +44,13 @@ class Pairs:
         # Every row holds its self pair, so no segment is empty and reduceat is safe.
         return np.add.reduceat(values, self.starts[:-1], axis=0)
 
+    def spread(self, values: Array) -> Array:
+        """Values of the particles listed (n, ...), given to each of their pairs, (m, ...)."""
+        return np.repeat(values, np.diff(self.starts), axis=0)
+
     def matrix(self, values: Array) -> csr_array:
         """Sparse n x n matrix with `values` (m,) at (p, q)."""
-        n = self.particle_count
+        n = self.row_count
         return csr_array((values, self.columns, self.starts), shape=(n, n))
 
     @property

@@ -28,6 +28,8 @@ class Problems:
             self.add(cause.problems)
         except SolidsphError as cause:
             self.add([str(cause)])
+        except Warning:  # where the user has asked for warnings to be errors
+            raise
         except Exception as cause:  # a plugin's code may fail in any way
             owner = type(getattr(make, "__self__", make))
             raise PluginError(

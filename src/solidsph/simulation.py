@@ -13,7 +13,7 @@ import pluggy
 
 from solidsph.dynamics import Dynamics
 from solidsph.engines.engine import Engine
-from solidsph.errors import DivergedError
+from solidsph.errors import BuildError, DivergedError
 from solidsph.interfaces.condition import Condition, Observation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.integrator import Integrator
@@ -118,7 +118,10 @@ class Simulation:
 
     def _advance(self, state: State, stop: int) -> State:
         while state.step < stop:
-            state = self.integrator.advance(state, self.dynamics, self.step_size)
+            try:
+                state = self.integrator.advance(state, self.dynamics, self.step_size)
+            except BuildError as cause:  # a moving neighbourhood may stop determining a gradient
+                raise self._diverged(state, cause.problems[0]) from cause
             # One sum tells whether any entry is not finite, at a fraction of a step's cost.
             if not np.isfinite(state.accelerations.sum()):
                 raise self._diverged(state, "the acceleration is not finite")

@@ -33,15 +33,16 @@ class Corrected(Gradient):
         moments = pairs.row_sums(pairs.offsets[:, :, None] * plain[:, None, :])
         _check_moments(moments, pairs)
         corrections = np.linalg.inv(moments).transpose(0, 2, 1)
-        corrected = np.einsum("mij,mj->mi", corrections[pairs.rows], plain)
+        corrected = np.einsum("mij,mj->mi", pairs.spread(corrections), plain)
         return differences(pairs, corrected)
 
 
 def _check_moments(moments: Array, pairs: Pairs) -> None:
     singular = ~(np.linalg.cond(moments) < _WORST_CONDITION)
     if singular.any():
-        worst = int(np.flatnonzero(singular)[0])
-        neighbours = int(pairs.starts[worst + 1] - pairs.starts[worst]) - 1
+        first = int(np.flatnonzero(singular)[0])
+        neighbours = int(pairs.starts[first + 1] - pairs.starts[first]) - 1
+        worst = int(pairs.rows[pairs.starts[first]])
         raise BuildError(
             [
                 f"gradient 'corrected': the {neighbours} neighbours of particle {worst} do not "

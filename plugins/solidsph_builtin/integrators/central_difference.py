@@ -41,8 +41,10 @@ class CentralDifference(Integrator):
     def advance(self, state: State, dynamics: Dynamics, step_size: float) -> State:
         time = state.time + step_size
         increment = state.memory[_INCREMENT] + step_size**2 * state.accelerations
-        positions = dynamics.place(time, state.positions + increment)
-        increment = positions - state.positions
+        free = state.positions + increment
+        positions = dynamics.place(time, free)
+        # Only what was imposed: the difference of positions would bring their rounding back.
+        increment = increment + (positions - free)
         backward = increment / step_size
         predicted = dynamics.carry(time, backward + 0.5 * step_size * state.accelerations)
         response = dynamics.respond(time, positions, predicted)

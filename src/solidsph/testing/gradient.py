@@ -18,7 +18,7 @@ from solidsph.testing.samples import scattered, seeded
 
 _CELLS = {1: (20,), 2: (9, 8), 3: (6, 5, 5)}
 _SPACING = 0.05  # [m]
-_COVER = 2.6  # support radius in spacings: a particle in a corner has neighbours in every direction
+_COVER = 3.5  # in spacings: a particle in a corner has neighbours for second derivatives
 _KERNEL = "modified-mollifier"  # that of a scene which names none
 
 # Relative to the sum of |g_pq| |f_q|, what rounding can do to the sum, times the loss of a few

@@ -65,10 +65,6 @@ class _Damper(ForceCondition):
     def particles(self) -> Indices:
         return np.array([0])
 
-    @property
-    def pair_count(self) -> int:
-        return 0
-
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         return -_MASS * _RATE * velocities[:1]
 

@@ -1,0 +1,1 @@
+"""The compiled engine. Importing it brings the compiler, so only what uses it does."""

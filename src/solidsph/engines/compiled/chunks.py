@@ -1,0 +1,43 @@
+"""Neighbours of some particles at a time, so that no list of all pairs need exist."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solidsph.arrays import Array
+from solidsph.body import Body
+from solidsph.neighbours import Pairs
+
+_ROWS_AT_ONCE = 2048
+
+
+def weighted_chunks(body: Body, count: int) -> Iterator[tuple[Pairs, Array]]:
+    """Pairs of the first `count` particles, some rows at a time, with the gradient's weights (m, d).
+
+    Rows and columns are numbered within the body; the weights of a row depend on that row alone.
+    """
+    volumes, positions = body.particles.volumes, body.particles.positions
+    tree = cKDTree(positions)
+    for first in range(0, count, _ROWS_AT_ONCE):
+        rows = slice(first, min(first + _ROWS_AT_ONCE, count))
+        pairs = _pairs_of(tree, positions, rows, body.smoothing.support_radius)
+        kernel_gradients = body.smoothing.gradient(pairs.offsets, pairs.distances)
+        yield pairs, body.formulation.gradient.weights(pairs, kernel_gradients, volumes)
+
+
+def _pairs_of(tree: cKDTree, positions: Array, rows: slice, radius: float) -> Pairs:
+    n, k = len(positions), rows.stop - rows.start
+    found = cKDTree(positions[rows]).sparse_distance_matrix(tree, radius, output_type="ndarray")
+    keys = np.sort(found["i"] * n + found["j"])
+    own, columns = np.divmod(keys, n)
+    offsets = positions[columns] - positions[own + rows.start]
+    return Pairs(
+        starts=np.searchsorted(own, np.arange(k + 1)).astype(np.intp),
+        rows=own + rows.start,
+        columns=columns,
+        offsets=offsets,
+        distances=np.linalg.norm(offsets, axis=1),
+    )

@@ -1,0 +1,93 @@
+"""Pointwise functions of parts, made ready for the compiler.
+
+A part imports no compiler: its functions and the helpers that they call are registered from here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cache
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+from numba import njit
+from numba.core.errors import NumbaError
+from numba.core.types import UniTuple, float64
+from numba.extending import register_jitable
+
+from solidsph.arrays import Tensor
+from solidsph.interfaces.formulation import Formulation
+from solidsph.interfaces.material import Material
+
+_DEEPEST = 20  # calls within calls; more is taken for a recursion
+
+
+class NotCompilableError(Exception):
+    """A pointwise function is outside what the compiler understands."""
+
+
+def compiled_flux(formulation: Formulation, material: Material, dimension: int) -> Any:
+    """Compiled (H, params) -> flux(F(H), P(F)) at one point, of these two parts.
+
+    Raises:
+        NotCompilableError: one of their functions cannot be compiled.
+    """
+    law = _flux(formulation.deformation_gradient, material.first_piola, formulation.flux)
+    tensor = UniTuple(UniTuple(float64, dimension), dimension)
+    try:
+        law.compile((tensor, UniTuple(float64, len(material.params))))
+    except NumbaError as cause:
+        raise NotCompilableError(str(cause)) from cause
+    return law
+
+
+@njit
+def no_law(H: Tensor, params: tuple[float, ...]) -> Tensor:
+    """H itself, where the gradient alone is wanted."""
+    return H
+
+
+# By the identity of the functions: a process compiles each combination once.
+@cache
+def _flux(deformation_gradient: Any, first_piola: Any, flux: Any) -> Any:
+    F_of, P_of, T_of = (_registered(f) for f in (deformation_gradient, first_piola, flux))
+
+    @njit
+    def law(H: Tensor, params: tuple[float, ...]) -> Tensor:
+        F = F_of(H)
+        return T_of(F, P_of(F, params))
+
+    return law
+
+
+@cache
+def _registered(function: Callable[..., Any], depth: int = 0) -> Any:
+    """The same function, known to the compiler with every plain function that it calls."""
+    if not isinstance(function, FunctionType):
+        raise NotCompilableError(f"{function!r} is not a plain function")
+    if depth > _DEEPEST:
+        raise NotCompilableError(f"{function.__qualname__} calls itself, or nests too deeply")
+    for helper in _called(function):
+        _registered(helper, depth + 1)
+    return register_jitable(function)
+
+
+def _called(function: FunctionType) -> Iterator[FunctionType]:
+    """Plain functions that the names in a function's code stand for, modules looked through."""
+    names = set(_names(function.__code__))
+    known = [function.__globals__[name] for name in names if name in function.__globals__]
+    known += [cell.cell_contents for cell in function.__closure__ or ()]
+    for value in known:
+        if isinstance(value, FunctionType):
+            yield value
+        # NumPy's functions are the compiler's own business.
+        elif isinstance(value, ModuleType) and value.__name__.split(".")[0] not in ("numpy", "math"):
+            inside = (vars(value).get(name) for name in names)
+            yield from (one for one in inside if isinstance(one, FunctionType))
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)

@@ -1,0 +1,231 @@
+"""Rows of weights in little memory: particles with the same stencil share it.
+
+Particles made by a lattice stand in long runs p, p + 1, ... whose neighbours have the same index
+offsets and the same weights. A run keeps one stencil; only the rest keeps rows of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from solidsph.arrays import Array, Indices, Mask
+from solidsph.neighbours import Pairs
+
+# Relative to the largest weight of a row: below the first a weight is rounding, and below the
+# second so is the difference of two. Positions of a lattice are rounded to 1e-16 of the body's
+# size, so their differences to some 1e-14 of the spacing.
+_NOTHING = 1e-15
+_SAME = 1e-13
+
+RUN = 128  # most particles of a run that are treated at once, so that their tensors stay in cache
+ROWS = 16  # the same for rows, which have weights of their own
+BAND = 16  # widest band
+
+
+class Rows(NamedTuple):
+    """Weight vectors g_pq of rows p, laid out for the loops over them."""
+
+    # (b, 3) consecutive particles that are treated at once: the first, how many, and the number
+    # of their stencil, or -1 - k where their own rows begin with row k
+    blocks: Indices
+    # (s + 1,), (s + 1,) where each stencil's members, and its bands, begin
+    members: Indices
+    stencils: Indices
+    offsets: Indices  # (k,) q - p of every member of a stencil, rising
+    stencil_weights: Array  # (k, d) [1/m]
+    bands: Indices  # (c, 3) members whose offsets follow each other: first member, offset, width
+    # (r + 1,), (m,), (m, d) rows of those that are in no run
+    starts: Indices
+    columns: NDArray[np.int32]
+    weights: Array
+
+    @property
+    def run_particles(self) -> int:
+        """Particles that share a stencil."""
+        return int(self.blocks[self.blocks[:, 2] >= 0, 1].sum())
+
+    @property
+    def bytes(self) -> int:
+        """Memory of all arrays."""
+        return sum(array.nbytes for array in self)
+
+    def costs(self) -> Array:
+        """Pairs of each block, those of a run counted by what they cost beside a row's, (b,)."""
+        first, count, where = self.blocks.T
+        costs = np.empty(len(self.blocks))
+        run = where >= 0
+        sizes = np.diff(self.members)
+        costs[run] = 0.4 * count[run] * sizes[where[run]]
+        row = -1 - where[~run]
+        costs[~run] = self.starts[row + count[~run]] - self.starts[row]
+        return costs
+
+
+class _Compressor:
+    """Takes chunks of rows and keeps what is new in them."""
+
+    def __init__(self, dtype: str, shortest_run: int) -> None:
+        self._dtype, self._shortest_run = dtype, shortest_run
+        self._blocks: list[Array] = []
+        self._stencils: list[tuple[Indices, Array]] = []
+        self._lengths: list[Indices] = []
+        self._columns: list[NDArray[np.int32]] = []
+        self._weights: list[Array] = []
+        self._row_count = 0
+
+    def add(self, first: int, counts: Indices, columns: Indices, weights: Array) -> None:
+        """Rows `first`, ... with so many pairs each (k,), columns (m,) and weights (m, d)."""
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        rows = np.repeat(np.arange(first, first + len(counts)), counts)
+        heads = _run_heads(starts, columns - rows, weights, _SAME)
+        begin = np.flatnonzero(heads == np.arange(len(heads)))
+        length = np.diff([*begin, len(heads)])
+        shared = length >= self._shortest_run
+        for a, n in zip(begin[shared], length[shared], strict=True):
+            own = slice(starts[a], starts[a + 1])
+            stencil = self._stencil(columns[own] - (first + a), weights[own])
+            parts = -(-n // RUN)
+            edges = a + np.arange(parts + 1) * n // parts
+            self._add_blocks(first + edges[:-1], np.diff(edges), np.full(parts, stencil))
+        single = np.repeat(~shared, length)
+        self._add_rows(first, single)
+        kept = np.repeat(single, counts)
+        self._lengths.append(counts[single])
+        self._columns.append(columns[kept].astype(np.int32))
+        self._weights.append(weights[kept].astype(self._dtype))
+        self._row_count += int(single.sum())
+
+    def rows(self, dimension: int) -> Rows:
+        """All that was added."""
+        blocks = np.concatenate([np.empty((0, 3), dtype=np.intp), *self._blocks])
+        offsets = [one[0] for one in self._stencils]
+        bands = [_bands(one) for one in offsets]
+        members = _starts(np.array([len(one) for one in offsets], dtype=np.intp))
+        none = np.empty((0, dimension), dtype=self._dtype)
+        stencil_weights = [one[1].astype(self._dtype) for one in self._stencils]
+        return Rows(
+            blocks=np.ascontiguousarray(blocks[np.argsort(blocks[:, 0])]),
+            members=members,
+            stencils=_starts(np.array([len(one) for one in bands], dtype=np.intp)),
+            offsets=np.concatenate([np.empty(0, dtype=np.intp), *offsets]),
+            stencil_weights=np.concatenate([none, *stencil_weights]),
+            bands=np.concatenate(
+                [np.empty((0, 3), dtype=np.intp)]
+                + [one + [start, 0, 0] for one, start in zip(bands, members[:-1], strict=True)]
+            ),
+            starts=_starts(np.concatenate([np.empty(0, dtype=np.intp), *self._lengths])),
+            columns=np.concatenate([np.empty(0, dtype=np.int32), *self._columns]),
+            weights=np.concatenate([none, *self._weights]),
+        )
+
+    def _stencil(self, offsets: Indices, weights: Array) -> int:
+        # Lines that follow each other often have the same one.
+        if self._stencils:
+            last, values = self._stencils[-1]
+            if np.array_equal(last, offsets):
+                close = _SAME * np.abs(values).max()
+                if np.abs(values - weights).max() <= close:
+                    return len(self._stencils) - 1
+        self._stencils.append((offsets, weights))
+        return len(self._stencils) - 1
+
+    def _add_rows(self, first: int, single: Mask) -> None:
+        k = np.flatnonzero(single)
+        # A block ends where the particles do not follow each other, or where it is full.
+        fresh = np.diff(k, prepend=-2) != 1
+        since = np.arange(len(k)) - np.maximum.accumulate(np.where(fresh, np.arange(len(k)), 0))
+        at = np.flatnonzero(since % ROWS == 0)
+        self._add_blocks(first + k[at], np.diff([*at, len(k)]), -1 - (self._row_count + at))
+
+    def _add_blocks(self, first: Indices, count: Indices, where: Indices) -> None:
+        self._blocks.append(np.stack([first, count, where], axis=1).astype(np.intp))
+
+
+def compressed(
+    chunks: Iterable[tuple[Pairs, Array]], dimension: int, dtype: str, shortest_run: int
+) -> Rows:
+    """Rows of the weights (m, d) that come with chunks of pairs, in order.
+
+    Args:
+        chunks: pairs of consecutive particles, and their weights.
+        dimension: d.
+        dtype: number type in which the weights are kept.
+        shortest_run: fewest particles for which a stencil pays.
+    """
+    compressor = _Compressor(dtype, shortest_run)
+    for pairs, weights in chunks:
+        size = np.abs(weights).max(axis=1)
+        largest = np.maximum.reduceat(size, pairs.starts[:-1])
+        matters = size > _NOTHING * pairs.spread(largest)
+        # A particle's own weight makes the row add up to zero, however small it is.
+        matters[pairs.self_pairs] = True
+        counts = np.add.reduceat(matters, pairs.starts[:-1], dtype=np.intp)
+        compressor.add(
+            int(pairs.rows[0]), counts, pairs.columns[matters], weights[matters]
+        )
+    return compressor.rows(dimension)
+
+
+def in_chunks(pairs: Pairs, weights: Array, rows: int = 2048) -> Iterator[tuple[Pairs, Array]]:
+    """A whole list of pairs and its weights (m, d), some rows at a time."""
+    for first in range(0, pairs.row_count, rows):
+        starts = pairs.starts[first : first + rows + 1]
+        own = slice(starts[0], starts[-1])
+        part = Pairs(
+            starts=starts - starts[0],
+            rows=pairs.rows[own],
+            columns=pairs.columns[own],
+            offsets=pairs.offsets[own],
+            distances=pairs.distances[own],
+        )
+        yield part, weights[own]
+
+
+def _starts(lengths: Indices) -> Indices:
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.intp)
+
+
+def _bands(offsets: Indices) -> Indices:
+    """Stretches of offsets that follow each other, (c, 3): first member, offset, width."""
+    fresh = np.diff(offsets, prepend=offsets[:1] - 2) != 1
+    since = np.arange(len(offsets))
+    since = since - np.maximum.accumulate(np.where(fresh, since, 0))
+    first = np.flatnonzero(since % BAND == 0)
+    width = np.diff([*first, len(offsets)])
+    return np.stack([first, offsets[first], width], axis=1).astype(np.intp)
+
+
+@njit
+def _run_heads(starts: Indices, offsets: Indices, weights: Array, tolerance: float) -> Indices:
+    """For every row the first of those before it, without a gap, that have its stencil, (k,)."""
+    heads = np.empty(len(starts) - 1, np.intp)
+    head, largest = -1, 0.0
+    for p in range(len(heads)):
+        if head < 0 or not _alike(starts, offsets, weights, head, p, tolerance * largest):
+            head, largest = p, 0.0
+            for m in range(starts[p], starts[p + 1]):
+                for k in range(weights.shape[1]):
+                    largest = max(largest, abs(weights[m, k]))
+        heads[p] = head
+    return heads
+
+
+@njit
+def _alike(
+    starts: Indices, offsets: Indices, weights: Array, p: int, q: int, close: float
+) -> bool:
+    a, b = starts[p], starts[q]
+    if starts[p + 1] - a != starts[q + 1] - b:
+        return False
+    for m in range(starts[p + 1] - a):
+        if offsets[a + m] != offsets[b + m]:
+            return False
+        for k in range(weights.shape[1]):
+            if not abs(weights[a + m, k] - weights[b + m, k]) <= close:
+                return False
+    return True

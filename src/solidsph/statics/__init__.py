@@ -1,0 +1,20 @@
+"""Equilibria, natural frequencies and the stable step, from the operators that runs use."""
+
+from solidsph.statics.equilibrium import EquilibriumResult, LoadStep, equilibrium
+from solidsph.statics.modes import Modes, frequencies
+from solidsph.statics.stable_step import StableStep, critical_step, highest_frequency
+from solidsph.statics.stiff import Stiff
+from solidsph.statics.tangent import tangent
+
+__all__ = [
+    "EquilibriumResult",
+    "LoadStep",
+    "Modes",
+    "StableStep",
+    "Stiff",
+    "critical_step",
+    "equilibrium",
+    "frequencies",
+    "highest_frequency",
+    "tangent",
+]

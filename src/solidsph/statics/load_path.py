@@ -1,0 +1,112 @@
+"""The load path: the scene at rest under a growing part of what is imposed on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array, Mask
+from solidsph.engines.matrix import MatrixEngine, MatrixForces
+from solidsph.interfaces.condition import ExtensionCondition, StressCondition
+from solidsph.simulation import Simulation
+
+
+@attrs.frozen(eq=False)
+class Forces:
+    """Forces on particles at rest."""
+
+    total: Array  # (n, d) [N], those on ghosts handed to whom they follow
+    applied: Mapping[str, Array]  # by account, reactions among them, (n, d) [N]
+
+    @property
+    def scale(self) -> float:
+        """Size of everything applied [N], which the imbalance is measured by."""
+        return float(np.sqrt(sum(np.vdot(force, force) for force in self.applied.values())))
+
+
+@attrs.frozen(eq=False)
+class LoadPath:
+    """A scene at load factors from 0, where nothing is imposed, to 1, where all of it is.
+
+    At factor s, imposed motions and loads are those of the time s T, with T the duration, less
+    1 - s times what they are at t = 0. A formula that grows from zero is so followed in time; a
+    constant, which stands at full height from the start, grows in proportion to s.
+    """
+
+    simulation: Simulation
+    internal: MatrixForces
+    offset: Array  # (n, d) motion imposed at t = 0 [m]
+    initial_loads: Mapping[str, Array]  # (k, d) of each load at t = 0 [N]
+    held: Mask  # (n, d) components of real particles that a motion determines
+
+    @classmethod
+    def of(cls, simulation: Simulation) -> LoadPath:
+        """The path of a scene, from its reference configuration."""
+        dynamics, particles = simulation.dynamics, simulation.particles
+        rest = np.zeros_like(particles.positions)
+        held = np.zeros(rest.shape, dtype=np.bool_)
+        offset = rest.copy()
+        for motion in dynamics.motions:
+            motion.impose(0.0, 0, offset)
+            held |= motion.held
+        return cls(
+            simulation=simulation,
+            internal=_double_precision(simulation),
+            offset=offset,
+            initial_loads={
+                load.label: load.forces(0.0, particles.positions, rest) for load in dynamics.loads
+            },
+            held=held & ~particles.ghosts[:, None],
+        )
+
+    def time(self, factor: float) -> float:
+        """Time that belongs to a load factor [s]."""
+        return factor * self.simulation.scene.duration
+
+    def placed(self, displacements: Array, factor: float) -> Array:
+        """Displacements (n, d) with the motions of this factor imposed."""
+        placed = displacements.copy()
+        for motion in self.simulation.dynamics.motions:
+            motion.impose(self.time(factor), 0, placed)
+        return placed - (1.0 - factor) * self.offset
+
+    def forces(self, displacements: Array, factor: float) -> Forces:
+        """Forces at displacements (n, d), with the loads of this factor."""
+        dynamics, time = self.simulation.dynamics, self.time(factor)
+        positions = dynamics.particles.positions + displacements
+        rest = np.zeros_like(positions)
+        total = self.internal.forces(time, displacements)
+        applied: dict[str, Array] = {}
+        for load in dynamics.loads:
+            force = np.zeros_like(positions)
+            force[load.particles] = (
+                load.forces(time, positions, rest) - (1.0 - factor) * self.initial_loads[load.label]
+            )
+            applied[load.label] = force
+            total = total + force
+        for motion in dynamics.motions:
+            if isinstance(motion, ExtensionCondition):
+                motion.return_forces(total)
+        for motion in dynamics.motions:
+            applied[motion.label] = np.where(motion.held & self.held, -total, 0.0)
+        return Forces(total, applied)
+
+    def volume_ratios(self, displacements: Array) -> Array:
+        """J of every particle, (n,); 1 for ghosts."""
+        with np.errstate(all="ignore"):  # a displacement that is being tried may be absurd
+            F = self.internal.fields(displacements).deformation_gradients
+            ratios: Array = np.linalg.det(F)
+        return ratios
+
+
+def _double_precision(simulation: Simulation) -> MatrixForces:
+    """Internal forces whose rounding Newton's method does not see, whichever engine runs."""
+    internal = simulation.dynamics.internal
+    if isinstance(internal, MatrixForces):
+        return internal
+    conditions = [c for c in simulation.conditions if isinstance(c, StressCondition)]
+    prepared = MatrixEngine().prepare(simulation.setting.bodies, conditions)
+    assert isinstance(prepared, MatrixForces)
+    return prepared
