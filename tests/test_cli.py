@@ -113,7 +113,7 @@ def test_write_a_cases_scenes_and_run_one(tmp_path: Path) -> None:
         (("run", "tensile-instabilty"), "did you mean 'tensile-instability'"),
         (("run", "tensile-instability", "--set", "strech=1.2"), "did you mean 'stretch'"),
         (("run", "tensile-instability", "--set", "stretch"), "not of the form name=value"),
-        (("run", "tensile-instability", "--set", "stretch=wide"), "could not convert"),
+        (("run", "tensile-instability", "--set", "stretch=wide"), "stretch must be a number"),
         (("run", "tensile-instability", "--set", "stretch=1"), "must be positive and not 1"),
         (("run", "pull.toml", "--set", "a=1"), "edit it"),
         (("run",), "Missing argument"),

@@ -296,11 +296,30 @@ def test_particles_on_the_boundary_have_halves_and_quarters_of_cells() -> None:
     np.testing.assert_allclose(particles.area_vectors[corner], [[0.05, 0.05]], rtol=1e-12)
 
 
-def test_particles_on_the_boundary_with_ghosts_have_whole_cells() -> None:
+def test_cells_are_whole_where_ghosts_go_on_and_volumes_are_the_shapes() -> None:
     particles = Lattice(on_boundary=True, ghosts=2).particles(Box([1.0, 0.5]), 0.1)
     assert particles.count == 15 * 10
     assert particles.ghosts.sum() == 15 * 10 - 11 * 6
-    np.testing.assert_allclose(particles.volumes, 0.01, rtol=1e-14)
+    np.testing.assert_allclose(particles.cells, 0.01, rtol=1e-14)
+    np.testing.assert_allclose(particles.volumes[~particles.ghosts].sum(), 0.5, rtol=1e-14)
+
+    some = Lattice(on_boundary=True, ghosts=2, ghost_faces=("left",)).particles(
+        Box([1.0, 0.5]), 0.1
+    )
+    left, right = some.tags["left"], some.tags["right"]
+    edge = some.tags["top"] | some.tags["bottom"]
+    np.testing.assert_allclose(some.cells[left & ~edge], 0.01, rtol=1e-14)
+    np.testing.assert_allclose(some.cells[left & edge], 0.005, rtol=1e-14)
+    np.testing.assert_allclose(some.cells[right & edge], 0.0025, rtol=1e-14)
+    np.testing.assert_allclose(some.volumes[left & ~edge], 0.005, rtol=1e-14)
+    # Ghosts behind one face only, none in the corners that it does not have to itself.
+    assert some.ghosts.sum() == 2 * 6
+    assert (some.images[some.ghosts, 0] > 0.0).all()
+
+
+def test_an_unknown_ghost_face_is_refused() -> None:
+    with pytest.raises(SceneError, match="has no face 'lft'; it has left"):
+        Lattice(ghosts=2, ghost_faces=("lft",)).particles(Box([1.0, 0.5]), 0.1)
 
 
 def test_spacing_is_changed_to_what_fits() -> None:

@@ -52,9 +52,12 @@ def some_particles(count: int, dimension: int, seed: int = 0) -> Particles:
         tags={name: random.random(count) < 0.5 for name in ("left", "a/b", "100 %", "a%2Fb")},
         bodies={"bar": slice(0, half), "the wall": slice(half, count)},
         faces={
-            "top/left": Face(chosen, random.normal(size=(len(chosen), dimension))),
+            "top/left": Face(
+                chosen, random.normal(size=(len(chosen), dimension)), random.random(len(chosen))
+            ),
             "none": Face(chosen[:0], np.zeros((0, dimension))),
         },
+        cells=random.random(count),
     )
 
 
@@ -118,7 +121,7 @@ def written(path: Path, count: int, dimension: int, steps: int, seed: int = 0) -
 
 
 def assert_same_particles(a: Particles, b: Particles) -> None:
-    for name in ("positions", "volumes", "spacings", "area_vectors", "ghosts", "images"):
+    for name in ("positions", "volumes", "cells", "spacings", "area_vectors", "ghosts", "images"):
         x, y = getattr(a, name), getattr(b, name)
         assert x.dtype == y.dtype
         np.testing.assert_array_equal(x, y)
@@ -131,9 +134,10 @@ def assert_same_particles(a: Particles, b: Particles) -> None:
     for face in a.faces:
         np.testing.assert_array_equal(a.faces[face].particles, b.faces[face].particles)
         np.testing.assert_array_equal(a.faces[face].area_vectors, b.faces[face].area_vectors)
+        np.testing.assert_array_equal(a.faces[face].areas, b.faces[face].areas)
     assert {field.name for field in attrs.fields(Particles)} == {
         "positions", "volumes", "spacings", "area_vectors", "ghosts", "images", "tags", "bodies",
-        "faces",
+        "faces", "cells",
     }, "Particles has grown: a record must hold the new array too"  # fmt: skip
 
 
@@ -341,6 +345,7 @@ def test_vtk_reads_every_number(tmp_path: Path, dimension: int, count: int) -> N
             "volume_ratio": step.fields["volume_ratio"],
             "reference_position": in_three(particles.positions),
             "volume": particles.volumes,
+            "cell": particles.cells,
             "spacing": particles.spacings,
             "area_vector": in_three(particles.area_vectors),
             "ghost": particles.ghosts,

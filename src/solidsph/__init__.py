@@ -2,6 +2,7 @@
 
 from solidsph.errors import (
     BuildError,
+    ConvergenceError,
     DivergedError,
     PluginError,
     RecordError,
@@ -28,6 +29,7 @@ __all__ = [
     "BoundaryHandler",
     "BuildError",
     "Case",
+    "ConvergenceError",
     "Discretisation",
     "DivergedError",
     "Divergence",

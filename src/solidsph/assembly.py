@@ -43,6 +43,9 @@ from solidsph.simulation import Simulation
 from solidsph.smoothing import smoothing_kernel
 from solidsph.where import EVERYWHERE, select
 
+# No run of more steps ends; a scene that asks for them has its units wrong.
+_MOST_STEPS = 1e10
+
 
 class Assembly:
     """One build of one scene."""
@@ -51,6 +54,7 @@ class Assembly:
         self._scene = scene
         self._manager = manager
         self._problems = Problems()
+        self._labels: set[str] = set()  # of the accounts of boundaries and effects
         self._used: dict[registry.Entry, None] = {}  # plugins in the order of their use, each once
 
     def simulation(self) -> Simulation:
@@ -72,6 +76,8 @@ class Assembly:
 
         problems.add(compatibility.dimensions(shapes, scene.cover))
         problems.stop_if_any()
+        problems.add(compatibility.names(sets))
+        problems.stop_if_any()
         particles = self._tagged(Particles.joined(sets))
         problems.add(compatibility.apart(shapes, particles))
         bodies = [
@@ -80,20 +86,29 @@ class Assembly:
         ]
         problems.stop_if_any()
 
-        setting = _setting(particles, [problems.settled(body) for body in bodies])
+        made = [problems.settled(body) for body in bodies]
+        scheme = problems.settled(integrator)
+        step = problems.attempt(self._step_size, scheme, effects, made)
+        problems.stop_if_any()
+        steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
+        setting = Setting(
+            particles=particles,
+            masses=np.concatenate([body.masses for body in made]),
+            bodies=made,
+            step_size=scene.duration / steps,
+        )
         conditions = self._bound(handlers, effects, setting)
         motions = _in_order([c for c in conditions if isinstance(c, MotionCondition)], particles)
         stresses = [c for c in conditions if isinstance(c, StressCondition)]
         problems.add(compatibility.motions(motions, particles))
+        forces = [c for c in conditions if isinstance(c, ForceCondition)]
+        problems.add(compatibility.loads(forces, particles, problems.settled(formulation)))
         problems.add(compatibility.stresses(stresses, problems.settled(formulation)))
         initial = problems.attempt(self._initial_state, particles)
         chosen_engine = problems.settled(engine)
         internal = problems.attempt(chosen_engine.prepare, setting.bodies, stresses)
-        scheme = problems.settled(integrator)
-        step = problems.attempt(self._step_size, scheme, effects, setting.time_scale)
         problems.stop_if_any()
 
-        steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
         return Simulation(
             scene=scene,
             setting=setting,
@@ -102,14 +117,14 @@ class Assembly:
                 masses=setting.masses,
                 internal=problems.settled(internal),
                 motions=motions,
-                loads=[c for c in conditions if isinstance(c, ForceCondition)],
+                loads=forces,
             ),
             conditions=tuple(conditions),
             effects=effects,
             integrator=scheme,
             engine=chosen_engine,
             initial=problems.settled(initial),
-            step_size=scene.duration / steps,
+            step_size=setting.step_size,
             steps=steps,
             parts=tuple(self._used),
             manager=self._manager,
@@ -141,12 +156,13 @@ class Assembly:
             if part is None:
                 continue
             label = entry.label or _label(kind, part)
-            if label in made and entry.label:
+            if label in self._labels and entry.label:
                 self._problems.add(
-                    [f"two {kind} are labelled {label!r}; give each a label of its own"]
+                    [f"two accounts are labelled {label!r}; give each a label of its own"]
                 )
-            while label in made:
+            while label in self._labels:
                 label = f"{label}'"
+            self._labels.add(label)
             made[label] = part
         return made
 
@@ -205,10 +221,9 @@ class Assembly:
         for name, body in self._scene.bodies.items():
             extent = particles.bodies[name]
             for tag, where in body.tags.items():
-                if tag in particles.tags or tag == EVERYWHERE:
-                    self._problems.add(
-                        [f"body {name!r}: tag {tag!r} exists already; choose another name"]
-                    )
+                wrong = compatibility.name_problem(tag, particles.tags)
+                if wrong:
+                    self._problems.add([f"body {name!r}: tag {tag!r} {wrong}"])
                     continue
                 chosen = self._problems.attempt(select, particles, where)
                 if chosen is not None:
@@ -256,36 +271,34 @@ class Assembly:
         )
 
     def _step_size(
-        self, integrator: Integrator, effects: Mapping[str, Effect], wave_time: float
+        self, integrator: Integrator, effects: Mapping[str, Effect], bodies: Sequence[Body]
     ) -> float:
         """Time step [s] from the confined wave speed and whatever the effects add."""
         scene = self._scene
+        wave_time = min(
+            float(body.particles.spacings.min()) / body.material.wave_speed for body in bodies
+        )
         # A lattice of point masses and springs has its highest frequency at 2 c / spacing.
         frequency = sqrt(
             (2.0 / wave_time) ** 2 + sum(e.stiffness_rate() ** 2 for e in effects.values())
         )
         rate = sum(e.damping_rate() for e in effects.values())
         largest = integrator.stability_limit / (frequency + rate)
-        if scene.time_step is None:
-            return scene.time_step_factor * largest
-        if scene.time_step > largest:
+        if scene.time_step is not None and scene.time_step > largest:
             raise SceneError(
-                f"time_step = {scene.time_step:.6g} s exceeds the largest stable step, "
-                f"{largest:.6g} s by confined wave speed and spacing; take a smaller one, or state "
-                "time_step_factor instead"
+                f"time_step = {scene.time_step:.6g} s exceeds the CFL step, {largest:.6g} s by "
+                "confined wave speed and spacing; take a smaller one, or state time_step_factor "
+                "instead"
             )
-        return scene.time_step
-
-
-def _setting(particles: Particles, bodies: Sequence[Body]) -> Setting:
-    return Setting(
-        particles=particles,
-        masses=np.concatenate([body.masses for body in bodies]),
-        bodies=bodies,
-        time_scale=min(
-            float(body.particles.spacings.min()) / body.material.wave_speed for body in bodies
-        ),
-    )
+        step = scene.time_step or scene.time_step_factor * largest
+        if not (step > 0.0 and scene.duration / step <= _MOST_STEPS):
+            raise SceneError(
+                f"a duration of {scene.duration:.6g} s in steps of {step:.6g} s takes "
+                f"{scene.duration / step if step > 0.0 else float('inf'):.3g} steps, at most "
+                f"{_MOST_STEPS:.0e} are allowed; shorten the duration, or check the units of "
+                "modulus, density and spacing"
+            )
+        return step
 
 
 def _in_order(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import os
 import sys
 from importlib import import_module
 from importlib.metadata import version
@@ -11,6 +13,9 @@ import click
 from solidsph.errors import DivergedError, SolidsphError
 
 VERBS = ("run", "explain", "cases", "plugins", "check", "plot")
+
+TRACEBACK = "SOLIDSPH_TRACEBACK"
+"""Environment variable: if 1, an unexpected error shows its traceback."""
 
 FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
 
@@ -33,12 +38,15 @@ class _Verbs(click.Group):
 def cli() -> None:
     """Smoothed Particle Hydrodynamics for nonlinear solid mechanics.
 
-    Exit codes: 0 all is well, 1 the run or the check failed, 2 the input is wrong.
+    Exit codes: 0 all is well, 1 the run or the check failed, 2 the input is wrong, 130 interrupted.
     """
 
 
 def main() -> None:
     """Run the command line; every error of the user's is one message, never a traceback."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that cannot show a sign shows another
     try:
         code = cli.main(prog_name="solidsph", standalone_mode=False)
     except click.ClickException as cause:
@@ -50,4 +58,16 @@ def main() -> None:
     except SolidsphError as cause:
         print(f"error: {cause}", file=sys.stderr)
         sys.exit(FAILED if isinstance(cause, DivergedError) else WRONG_INPUT)
+    except OSError as cause:
+        print(f"error: {cause}; check the path, its permissions and the disk", file=sys.stderr)
+        sys.exit(WRONG_INPUT)
+    except Exception as cause:
+        if os.environ.get(TRACEBACK) == "1":
+            raise
+        print(
+            f"error: {type(cause).__name__}: {cause}\nThis is a fault of solidsph or of a plugin, "
+            f"not of the input; {TRACEBACK}=1 shows where it happened",
+            file=sys.stderr,
+        )
+        sys.exit(FAILED)
     sys.exit(code if isinstance(code, int) else 0)

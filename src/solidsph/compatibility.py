@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from math import ceil, isfinite, sqrt
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from solidsph.arrays import Mask
-from solidsph.interfaces.condition import MotionCondition, StressCondition
+from solidsph.interfaces.condition import (
+    ForceCondition,
+    MotionCondition,
+    StressCondition,
+    SurfaceLoad,
+)
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.shape import Shape
 from solidsph.particles import Particles
 from solidsph.scene import Scene
+from solidsph.where import AXES, EVERYWHERE
 
 # Deeper than this inside another body, in spacings, a particle is not merely touching it.
 _TOUCHING = 1e-6
@@ -29,9 +37,29 @@ def numbers(scene: Scene) -> Iterator[str]:
         if value is not None and not (isfinite(value) and value > 0.0):
             yield f"{name} must be positive and finite, got {value}; give it in {unit}"
     if scene.time_step_factor > 1.0:
-        yield f"time_step_factor must not exceed 1, got {scene.time_step_factor}; 0.5 is safe"
+        yield f"time_step_factor must not exceed 1, got {scene.time_step_factor}; 0.5 is usual"
     if scene.outputs < 1:
         yield f"outputs must be at least 1, got {scene.outputs}; the last state is always recorded"
+
+
+def names(bodies: Mapping[str, Particles]) -> Iterator[str]:
+    """No body is called like a tag of its or another's particles, or like a variable."""
+    taken = {tag for particles in bodies.values() for tag in particles.tags}
+    for name in bodies:
+        wrong = name_problem(name, taken)
+        if wrong:
+            yield f"body {name!r}: its name {wrong}"
+
+
+def name_problem(name: str, taken: Collection[str]) -> str:
+    """What is wrong with `name` for a body or a tag, with the remedy; nothing if it is right."""
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
+        return "must begin with a letter and go on in letters, digits, '-' and '_'; change it"
+    if name in taken or name == EVERYWHERE:
+        return "names a set of particles already; choose another"
+    if name in (*AXES, "t", "pi", "e"):
+        return "is a variable or constant of formulas; choose another"
+    return ""
 
 
 def dimensions(shapes: Mapping[str, Shape], cover: float) -> Iterator[str]:
@@ -95,6 +123,31 @@ def motions(held_by: Sequence[MotionCondition], particles: Particles) -> Iterato
             f"{int(adrift.sum())} ghosts ({', '.join(tags)}) have no motion; add 'symmetry' or "
             "'ghost-extension' for them, or leave them out of the discretisation"
         )
+
+
+def loads(
+    loaded: Sequence[ForceCondition], particles: Particles, formulation: Formulation
+) -> Iterator[str]:
+    """No surface is loaded through which ghosts carry the stress on."""
+    if not (formulation.divergence.uses_ghost_stress and particles.ghosts.any()):
+        return
+    beyond = particles.positions - particles.images  # along the normal, out of the body
+    for load in loaded:
+        if not isinstance(load, SurfaceLoad):
+            continue
+        areas = particles.area_vectors[load.particles]
+        near = cKDTree(particles.positions[load.particles])
+        distances, nearest = near.query(particles.positions[particles.ghosts])
+        facing = np.einsum("gi,gi->g", beyond[particles.ghosts], areas[nearest])
+        sizes = np.linalg.norm(beyond[particles.ghosts], axis=1)
+        sizes *= np.linalg.norm(areas[nearest], axis=1)
+        spacing = particles.spacings[particles.ghosts]
+        if np.any((distances < 1.5 * spacing) & (facing > 0.9 * sizes)):
+            yield (
+                f"{load.label!r} loads a surface through which ghosts carry the stress on "
+                f"(divergence {type(formulation.divergence).__name__}), so nothing would balance "
+                "it; impose the traction with 'approximate-neumann', or leave these ghosts out"
+            )
 
 
 def stresses(imposed: Sequence[StressCondition], formulation: Formulation) -> Iterator[str]:

@@ -59,30 +59,32 @@ class Dynamics:
         return carried
 
     def respond(self, time: float, positions: Array, velocities: Array) -> Response:
-        """Accelerations, and the force that each imposed part exerts.
+        """Accelerations, and the force that each imposed part exerts on every particle.
 
         Free degrees of freedom follow f = m a. Held ones follow the imposed motion, and what is
-        missing of m a is the reaction.
+        missing of m a is the reaction; ghosts have no mass, so theirs balances the force on them.
         """
         internal = self.internal.forces(time, positions - self.particles.positions)
-        applied: dict[str, Array] = {}
-        total = internal
+        applied = {c.label: np.zeros_like(positions) for c in (*self.loads, *self.motions)}
+        total = internal.copy()
         for load in self.loads:
-            force = np.zeros_like(positions)
-            force[load.particles] = load.forces(time, positions, velocities)
-            applied[load.label] = force
-            total = total + force
+            force = load.forces(time, positions, velocities)
+            applied[load.label][load.particles] += force
+            total[load.particles] += force
         for motion in self.motions:
             if isinstance(motion, ExtensionCondition):
+                before = total.copy()
                 motion.return_forces(total)
+                applied[motion.label] += total - before
         real = ~self.particles.ghosts
         accelerations = np.zeros_like(positions)
         accelerations[real] = total[real] / self.masses[real, None]
         for motion in self.motions:
             motion.impose(time, 2, accelerations)
-        for motion in self.motions:
+        if self.motions:
             missing = self.masses[:, None] * accelerations - total
-            applied[motion.label] = np.where(motion.held & real[:, None], missing, 0.0)
+        for motion in self.motions:
+            applied[motion.label] += np.where(motion.held, missing, 0.0)
         return Response(accelerations, applied)
 
     def observe(self, state: State) -> Observation:

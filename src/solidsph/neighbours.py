@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
@@ -44,7 +47,7 @@ class Pairs:
         # Every row holds its self pair, so no segment is empty and reduceat is safe.
         return np.add.reduceat(values, self.starts[:-1], axis=0)
 
-    def spread(self, values: Array) -> Array:
+    def spread(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values of the particles listed (n, ...), given to each of their pairs, (m, ...)."""
         return np.repeat(values, np.diff(self.starts), axis=0)
 

@@ -21,6 +21,11 @@ class Face:
 
     particles: Indices  # (k,)
     area_vectors: Array  # (k, d) outward [m^(d-1)]
+    areas: Array = attrs.field()  # (k,) more than their length where the face is curved [m^(d-1)]
+
+    @areas.default
+    def _lengths(self) -> Array:
+        return np.asarray(np.linalg.norm(self.area_vectors, axis=1), dtype=np.float64)
 
 
 @attrs.frozen(eq=False)
@@ -32,7 +37,7 @@ class Particles:
     """
 
     positions: Array  # (n, d) reference positions X [m]
-    volumes: Array  # (n,) weights of the sums over neighbours [m^d]
+    volumes: Array  # (n,) share of the body, by which masses and energies count [m^d]
     spacings: Array  # (n,) particle spacing of the body that a particle belongs to [m]
     area_vectors: Array  # (n, d) outward surface area that a particle owns, 0 inside [m^(d-1)]
     ghosts: Mask  # (n,)
@@ -40,6 +45,12 @@ class Particles:
     tags: Mapping[str, Mask] = attrs.field(factory=dict)  # named sets of particles, each (n,)
     bodies: Mapping[str, slice] = attrs.field(factory=dict)  # each body is one run of particles
     faces: Mapping[str, Face] = attrs.field(factory=dict)  # a particle at an edge is on several
+    cells: Array = attrs.field()  # (n,) weights in sums over neighbours [m^d]
+
+    @cells.default
+    def _shares(self) -> Array:
+        # The two differ where ghosts take up the sums beyond the middle of a cell.
+        return self.volumes
 
     @property
     def count(self) -> int:
@@ -70,7 +81,7 @@ class Particles:
                 tags.setdefault(tag, np.zeros(total, dtype=np.bool_))[slices[name]] |= mask
             for face, own_face in part.faces.items():
                 moved = own_face.particles + slices[name].start
-                faces.setdefault(face, []).append(Face(moved, own_face.area_vectors))
+                faces.setdefault(face, []).append(attrs.evolve(own_face, particles=moved))
         return cls(
             positions=np.concatenate([part.positions for part in parts]),
             volumes=np.concatenate([part.volumes for part in parts]),
@@ -84,9 +95,11 @@ class Particles:
                 face: Face(
                     np.concatenate([one.particles for one in several]),
                     np.concatenate([one.area_vectors for one in several]),
+                    np.concatenate([one.areas for one in several]),
                 )
                 for face, several in faces.items()
             },
+            cells=np.concatenate([part.cells for part in parts]),
         )
 
     def tagged(self, name: str) -> Indices:

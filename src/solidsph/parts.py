@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -56,7 +57,7 @@ def construct(kind: str, wanted: object) -> Any:
     for key, value in parameters.items():
         nested = fields[key].metadata.get("part")
         if nested is not None:
-            parameters[key] = _nested(nested, value)
+            parameters[key] = _nested(nested, value, fields[key].type, f"{label}: {key}")
     try:
         return cls(**parameters)
     except SolidsphError:
@@ -100,8 +101,11 @@ def _fields(cls: type[Any], label: str) -> dict[str, attrs.Attribute[Any]]:
     return {field.alias or field.name: field for field in attrs.fields(cls) if field.init}
 
 
-def _nested(kind: str, value: object) -> Any:
+def _nested(kind: str, value: object, several: object, label: str) -> Any:
     if isinstance(value, (list, tuple)):
+        # Annotations are text here; a field of several parts is a tuple or a sequence of them.
+        if not re.search(r"tuple|Sequence", str(several)):
+            raise SceneError(f"{label} must be one {registry.singular(kind)}, got {value!r}")
         return tuple(construct(kind, one) for one in value)
     return construct(kind, value)
 

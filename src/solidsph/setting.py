@@ -20,7 +20,7 @@ class Setting:
     particles: Particles
     masses: Array  # (n,) [kg], 0 for ghosts
     bodies: Sequence[Body]
-    time_scale: float  # spacing over wave speed, the shortest time that is resolved [s]
+    step_size: float  # time step of the run [s]
 
     def select(self, where: Where) -> Indices:
         """Indices of the particles at `where`.
@@ -38,4 +38,4 @@ class Setting:
 def _smoothing(body: Body) -> csr_array:
     pairs = body.pairs()
     weights = body.smoothing.value(pairs.distances)
-    return pairs.matrix(weights * body.particles.volumes[pairs.columns])
+    return pairs.matrix(weights * body.particles.cells[pairs.columns])

@@ -120,10 +120,38 @@ def check_profile(kernel: Kernel) -> None:
     if not np.any(w > 0.0):
         raise PluginError(f"kernel {name}: profile is zero everywhere; it must have a mass")
     lost = [kernel.lost_mass(d) for d in (1, 2, 3)]
+    if not all(0.0 <= loss < 1.0 for loss in lost):
+        raise PluginError(
+            f"kernel {name}: lost_mass must be in [0, 1) in every dimension, got {lost}"
+        )
+    if not all(0.0 < knot < 1.0 for knot in kernel.knots):
+        raise PluginError(f"kernel {name}: knots must lie between 0 and 1, got {kernel.knots}")
+    _check_slope(kernel, q, w)
     if edge > _EDGE_TOLERANCE * w.max() and min(lost) <= 0.0:
         raise PluginError(
             f"kernel {name}: profile is {edge:.6g} at q = 1, where it must be zero; let it vanish "
             "there, or declare the mass that the cut loses in `lost_mass`"
+        )
+
+
+def _check_slope(kernel: Kernel, q: Array, w: Array) -> None:
+    """The slope must be that of the profile: its trapezoidal integral is the profile's change."""
+    try:
+        with np.errstate(all="ignore"):
+            slope = profile_slope(kernel, q)
+    except Exception as cause:  # a plugin's formula may fail in any way
+        raise PluginError(
+            f"kernel {type(kernel).__name__}: its slope failed on an array: "
+            f"{type(cause).__name__}: {cause}; use NumPy functions"
+        ) from cause
+    change = 0.5 * (slope[1:] + slope[:-1]) * np.diff(q)
+    wrong = np.abs(change - np.diff(w))
+    # Steps of 1/2000: the rule's own error is some 1e-10 of a smooth profile, 1e-6 at a kink.
+    if not np.all(wrong < 1e-5 * w.max()):
+        worst = q[int(np.argmax(np.where(np.isfinite(wrong), wrong, np.inf)))]
+        raise PluginError(
+            f"kernel {type(kernel).__name__}: slope is not the derivative of profile near q = "
+            f"{worst:.4g}; correct it, or leave it out if profile is a formula without abs"
         )
 
 

@@ -46,6 +46,8 @@ def _mask(particles: Particles, where: Where) -> Mask:
                 f"for each of {particles.count} particles"
             )
         return mask
+    if not isinstance(where, str):
+        raise SceneError(f"where = {where!r} must be text: a tag or a condition, such as 'left'")
     if where == EVERYWHERE:
         return ~particles.ghosts
     if where in particles.tags:

@@ -18,7 +18,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from solidsph.arrays import Array, Indices, Mask
 from solidsph.errors import SceneError
-from solidsph.interfaces.condition import MotionCondition, Observation
+from solidsph.interfaces.condition import ExtensionCondition, Observation
 from solidsph.motion import Component, VectorField
 from solidsph.setting import Setting
 from solidsph.where import Where
@@ -40,6 +40,10 @@ class Solve(ABC):
             target: (b,) what the approximation must be at the boundary.
         """
 
+    @abstractmethod
+    def transposed(self, forces: Array) -> tuple[Array, Array]:
+        """Forces (b + g,) on the values, carried back to `smooth` and to `interior`."""
+
 
 class Extension(ABC):
     """A smooth extension of the field to the ghosts, which the solve starts from."""
@@ -47,6 +51,10 @@ class Extension(ABC):
     @abstractmethod
     def values(self, axis: int, time: float, derivative: int, column: Array) -> Array:
         """Values at the ghosts (g,) from those of all particles (n,)."""
+
+    @abstractmethod
+    def transposed(self, forces: Array) -> Array | float:
+        """Forces (g,) on the ghosts, carried back to the particles that they follow, (n,)."""
 
 
 @final
@@ -60,6 +68,10 @@ class ReflectedExtension(Extension):
         reflection: Array = self.matrix @ column
         return reflection
 
+    def transposed(self, forces: Array) -> Array | float:
+        carried: Array = self.matrix.T @ forces
+        return carried
+
 
 @final
 @attrs.frozen(eq=False)
@@ -68,25 +80,33 @@ class KnownExtension(Extension):
 
     positions: Array  # (g, d)
     field: VectorField
-    time_scale: float
+    step_size: float
 
     def values(self, axis: int, time: float, derivative: int, column: Array) -> Array:
-        return self.field.derivative(axis, self.positions, time, derivative, self.time_scale)
+        return self.field.derivative(axis, self.positions, time, derivative, self.step_size)
+
+    def transposed(self, forces: Array) -> Array | float:
+        return 0.0
 
 
 @final
 @attrs.frozen(eq=False)
-class SmoothedValue(MotionCondition):
-    """<u> = field(X, t) at the boundary particles."""
+class SmoothedValue(ExtensionCondition):
+    """<u> = field(X, t) at the boundary particles.
+
+    Components that the field does not have are reflected at the ghosts, and left free at the
+    boundary.
+    """
 
     label: str
     positions: Array  # (n, d) reference positions of all particles
     boundary: Indices  # (b,)
     ghosts: Indices  # (g,)
     field: VectorField
-    time_scale: float
+    step_size: float
     smoothing: csr_array  # (b + g, n) rows of W
     extension: Extension  # smooth, of boundary values to ghosts
+    reflection: csr_array  # (g, n), for components that are not imposed
     solve: Solve
 
     @property
@@ -98,12 +118,18 @@ class SmoothedValue(MotionCondition):
         held = np.zeros(self.positions.shape, dtype=np.bool_)
         for axis in self.field.components:
             held[self._chosen, axis] = True
+        held[self.ghosts] = True
         return held
 
+    def _free_axes(self) -> list[int]:
+        return [k for k in range(self.positions.shape[1]) if k not in self.field.components]
+
     def impose(self, time: float, derivative: int, values: Array) -> None:
+        for axis in self._free_axes():
+            values[self.ghosts, axis] = self.reflection @ values[:, axis]
         for axis in self.field.components:
             target = self.field.derivative(
-                axis, self.positions[self.boundary], time, derivative, self.time_scale
+                axis, self.positions[self.boundary], time, derivative, self.step_size
             )
             column = values[:, axis]
             column[self.boundary] = target
@@ -112,6 +138,22 @@ class SmoothedValue(MotionCondition):
             column[self._chosen] = 0.0
             interior = self.smoothing @ column
             column[self._chosen] = self.solve.values(smooth, interior, target)
+
+    def return_forces(self, forces: Array) -> None:
+        for axis in self._free_axes():
+            forces[:, axis] += self.reflection.T @ forces[self.ghosts, axis]
+        boundary_count = len(self.boundary)
+        for axis in self.field.components:
+            column = forces[:, axis]
+            # Only what acts on ghosts goes back; boundary particles have a reaction of their own.
+            on_ghosts = np.zeros(len(self._chosen))
+            on_ghosts[boundary_count:] = column[self.ghosts]
+            smooth, interior = self.solve.transposed(on_ghosts)
+            carried = self.smoothing.T @ interior
+            carried += self.extension.transposed(smooth[boundary_count:])
+            carried[self._chosen] = 0.0  # what falls on imposed values is held
+            column += carried
+        forces[self.ghosts] = 0.0
 
     def miss(self, observation: Observation) -> float:
         """Largest difference between the approximation at the boundary and what was asked [m]."""
@@ -161,9 +203,10 @@ def smoothed_value(
         boundary=boundary,
         ghosts=own_ghosts,
         field=field,
-        time_scale=setting.time_scale,
+        step_size=setting.step_size,
         smoothing=smoothing,
         extension=_extension(setting, own_ghosts, extension, field, handler),
+        reflection=reflected(setting.particles, own_ghosts),
         solve=solve(csr_array(smoothing[:, chosen]), len(boundary)),
     )
 
@@ -184,7 +227,14 @@ def _extension(
             f"{handler}: extension lacks component {COMPONENTS[min(missing)]!r}; give every "
             "component that displacement has"
         )
-    return KnownExtension(setting.particles.positions[ghosts], beyond, setting.time_scale)
+    return KnownExtension(setting.particles.positions[ghosts], beyond, setting.step_size)
+
+
+def solved_transposed(factors: SuperLU, right: Array) -> Array:
+    """The solution x of A^T x = right, from the factors of A."""
+    # The stubs of SciPy do not know of `trans`.
+    solution: Array = factors.solve(right, trans="T")  # type: ignore[call-overload]
+    return solution
 
 
 def factorised(matrix: csr_array, handler: str) -> SuperLU:

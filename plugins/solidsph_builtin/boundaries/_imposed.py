@@ -11,7 +11,9 @@ import numpy as np
 from solidsph.arrays import Array, Indices, Mask
 from solidsph.interfaces.condition import MotionCondition, Observation
 from solidsph.motion import VectorField
-from solidsph_builtin.boundaries._reports import reaction
+from solidsph.particles import Face
+from solidsph.setting import Setting
+from solidsph_builtin.boundaries._reports import reaction, stress_reaction
 
 
 @final
@@ -23,7 +25,8 @@ class ImposedMotion(MotionCondition):
     indices: Indices  # (k,)
     positions: Array  # (n, d) reference positions of all particles
     field: VectorField
-    time_scale: float  # over which the field may vary [s]
+    step_size: float  # of the run [s]
+    stressed_face: Face | None  # of these particles, where the reaction must be read off the stress
 
     @property
     def held(self) -> Mask:
@@ -36,8 +39,29 @@ class ImposedMotion(MotionCondition):
         X = self.positions[self.indices]
         for axis in self.field.components:
             values[self.indices, axis] = self.field.derivative(
-                axis, X, time, derivative, self.time_scale
+                axis, X, time, derivative, self.step_size
             )
 
     def report(self, observation: Observation) -> Mapping[str, float]:
+        if self.stressed_face is not None:
+            return stress_reaction(observation, self.label, self.stressed_face)
         return reaction(observation, self.label)
+
+
+def imposed_motion(
+    setting: Setting, label: str, indices: Indices, field: VectorField
+) -> ImposedMotion:
+    """Impose `field` on the particles `indices` of a setting."""
+    particles = setting.particles
+    by_stress = any(
+        body.formulation.divergence.uses_ghost_stress and body.particles.ghosts.any()
+        for body in setting.bodies
+    )
+    return ImposedMotion(
+        label=label,
+        indices=indices,
+        positions=particles.positions,
+        field=field,
+        step_size=setting.step_size,
+        stressed_face=Face(indices, particles.area_vectors[indices]) if by_stress else None,
+    )

@@ -43,7 +43,8 @@ class ApproximateNeumann(BoundaryHandler):
         particles = setting.particles
         field = VectorField.of(self.traction, "approximate-neumann: traction")
         field.check_dimension(particles.dimension, "approximate-neumann")
-        boundary, area_vectors = surface_at(setting, self.where, "approximate-neumann")
+        face = surface_at(setting, self.where, "approximate-neumann")
+        boundary, area_vectors = face.particles, face.area_vectors
         ghosts = chosen_ghosts(setting, self.ghosts, "approximate-neumann")
         normals = area_vectors / np.linalg.norm(area_vectors, axis=1)[:, None]
         smoothing = csr_array(setting.smoothing_matrix()[boundary])

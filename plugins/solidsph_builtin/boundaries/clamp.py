@@ -13,7 +13,7 @@ from solidsph.interfaces.condition import Condition
 from solidsph.motion import VectorField
 from solidsph.setting import Setting
 from solidsph.where import Where
-from solidsph_builtin.boundaries._imposed import ImposedMotion
+from solidsph_builtin.boundaries._imposed import imposed_motion
 from solidsph_builtin.boundaries._reports import COMPONENTS
 
 
@@ -27,16 +27,14 @@ class Clamp(BoundaryHandler):
 
     def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
         names = COMPONENTS[: setting.particles.dimension]
-        axes = names if self.axes is None else tuple(self.axes)
+        wanted = names if self.axes is None else self.axes
+        if isinstance(wanted, str) or not isinstance(wanted, Sequence) or not wanted:
+            raise SceneError(
+                f'clamp: axes must be a list such as ["x"], got {wanted!r}; leave it out for all'
+            )
+        axes = tuple(wanted)
         for name in axes:
             if name not in names:
                 raise SceneError(f"clamp: unknown axis {name!r}; this scene has {', '.join(names)}")
-        return [
-            ImposedMotion(
-                label=label,
-                indices=setting.select(self.where),
-                positions=setting.particles.positions,
-                field=VectorField({names.index(name): 0.0 for name in axes}),
-                time_scale=setting.time_scale,
-            )
-        ]
+        field = VectorField({names.index(name): 0.0 for name in axes})
+        return [imposed_motion(setting, label, setting.select(self.where), field)]

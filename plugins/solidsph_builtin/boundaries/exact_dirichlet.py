@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import final
 
 import attrs
+import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU
 
@@ -68,3 +69,9 @@ class _MinimumNorm(Solve):
         for _ in range(2):
             values = values + self.rows.T @ self.normal.solve(wanted - self.rows @ values)
         return values
+
+    def transposed(self, forces: Array) -> tuple[Array, Array]:
+        multipliers = self.normal.solve(self.rows @ forces)
+        interior = np.zeros_like(forces)
+        interior[: len(multipliers)] = -multipliers
+        return forces - self.rows.T @ multipliers, interior

@@ -15,7 +15,12 @@ from solidsph.interfaces.condition import Condition
 from solidsph.motion import Component
 from solidsph.setting import Setting
 from solidsph.where import Where
-from solidsph_builtin.boundaries._dirichlet import Solve, factorised, smoothed_value
+from solidsph_builtin.boundaries._dirichlet import (
+    Solve,
+    factorised,
+    smoothed_value,
+    solved_transposed,
+)
 
 
 @final
@@ -61,3 +66,7 @@ class _FullSolve(Solve):
 
     def values(self, smooth: Array, interior: Array, target: Array) -> Array:
         return self.square.solve(smooth - interior)
+
+    def transposed(self, forces: Array) -> tuple[Array, Array]:
+        carried = solved_transposed(self.square, forces)
+        return carried, -carried

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import final
 
 import attrs
+import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU
 
@@ -15,7 +16,12 @@ from solidsph.interfaces.condition import Condition
 from solidsph.motion import Component
 from solidsph.setting import Setting
 from solidsph.where import Where
-from solidsph_builtin.boundaries._dirichlet import Solve, factorised, smoothed_value
+from solidsph_builtin.boundaries._dirichlet import (
+    Solve,
+    factorised,
+    smoothed_value,
+    solved_transposed,
+)
 
 
 @final
@@ -60,3 +66,6 @@ class _LiteralSolve(Solve):
 
     def values(self, smooth: Array, interior: Array, target: Array) -> Array:
         return self.square.solve(smooth)
+
+    def transposed(self, forces: Array) -> tuple[Array, Array]:
+        return solved_transposed(self.square, forces), np.zeros_like(forces)

@@ -12,7 +12,7 @@ from solidsph.interfaces.condition import Condition
 from solidsph.motion import Component, VectorField
 from solidsph.setting import Setting
 from solidsph.where import Where
-from solidsph_builtin.boundaries._imposed import ImposedMotion
+from solidsph_builtin.boundaries._imposed import imposed_motion
 
 
 @final
@@ -33,12 +33,4 @@ class PrescribedMotion(BoundaryHandler):
         indices = setting.select(self.where)
         for axis in field.components:  # a formula out of its domain shows now, not in mid-run
             field.values(axis, setting.particles.positions[indices], 0.0)
-        return [
-            ImposedMotion(
-                label=label,
-                indices=indices,
-                positions=setting.particles.positions,
-                field=field,
-                time_scale=setting.time_scale,
-            )
-        ]
+        return [imposed_motion(setting, label, indices, field)]

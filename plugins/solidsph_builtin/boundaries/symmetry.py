@@ -19,10 +19,11 @@ from solidsph.interfaces.condition import (
     StressCondition,
 )
 from solidsph.motion import VectorField
+from solidsph.parameters import number
 from solidsph.setting import Setting
 from solidsph_builtin.boundaries._images import interpolation
-from solidsph_builtin.boundaries._imposed import ImposedMotion
-from solidsph_builtin.boundaries._reports import COMPONENTS
+from solidsph_builtin.boundaries._imposed import imposed_motion
+from solidsph_builtin.boundaries._reports import COMPONENTS, reaction
 
 # A particle this close to the plane, in spacings, lies on it.
 _ON_PLANE = 1e-6
@@ -39,7 +40,7 @@ class Symmetry(BoundaryHandler):
     """
 
     axis: str
-    at: float = attrs.field(default=0.0, converter=float)  # [m]
+    at: float = number(default=0.0)  # [m]
 
     def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
         particles = setting.particles
@@ -61,20 +62,12 @@ class Symmetry(BoundaryHandler):
             )
         conditions: list[Condition] = []
         if len(on_plane):
-            conditions.append(
-                ImposedMotion(
-                    label=label,
-                    indices=on_plane,
-                    positions=particles.positions,
-                    field=VectorField({normal: 0.0}),
-                    time_scale=setting.time_scale,
-                )
-            )
+            conditions.append(imposed_motion(setting, label, on_plane, VectorField({normal: 0.0})))
         if len(beyond):
             X, images = particles.positions[beyond], particles.images[beyond]
             conditions.append(
                 Mirror(
-                    label=f"{label} (ghosts)",
+                    label=label,
                     ghosts=beyond,
                     shape=particles.positions.shape,
                     images=interpolation(particles, images),
@@ -130,4 +123,4 @@ class Mirror(ExtensionCondition, StressCondition):
                 component[self.ghosts] = sign * (self.images @ component)
 
     def report(self, observation: Observation) -> Mapping[str, float]:
-        return {}
+        return reaction(observation, self.label)

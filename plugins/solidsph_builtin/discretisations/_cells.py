@@ -31,7 +31,6 @@ def lattice_particles(
     *,
     ghosts: int,
     ghost_faces: Sequence[str] | None,
-    whole_cells: bool,
 ) -> Particles:
     """One particle at every lattice point in the shape, then the ghosts around them.
 
@@ -42,7 +41,6 @@ def lattice_particles(
         spacing: what was asked for [m]; what the particles have is that of the grid.
         ghosts: layers of ghosts.
         ghost_faces: faces behind which there are ghosts; None for all.
-        whole_cells: every volume that of a cell, whatever part of it lies in the shape.
 
     Raises:
         SceneError: no lattice point lies in the shape.
@@ -60,12 +58,10 @@ def lattice_particles(
     positions = grid.positions(numbers)
     tree = cKDTree(positions)
 
-    volumes = np.full(numbers.size, grid.cell_volume)
-    if not whole_cells:
-        volumes *= shares[numbers]
-        orphans = np.flatnonzero(~real & (np.abs(distance) < grid.half_diagonal))
-        volumes += _adopted(shape, grid, orphans, tree)
-        volumes = _fitted(volumes, grid.cell_volume, shape.volume())
+    volumes = grid.cell_volume * shares[numbers]
+    orphans = np.flatnonzero(~real & (np.abs(distance) < grid.half_diagonal))
+    volumes += _adopted(shape, grid, orphans, tree)
+    volumes = _fitted(volumes, grid.cell_volume, shape.volume())
 
     surface = sampled(discretisation, shape, spacing)
     owners = _owners(grid, real, tree, surface.points)
@@ -76,6 +72,11 @@ def lattice_particles(
         check_faces(discretisation, ghost_faces, surface.faces)
     images, samples, kept = mirrored(shape, surface, ghost_positions, tolerance, ghost_faces)
     ghost_positions, images, samples = ghost_positions[kept], images[kept], samples[kept]
+    cells = volumes
+    if len(ghost_positions):
+        occupied = real.copy()
+        occupied[ghost_numbers[kept]] = True
+        cells = np.maximum(volumes, grid.cell_volume * grid.completed(occupied)[numbers])
     count = numbers.size + len(ghost_positions)
     own = faces(surface, owners)
     is_ghost = np.arange(count) >= numbers.size
@@ -88,6 +89,8 @@ def lattice_particles(
         images=np.concatenate([positions, images]),
         tags=tags(own, is_ghost, [surface.faces[sample] for sample in samples]),
         faces=own,
+        # A ghost weighs in sums what the particle does whose image it is.
+        cells=np.concatenate([cells, cells[tree.query(images)[1]]]) if len(images) else cells,
     )
 
 

@@ -74,6 +74,18 @@ class Grid:
             grown = np.moveaxis(wider, 0, axis)
         return grown.ravel()
 
+    def completed(self, occupied: Mask) -> Array:
+        """What part of each cell has `occupied` points on both sides along every axis, (size,)."""
+        filled = occupied.reshape(self.counts)
+        part = np.ones(self.counts)
+        for axis in range(filled.ndim):
+            along, own = np.moveaxis(filled, axis, 0), np.moveaxis(part, axis, 0)
+            own[1:] *= np.where(along[:-1], 1.0, 0.5)
+            own[:-1] *= np.where(along[1:], 1.0, 0.5)
+            own[0] *= 0.5
+            own[-1] *= 0.5
+        return part.ravel()
+
 
 def grid_over(
     discretisation: Discretisation,

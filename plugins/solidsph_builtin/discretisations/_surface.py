@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -51,7 +52,9 @@ def faces(surface: Surface, owners: Assignment) -> dict[str, Face]:
         particles, which = np.unique(owners.particles[own], return_inverse=True)
         area_vectors = np.zeros((particles.size, surface.points.shape[1]))
         np.add.at(area_vectors, which, areas[own])
-        found[name] = Face(particles, area_vectors)
+        sizes = np.zeros(particles.size)
+        np.add.at(sizes, which, np.linalg.norm(areas[own], axis=1))
+        found[name] = Face(particles, area_vectors, sizes)
 
     vectors = np.concatenate([face.area_vectors for face in found.values()])
     sizes = np.linalg.norm(vectors, axis=1)
@@ -67,7 +70,7 @@ def faces(surface: Surface, owners: Assignment) -> dict[str, Face]:
         np.cumsum([face.particles.size for face in found.values()])[:-1],
     )
     return {
-        name: Face(face.particles, area_vectors)
+        name: attrs.evolve(face, area_vectors=area_vectors)
         for (name, face), area_vectors in zip(found.items(), closed, strict=True)
     }
 

@@ -61,7 +61,6 @@ class JitteredLattice(Discretisation):
             spacing,
             ghosts=self.ghosts,
             ghost_faces=self.ghost_faces,
-            whole_cells=False,
         )
         real = np.flatnonzero(~regular.ghosts)
         noise = np.random.default_rng(self.seed).uniform(-1.0, 1.0, (real.size, shape.dimension))

@@ -29,11 +29,7 @@ class Lattice(Discretisation):
 
     `ghosts` adds so many layers of lattice points beyond the surface, in holes as well, or only
     behind some faces: with `ghost_faces = ["left", "bottom"]` at those two and their corner. Each
-    has the volume of a whole cell, and as image its mirror image in the surface. With ghosts *and*
-    `on_boundary` every particle has a whole cell: sums over neighbours go on beyond the surface
-    and need their full weights on it. The volumes then exceed the shape's by the outer halves of
-    the cells on the surface.
-
+    has XX
     Tags: each face of the shape, `surface`, `interior` and `ghosts`; with ghosts also each face
     with `-ghosts` appended, for those nearest to it.
 
@@ -59,7 +55,6 @@ class Lattice(Discretisation):
         """
         spacing = check_spacing(self, spacing)
         grid = grid_over(self, shape, spacing, on_boundary=self.on_boundary, beyond=self.ghosts)
-        whole = self.on_boundary and self.ghosts > 0
         return lattice_particles(
             self,
             shape,
@@ -67,5 +62,4 @@ class Lattice(Discretisation):
             spacing,
             ghosts=self.ghosts,
             ghost_faces=self.ghost_faces,
-            whole_cells=whole,
         )

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
 from typing import final
 
 import attrs
 
 from solidsph.arrays import Array, Indices
-from solidsph.errors import SceneError
 from solidsph.interfaces.condition import ForceCondition, Observation
 from solidsph.interfaces.effect import Effect
+from solidsph.parameters import check_positive, number
 from solidsph.setting import Setting
 from solidsph.where import Where
 
@@ -21,15 +20,11 @@ from solidsph.where import Where
 class MassDamping(Effect):
     """f = -c m v: every free vibration decays as exp(-c t / 2). Rayleigh's first term."""
 
-    rate: float = attrs.field(converter=float)  # c [1/s]
+    rate: float = number()  # c [1/s]
     where: Where = "all"
 
     def __attrs_post_init__(self) -> None:
-        if not (isfinite(self.rate) and self.rate > 0.0):
-            raise SceneError(
-                f"mass-damping: rate must be positive and finite, got {self.rate}; leave the "
-                "effect out to have none"
-            )
+        check_positive("mass-damping", "rate", self.rate, "1/s, or leave the effect out")
 
     def bind(self, setting: Setting, label: str) -> ForceCondition:
         indices = setting.select(self.where)

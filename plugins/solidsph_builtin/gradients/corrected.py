@@ -33,7 +33,7 @@ class Corrected(Gradient):
         moments = pairs.row_sums(pairs.offsets[:, :, None] * plain[:, None, :])
         _check_moments(moments, pairs)
         corrections = np.linalg.inv(moments).transpose(0, 2, 1)
-        corrected = np.einsum("mij,mj->mi", pairs.spread(corrections), plain)
+        corrected: Array = np.einsum("mij,mj->mi", pairs.spread(corrections), plain)
         return differences(pairs, corrected)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from solidsph.arrays import Scalar
 from solidsph.errors import SceneError
 from solidsph.interfaces.kernel import Kernel
+from solidsph.parameters import number
 
 
 @final
@@ -22,7 +23,7 @@ class Gaussian(Kernel):
     2.2e-5, 1.2e-4 and 4.4e-4 in 1, 2 and 3 dimensions at the default cut.
     """
 
-    cut: float = attrs.field(default=3.0, converter=float)  # k [-]
+    cut: float = number(default=3.0)  # k [-]
 
     def __attrs_post_init__(self) -> None:
         if not 1.0 <= self.cut <= 6.0:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from math import isfinite
-
 from solidsph.errors import SceneError
+from solidsph.parameters import check_positive
 
 
 def checked_lame(
@@ -19,11 +18,7 @@ def checked_lame(
         ("youngs_modulus", youngs_modulus, "Pa"),
         ("density", density, "kg/m^3"),
     ):
-        if not (isfinite(value) and value > 0.0):
-            raise SceneError(
-                f"material {material!r}: {name} must be positive and finite, got {value}; "
-                f"give it in {unit}"
-            )
+        check_positive(f"material {material!r}", name, value, unit)
     if not -1.0 < poissons_ratio < 0.5:
         raise SceneError(
             f"material {material!r}: poissons_ratio must lie between -1 and 0.5, both excluded, "

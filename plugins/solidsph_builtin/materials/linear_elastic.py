@@ -8,6 +8,7 @@ import attrs
 
 from solidsph.arrays import Scalar, Tensor
 from solidsph.interfaces.material import Material
+from solidsph.parameters import number
 from solidsph.tensors import add, contraction, identity, scale, small_strain, trace, transpose
 from solidsph_builtin.materials._lame import checked_lame
 
@@ -20,9 +21,9 @@ class LinearElastic(Material):
     Hooke's law. A rigid rotation strains it, so it says that it is not objective.
     """
 
-    youngs_modulus: float = attrs.field(converter=float)  # E [Pa]
-    poissons_ratio: float = attrs.field(converter=float)  # nu [-]
-    density: float = attrs.field(converter=float)  # rho_0 [kg/m^3]
+    youngs_modulus: float = number()  # E [Pa]
+    poissons_ratio: float = number()  # nu [-]
+    density: float = number()  # rho_0 [kg/m^3]
 
     objective: ClassVar[bool] = False
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from solidsph.arrays import Scalar, Tensor
 from solidsph.interfaces.material import Material
+from solidsph.parameters import number
 from solidsph.tensors import (
     add,
     contraction,
@@ -29,9 +30,9 @@ class NeoHookean(Material):
     Ismail & Reddy, eq. 15, where F C^-1 = F^-T; with the stretches across the plane equal to 1.
     """
 
-    youngs_modulus: float = attrs.field(converter=float)  # E [Pa]
-    poissons_ratio: float = attrs.field(converter=float)  # nu [-]
-    density: float = attrs.field(converter=float)  # rho_0 [kg/m^3]
+    youngs_modulus: float = number()  # E [Pa]
+    poissons_ratio: float = number()  # nu [-]
+    density: float = number()  # rho_0 [kg/m^3]
 
     def __attrs_post_init__(self) -> None:
         checked_lame("neo-hookean", self.youngs_modulus, self.poissons_ratio, self.density)

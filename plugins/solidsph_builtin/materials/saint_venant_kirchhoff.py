@@ -8,6 +8,7 @@ import attrs
 
 from solidsph.arrays import Scalar, Tensor
 from solidsph.interfaces.material import Material
+from solidsph.parameters import number
 from solidsph.tensors import (
     add,
     contraction,
@@ -30,9 +31,9 @@ class SaintVenantKirchhoff(Material):
     vanishes again as J goes to 0.
     """
 
-    youngs_modulus: float = attrs.field(converter=float)  # E [Pa]
-    poissons_ratio: float = attrs.field(converter=float)  # nu [-]
-    density: float = attrs.field(converter=float)  # rho_0 [kg/m^3]
+    youngs_modulus: float = number()  # E [Pa]
+    poissons_ratio: float = number()  # nu [-]
+    density: float = number()  # rho_0 [kg/m^3]
 
     def __attrs_post_init__(self) -> None:
         checked_lame(

@@ -29,10 +29,14 @@ class Operators:
     force: csr_array  # (n, d n): from stress components along axis k to force [m^(d-1)]
 
 
-def operators(body: Body, pairs: Pairs, volumes: Array) -> Operators:
-    """The matrices X_k of the paper's eq. 10, and those of the divergence."""
+def operators(body: Body, pairs: Pairs, crowding: Array | float = 1.0) -> Operators:
+    """The matrices X_k of the paper's eq. 10, and those of the divergence.
+
+    `crowding` is how many times their reference volume the particles have now, (n,) or 1.
+    """
     kernel_gradients = body.smoothing.gradient(pairs.offsets, pairs.distances)
-    gradient = body.formulation.gradient.weights(pairs, kernel_gradients, volumes)
+    cells, volumes = body.particles.cells * crowding, body.particles.volumes * crowding
+    gradient = body.formulation.gradient.weights(pairs, kernel_gradients, cells)
     force = body.formulation.divergence.weights(pairs, gradient, volumes)
     axes = range(gradient.shape[1])
     return Operators(
@@ -67,13 +71,12 @@ class _FollowedBody:
         pairs = neighbour_pairs(positions, body.smoothing.support_radius)
         # The volume follows the crowding of particles, relative to that of the reference
         # configuration, so that the deficit at a surface cancels.
-        volumes = particles.volumes * self.reference_sums / kernel_sums(body, pairs)
-        return operators(body, pairs, volumes)
+        return operators(body, pairs, self.reference_sums / kernel_sums(body, pairs))
 
 
 def kernel_sums(body: Body, pairs: Pairs) -> Array:
-    """Sum over neighbours of V_q W_pq with reference volumes, (n,) [-]."""
-    weights = body.smoothing.value(pairs.distances) * body.particles.volumes[pairs.columns]
+    """Sum over neighbours of W_pq by reference cells, (n,) [-]."""
+    weights = body.smoothing.value(pairs.distances) * body.particles.cells[pairs.columns]
     return pairs.row_sums(weights)
 
 
@@ -165,7 +168,7 @@ class MatrixEngine(Engine):
             pairs = body.pairs()
             count += pairs.count
             if body.formulation.configuration is Configuration.REFERENCE:
-                matrices = operators(body, pairs, body.particles.volumes)
+                matrices = operators(body, pairs)
                 parts.append(_FixedBody(body, matrices))
             else:
                 parts.append(_FollowedBody(body, kernel_sums(body, pairs)))

@@ -88,3 +88,11 @@ class ForceCondition(Condition):
     @abstractmethod
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         """Forces on these particles, (k, d) [N], from positions and velocities (n, d) of all."""
+
+
+class SurfaceLoad(ForceCondition):
+    """Forces that are the weak form's natural condition of a surface.
+
+    They do not go with ghosts that continue the stress beyond that surface: the two together
+    would leave nothing to balance the load.
+    """

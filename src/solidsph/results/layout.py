@@ -58,6 +58,7 @@ def static_fields(dimension: int) -> tuple[Field, ...]:
     return (
         Field("reference_position", (d,), "m"),
         Field("volume", (), f"m^{d}" if d > 1 else "m"),
+        Field("cell", (), f"m^{d}" if d > 1 else "m"),
         Field("spacing", (), "m"),
         Field("area_vector", (d,), {1: "-", 2: "m"}.get(d, f"m^{d - 1}")),
         Field("ghost", (), "-"),  # 1 for a ghost

@@ -213,6 +213,7 @@ class Record:
         return Particles(
             positions=values["reference_position"],
             volumes=values["volume"],
+            cells=values["cell"],
             spacings=values["spacing"],
             area_vectors=values["area_vector"],
             ghosts=values["ghost"].astype(np.bool_),
@@ -316,4 +317,4 @@ def _numbered(group: Any) -> list[Any]:
 
 def _face(group: Any) -> tuple[str, Face]:
     indices = group["particles"][()].astype(np.intp)
-    return _word(group, "name"), Face(indices, group["area_vectors"][()])
+    return _word(group, "name"), Face(indices, group["area_vectors"][()], group["areas"][()])

@@ -347,6 +347,7 @@ def _static_values(particles: Particles) -> dict[str, Any]:
     return {
         "reference_position": particles.positions,
         "volume": particles.volumes,
+        "cell": particles.cells,
         "spacing": particles.spacings,
         "area_vector": particles.area_vectors,
         "ghost": particles.ghosts.astype(np.uint8),
@@ -388,6 +389,7 @@ def _write_run(
         group.attrs["name"] = _text([name]).reshape(())
         group["particles"] = np.asarray(face.particles, dtype=np.int64)
         group["area_vectors"] = face.area_vectors
+        group["areas"] = face.areas
     room = h5py.string_dtype("utf-8", OUTCOME_BYTES)
     run.create_dataset("outcome", data=RUNNING.encode(), dtype=room)
     _extendable(run, "step", np.int64)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import attrs
 import numpy as np
-from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from solidsph.arrays import Array
 
-# A pivot of the matrix scaled to a unit diagonal: below this it is rounding.
+# An eigenvalue of the matrix scaled to a unit diagonal: below this it is rounding.
 _SINGULAR = 1e-13
 
 
@@ -17,8 +17,8 @@ class SingularError(Exception):
     """The matrix has no inverse to working precision; for callers here, who know what it means."""
 
     def __init__(self, freedom: int | None) -> None:
-        self.freedom = freedom  # the row to blame, if it is known
-        super().__init__(f"no pivot in row {freedom}")
+        self.freedom = freedom  # where the motion without stiffness is largest, if it is known
+        super().__init__(f"no stiffness in row {freedom}")
 
 
 @attrs.frozen(eq=False)
@@ -27,7 +27,15 @@ class Factors:
 
     scaling: Array  # (k,)
     lu: SuperLU
-    stable: bool  # a symmetric matrix only: whether it is positive definite
+
+    @property
+    def positive(self) -> bool:
+        """Whether the matrix, which must be symmetric, is positive definite.
+
+        The signs of its pivots are those of its eigenvalues. SuperLU copies its factors to show
+        them, which takes as long as the factorisation: ask once.
+        """
+        return bool(np.all(self.lu.U.diagonal() > 0.0))
 
     def solve(self, values: Array) -> Array:
         """K^-1 times values (k,)."""
@@ -38,12 +46,11 @@ class Factors:
 def factorised(matrix: csr_array, *, symmetric: bool) -> Factors:
     """Factors of `matrix` (k, k).
 
-    A symmetric one is ordered by minimum degree and pivots on its diagonal, which fills least:
-    half the time of the general ordering for a beam, a sixth for a square. The signs of its
-    pivots are those of its eigenvalues.
+    A symmetric one is ordered by minimum degree and pivots on its diagonal: half the time of the
+    general ordering for a beam, a sixth for a square.
 
     Raises:
-        SingularError: a row or a pivot vanishes.
+        SingularError: some motion has no stiffness to working precision.
     """
     diagonal = np.abs(matrix.diagonal())
     if not np.all(np.isfinite(matrix.data)):
@@ -52,7 +59,11 @@ def factorised(matrix: csr_array, *, symmetric: bool) -> Factors:
     if empty.any():
         raise SingularError(int(np.argmax(empty)))
     scaling = 1.0 / np.sqrt(diagonal)
-    scaled = csc_array(diags_array(scaling) @ matrix @ diags_array(scaling))
+    scaled = csc_array(matrix)
+    columns = np.repeat(scaling, np.diff(scaled.indptr))
+    scaled = csc_array(
+        (scaled.data * scaling[scaled.indices] * columns, scaled.indices, scaled.indptr)
+    )
     try:
         if symmetric:
             lu = splu(
@@ -65,8 +76,10 @@ def factorised(matrix: csr_array, *, symmetric: bool) -> Factors:
             lu = splu(scaled, permc_spec="COLAMD")
     except RuntimeError:  # a pivot that is exactly zero; SuperLU does not say which
         raise SingularError(None) from None
-    pivots = lu.U.diagonal()
-    smallest = int(np.argmin(np.abs(pivots)))
-    if not np.abs(pivots[smallest]) > _SINGULAR:
-        raise SingularError(int(np.flatnonzero(lu.perm_c == smallest)[0]))
-    return Factors(scaling, lu, bool(symmetric and np.all(pivots > 0.0)))
+    # What a random force moves most, it moves along the softest eigenvector.
+    probe = np.random.default_rng(0).standard_normal(len(scaling))
+    softest = lu.solve(probe)
+    if not np.linalg.norm(softest) * _SINGULAR < np.linalg.norm(probe):
+        finite = np.isfinite(softest).all()
+        raise SingularError(int(np.argmax(np.abs(softest))) if finite else None)
+    return Factors(scaling, lu)

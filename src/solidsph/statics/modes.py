@@ -83,7 +83,7 @@ def frequencies(simulation: Simulation, count: int, state: State | None = None) 
         v0=start,
     )
     order = np.argsort(squares)
-    if not factors.stable or squares[order[0]] < -_ROUNDING * shift:
+    if not factors.positive or squares[order[0]] < -_ROUNDING * shift:
         raise _unstable()
     shapes = np.stack([own.expanded(vectors[:, k]) for k in order])
     flat = shapes.reshape(count, -1)

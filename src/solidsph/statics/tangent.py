@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import attrs
 import numpy as np
@@ -28,22 +29,57 @@ class _BodyTangent:
     constant: Operators
     stresses: csr_array | None  # (d d n, d d n) of all particles from those of real ones
 
-    def matrix(self, displacements: Array) -> csr_array:
+    def matrix(self, displacements: Array, ahead: Array) -> csr_array:
         """(d n, d n) [N/m] at displacements (n, d) of the body."""
         n, d = displacements.shape
-        gradients = [self.constant.gradient[k * n : (k + 1) * n] for k in range(d)]
-        g = np.stack([block.data for block in gradients], axis=1)
-        H = np.stack([block @ displacements for block in gradients], axis=2)
-        A = _moduli(self.body, np.eye(d) + H)
+        A = _moduli(self.body, self.deformation_gradients(displacements))
+        A += np.einsum("ij,pkl->pikjl", np.eye(d), ahead)
+        blocks = [self.constant.gradient[k * n : (k + 1) * n] for k in range(d)]
+        g = np.stack([block.data for block in blocks], axis=1)
         # Change of stress T_ik at p for a displacement of q along j, block by block (p, q).
-        pattern = gradients[0]
-        changes = np.einsum("mikjl,ml->mikj", np.repeat(A, np.diff(pattern.indptr), axis=0), g)
+        starts, columns = blocks[0].indptr, blocks[0].indices
+        changes = np.einsum("mikjl,ml->mikj", np.repeat(A, np.diff(starts), axis=0), g)
         of_displacement = bsr_array(
-            (changes.reshape(-1, d * d, d), pattern.indices, pattern.indptr),
-            shape=(d * d * n, d * n),
+            (changes.reshape(-1, d * d, d), columns, starts), shape=(d * d * n, d * n)
         )
-        stress = of_displacement if self.stresses is None else self.stresses @ of_displacement
-        return csr_array(-(self._force(n, d) @ stress))
+        return csr_array(-(self._force(n, d) @ self._extended(of_displacement)))
+
+    def forces(self, stresses: Array) -> Array:
+        """Forces (n, d) that stresses (n, d, d) at the real particles exert."""
+        n, d = stresses.shape[:2]
+        own = np.where(self.body.particles.ghosts[:, None, None], 0.0, stresses)
+        forces: Array = (self._force(n, d) @ self._extended(own.ravel())).reshape(n, d)
+        return forces
+
+    def ahead(self, displacements: Array, change: Array, placed: Array) -> Array:
+        """As in `Tangent.ahead`, for the body's own particles."""
+        n, d = displacements.shape
+        ghosts = self.body.particles.ghosts
+        if not self.body.material.objective:  # its forces are linear: nothing turns with it
+            return np.zeros((n, d, d))
+        material, one = self.body.material, np.eye(d)
+        before = np.where(ghosts[:, None, None], one, self.deformation_gradients(displacements))
+        after = np.where(ghosts[:, None, None], one, self.deformation_gradients(placed))
+        dF = self.deformation_gradients(change) - one
+        dP = particles_first(
+            material.tangent(components_first(before), components_first(dF), material.params), n
+        )
+        S = _second_piola(self.body, before)
+        predicted = S + np.linalg.solve(before, dP - dF @ S)
+        lead: Array = predicted - _second_piola(self.body, after)
+        lead[ghosts] = 0.0
+        return lead
+
+    def deformation_gradients(self, displacements: Array) -> Array:
+        """F, (n, d, d)."""
+        n, d = displacements.shape
+        along = (self.constant.gradient @ displacements).reshape(d, n, d)
+        F: Array = np.eye(d) + along.transpose(1, 2, 0)
+        return F
+
+    def _extended(self, stresses: Any) -> Any:
+        """Stresses of real particles, or their derivative, with those of ghosts that follow."""
+        return stresses if self.stresses is None else self.stresses @ stresses
 
     def _force(self, n: int, d: int) -> bsr_array:
         """Force along i at p from stress components (j, k) at q, (d n, d d n)."""
@@ -77,7 +113,7 @@ class Tangent:
             [
                 _BodyTangent(
                     body,
-                    operators(body, body.pairs(), body.particles.volumes),
+                    operators(body, body.pairs()),
                     _stress_extension(body, simulation, conditions),
                 )
                 for body in bodies
@@ -85,18 +121,49 @@ class Tangent:
             simulation.dynamics.loads,
         )
 
-    def matrix(self, displacements: Array) -> csr_array:
+    def matrix(self, displacements: Array, ahead: Array | None = None) -> csr_array:
         """K, (d n, d n) [N/m], at displacements u = x - X (n, d) of all particles.
 
-        Forces on ghosts and their displacements are among its rows and columns.
+        Forces on ghosts and their displacements are among its rows and columns. `ahead` (n, d, d)
+        is added to the second Piola-Kirchhoff stress that turns with the body.
         """
-        parts = [part.matrix(displacements[part.body.extent]) for part in self.bodies]
+        if ahead is None:
+            ahead = np.zeros((*displacements.shape, displacements.shape[1]))
+        parts = [
+            part.matrix(displacements[part.body.extent], ahead[part.body.extent])
+            for part in self.bodies
+        ]
         total = parts[0] if len(parts) == 1 else csr_array(block_diag(parts, format="csr"))
         for load in self.loads:
             if isinstance(load, Stiff):
                 own = load.stiffness(displacements)
                 total = total if own is None else csr_array(total + own)
         return total
+
+    def ahead(self, displacements: Array, change: Array, placed: Array) -> Array:
+        """How far the second Piola-Kirchhoff stress predicted by a step is ahead of the real one.
+
+        Predicted is S + dS, linear in `change` (n, d) from `displacements` (n, d); real is S at
+        `placed` (n, d). The difference, (n, d, d) [Pa], is of second order in the change.
+        """
+        return np.concatenate(
+            [
+                part.ahead(*(u[part.body.extent] for u in (displacements, change, placed)))
+                for part in self.bodies
+            ]
+        )
+
+    def forces_ahead(self, displacements: Array, ahead: Array) -> Array:
+        """Forces (n, d) [N] that a second Piola-Kirchhoff stress `ahead` (n, d, d) adds."""
+        return np.concatenate(
+            [
+                part.forces(
+                    part.deformation_gradients(displacements[part.body.extent])
+                    @ ahead[part.body.extent]
+                )
+                for part in self.bodies
+            ]
+        )
 
 
 def tangent(simulation: Simulation, displacements: Array) -> csr_array:
@@ -131,6 +198,13 @@ def _moduli(body: Body, F: Array) -> Array:
             moduli[..., j, k] = particles_first(dP, n)
     moduli[ghosts] = 0.0
     return moduli
+
+
+def _second_piola(body: Body, F: Array) -> Array:
+    """S = F^-1 P, (n, d, d) [Pa]."""
+    P = body.material.first_piola(components_first(F), body.material.params)
+    S = np.linalg.solve(F, particles_first(P, len(F)))
+    return np.asarray(S, dtype=np.float64)
 
 
 def _check_form(formulation: Formulation, d: int) -> None:

@@ -1,0 +1,33 @@
+"""Fields of parts that take numbers from a scene."""
+
+from __future__ import annotations
+
+from math import inf
+from numbers import Real
+from typing import Any
+
+import attrs
+
+from solidsph.errors import SceneError
+
+
+def _as_number(value: Any, field: attrs.Attribute[Any]) -> float:
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise ValueError(f"{field.name} must be a number, got {value!r}")
+    try:
+        return float(value)
+    except OverflowError:
+        return inf
+
+
+def number(**options: Any) -> Any:
+    """An attrs field that holds a float, and takes no text and no true or false for one."""
+    return attrs.field(converter=attrs.Converter(_as_number, takes_field=True), **options)
+
+
+def check_positive(part: str, name: str, value: float, unit: str) -> None:
+    """Raise SceneError unless `value` is positive and neither infinite nor absurdly large."""
+    if not 1e-100 < value < 1e100:
+        raise SceneError(
+            f"{part}: {name} must be positive and finite, got {value}; give it in {unit}"
+        )
