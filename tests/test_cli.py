@@ -68,6 +68,7 @@ def test_explain_runs_nothing_and_names_what_is_not_simulated(scene: Path) -> No
     assert {"kind": "kernel", "name": "modified-mollifier"}.items() <= facts["parts"][0].items()
     assert {row["effect"]: row["simulated"] for row in facts["effects"]} == {
         "body-force": False,
+        "hourglass-control": False,
         "mass-damping": False,
     }
     assert not (scene.parent / "results").exists()

@@ -280,7 +280,7 @@ class Assembly:
         )
         # A lattice of point masses and springs has its highest frequency at 2 c / spacing.
         frequency = sqrt(
-            (2.0 / wave_time) ** 2 + sum(e.stiffness_rate() ** 2 for e in effects.values())
+            (2.0 / wave_time) ** 2 + sum(e.stiffness_rate(bodies) ** 2 for e in effects.values())
         )
         rate = sum(e.damping_rate() for e in effects.values())
         largest = integrator.stability_limit / (frequency + rate)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import final
 
 import attrs
 import numpy as np
 
 from solidsph.arrays import Array, Indices
+from solidsph.body import Body
 from solidsph.interfaces.condition import ForceCondition, Observation
 from solidsph.interfaces.effect import Effect
 from solidsph.motion import Component, VectorField
@@ -44,7 +45,7 @@ class BodyForce(Effect):
     def damping_rate(self) -> float:
         return 0.0
 
-    def stiffness_rate(self) -> float:
+    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
         return 0.0
 
 

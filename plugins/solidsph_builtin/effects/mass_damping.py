@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import final
 
 import attrs
 
 from solidsph.arrays import Array, Indices
+from solidsph.body import Body
 from solidsph.interfaces.condition import ForceCondition, Observation
 from solidsph.interfaces.effect import Effect
 from solidsph.parameters import check_positive, number
@@ -37,7 +38,7 @@ class MassDamping(Effect):
     def damping_rate(self) -> float:
         return self.rate
 
-    def stiffness_rate(self) -> float:
+    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
         return 0.0
 
 

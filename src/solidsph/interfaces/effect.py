@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
+from solidsph.body import Body
 from solidsph.interfaces.condition import ForceCondition
 from solidsph.setting import Setting
 
@@ -32,5 +33,5 @@ class Effect(ABC):
         """Largest rate at which it damps velocities [1/s], for the stable step; 0 if none."""
 
     @abstractmethod
-    def stiffness_rate(self) -> float:
+    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
         """Angular frequency that its stiffness adds at most [rad/s]; 0 if none."""
