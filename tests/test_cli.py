@@ -71,6 +71,8 @@ def test_explain_runs_nothing_and_names_what_is_not_simulated(scene: Path) -> No
         "hourglass-control": False,
         "mass-damping": False,
     }
+    numbers = {row["quantity"]: row["value"] for row in facts["numbers"]}
+    assert 1.0 < numbers["critical step over it"] < 4.0
     assert not (scene.parent / "results").exists()
     assert solidsph("explain", scene.name, cwd=scene.parent).returncode == 0
 

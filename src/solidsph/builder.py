@@ -104,7 +104,7 @@ class Builder:
         time_step: float | None = None,
         **parameters: Any,
     ) -> Builder:
-        """Choose the integrator, and the step as a factor of the largest stable or in seconds."""
+        """Choose the integrator, and the step as a factor of the CFL step or in seconds."""
         self._values["integrator"] = _part(integrator, parameters)
         if time_step_factor is not None:
             self._values["time_step_factor"] = time_step_factor

@@ -31,7 +31,7 @@ def numbers(scene: Scene) -> Iterator[str]:
     for name, value, unit in (
         ("duration", scene.duration, "s"),
         ("cover", scene.cover, "particle spacings"),
-        ("time_step_factor", scene.time_step_factor, "the largest stable step"),
+        ("time_step_factor", scene.time_step_factor, "a part of the CFL step"),
         ("time_step", scene.time_step, "s"),
     ):
         if value is not None and not (isfinite(value) and value > 0.0):

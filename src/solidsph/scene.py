@@ -67,7 +67,7 @@ class Scene:
     effects: Sequence[ImposedScene] = ()
     initial: Sequence[InitialScene] = ()
     integrator: PartLike = "velocity-verlet"
-    time_step_factor: float = 0.5  # of the largest stable step
+    time_step_factor: float = 0.5  # of the CFL step
     time_step: float | None = None  # [s]; overrides the factor
     outputs: int = 200  # recorded states after the first
     engine: str = "auto"

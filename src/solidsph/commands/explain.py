@@ -12,8 +12,9 @@ from solidsph import registry
 from solidsph.commands.console import say, show_json, show_table
 from solidsph.commands.target import resolve
 from solidsph.interfaces.case import Case
-from solidsph.scene import Scene
+from solidsph.scene import BodyScene, Scene
 from solidsph.simulation import Simulation
+from solidsph.statics import critical_step
 
 _TIMED_STEPS = 5
 
@@ -64,6 +65,8 @@ def _explained(scene: Scene) -> dict[str, Any]:
     }
 
 
+_DEFAULT = "the default: the scene names no other"
+
 # Kinds of which a scene has one, and the field of the scene that holds it.
 _SINGLE = {"kernels": "kernel", "formulations": "formulation", "integrators": "integrator"}
 _INSIDE = {"gradients": "part of the formulation", "divergences": "part of the formulation"}
@@ -73,7 +76,12 @@ def _why(scene: Scene, entry: registry.Entry) -> str:
     if entry.kind in _SINGLE:
         wanted = getattr(scene, _SINGLE[entry.kind])
         if wanted == getattr(attrs.fields(Scene), _SINGLE[entry.kind]).default:
-            return "the default: the scene names no other"
+            return _DEFAULT
+    default = attrs.fields(BodyScene).discretisation.default
+    if entry.kind == "discretisations" and all(
+        body.discretisation == default for body in scene.bodies.values()
+    ):
+        return _DEFAULT
     return _INSIDE.get(entry.kind, "named by the scene")
 
 
@@ -87,6 +95,7 @@ def _numbers(simulation: Simulation) -> list[dict[str, Any]]:
     stated = scene.time_step is not None
     outputs = len(simulation.output_steps()) + 1
     d = particles.dimension
+    margin = critical_step(simulation).margin
     rows = [
         ("dimensions", d, "1 is uniaxial strain, 2 is plane strain"),
         ("particles", int((~particles.ghosts).sum()), "from shapes and spacings"),
@@ -98,7 +107,14 @@ def _numbers(simulation: Simulation) -> list[dict[str, Any]]:
             simulation.step_size,
             "as the scene states it"
             if stated
-            else f"{scene.time_step_factor:g} of the largest stable step by wave speed and spacing",
+            else f"{scene.time_step_factor:g} of the CFL step, by wave speed and spacing",
+        ),
+        (
+            "critical step over it",
+            margin,
+            "from the highest frequency of the discrete system at the start"
+            if margin >= 1.0
+            else "BELOW 1: the run will blow up; take a smaller time_step_factor",
         ),
         ("steps", simulation.steps, f"for {scene.duration:g} s"),
         ("engine", type(simulation.engine).__name__, f'engine = "{scene.engine}"'),
