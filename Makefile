@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 EXAMPLE := plugins/examples/solidsph-wendland
 
-.PHONY: demo test validate lint format clean
+.PHONY: demo test validate bench lint format clean
 
 demo: $(STAMP)  ## the paper's headline experiment: table, record and picture
 	$(BIN)/solidsph run tensile-instability
@@ -15,6 +15,10 @@ test: $(STAMP) lint  ## lint, types and every test but the slow physics
 
 validate: $(STAMP)  ## the slow physics
 	$(BIN)/pytest -n 2 -m validation
+
+bench: $(STAMP)  ## throughput against a plain C loop, and by size up to a million particles
+	$(BIN)/python benchmarks/throughput.py
+	$(BIN)/python benchmarks/throughput.py --sizes
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -40,7 +40,7 @@ class Quadratic(Gradient):
     is one-sided and makes a bending beam soft.
 
     Where the neighbours do not determine a quadratic fit (bodies fewer than about four particles
-    thick), that particle falls back to the linear one, with a warning that says how many do.
+    thick), that particle falls back to the linear one, with a warning.
     """
 
     exact_degree: ClassVar[int] = 2
@@ -52,10 +52,11 @@ class Quadratic(Gradient):
             own = slice(pairs.starts[rows.start], pairs.starts[rows.stop])
             weights[own], poor[rows] = _fitted(pairs, rows, kernel_gradients[own], volumes)
         if poor.any():
+            # Without a count: an engine may ask for some rows at a time, and one warning is enough.
             warnings.warn(
-                f"gradient 'quadratic': {int(poor.sum())} of {len(poor)} particles have too few or "
-                "too flat neighbours for a quadratic fit and use the linear one; a larger cover or "
-                "a finer spacing gives them more",
+                "gradient 'quadratic': some particles have too few or too flat neighbours for a "
+                "quadratic fit and use the linear one; a larger cover or a finer spacing gives "
+                "them more",
                 stacklevel=2,
             )
             replaced = pairs.spread(poor)

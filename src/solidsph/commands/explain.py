@@ -117,7 +117,11 @@ def _numbers(simulation: Simulation) -> list[dict[str, Any]]:
             else "BELOW 1: the run will blow up; take a smaller time_step_factor",
         ),
         ("steps", simulation.steps, f"for {scene.duration:g} s"),
-        ("engine", type(simulation.engine).__name__, f'engine = "{scene.engine}"'),
+        (
+            "engine",
+            type(simulation.dynamics.internal).__name__,
+            f'engine = "{scene.engine}"',
+        ),
         (
             "predicted wall time [s]",
             per_step * simulation.steps,

@@ -7,25 +7,32 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array
+from solidsph.arrays import Array, Mask
 from solidsph.body import Body
 from solidsph.neighbours import Pairs
 
 _ROWS_AT_ONCE = 2048
 
 
-def weighted_chunks(body: Body, count: int) -> Iterator[tuple[Pairs, Array]]:
-    """Pairs of the first `count` particles, some rows at a time, with the gradient's weights (m, d).
+def weighted_chunks(body: Body, wanted: Mask) -> Iterator[tuple[Pairs, Array]]:
+    """Pairs of the particles `wanted` (n,), some rows at a time, with gradient weights (m, d).
 
     Rows and columns are numbered within the body; the weights of a row depend on that row alone.
     """
-    volumes, positions = body.particles.volumes, body.particles.positions
+    positions, cells = body.particles.positions, body.particles.cells
     tree = cKDTree(positions)
-    for first in range(0, count, _ROWS_AT_ONCE):
-        rows = slice(first, min(first + _ROWS_AT_ONCE, count))
+    for rows in _chunks(wanted):
         pairs = _pairs_of(tree, positions, rows, body.smoothing.support_radius)
         kernel_gradients = body.smoothing.gradient(pairs.offsets, pairs.distances)
-        yield pairs, body.formulation.gradient.weights(pairs, kernel_gradients, volumes)
+        yield pairs, body.formulation.gradient.weights(pairs, kernel_gradients, cells)
+
+
+def _chunks(wanted: Mask) -> Iterator[slice]:
+    """Consecutive particles that are wanted, not too many at a time."""
+    change = np.flatnonzero(np.diff(wanted, prepend=False, append=False))
+    for begin, end in change.reshape(-1, 2).tolist():
+        for first in range(begin, end, _ROWS_AT_ONCE):
+            yield slice(first, min(first + _ROWS_AT_ONCE, end))
 
 
 def _pairs_of(tree: cKDTree, positions: Array, rows: slice, radius: float) -> Pairs:

@@ -3,10 +3,14 @@
 The compiler is not left to find out what can be done side by side: sums over neighbours keep their
 accumulators in vector registers only if they are written so. Where a machine's registers are
 narrower than the lanes asked for, LLVM takes several.
+
+A field of vectors is flat; so are the d planes of a field of tensors, plane k holding column k.
+Loops know vectors as lanes, and tensors as tuples of d lanes, one a column.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -34,12 +38,17 @@ class _LanesModel(models.PrimitiveModel):
 
 
 class Words(NamedTuple):
-    """What compiled loops say about lanes; `at` counts elements of a flat array."""
+    """What compiled loops say about lanes; `at` counts the elements of a flat array."""
 
-    load: Any  # (array, at) -> lanes
-    store: Any  # (array, at, lanes)
-    spread: Any  # (number) -> lanes, all equal to it
-    add_product: Any  # (a, b, c) -> a + b c, rounded once where the machine can
+    load: Any  # (array, at) -> vector
+    store: Any  # (array, at, vector)
+    zeros: Any  # () -> tensor
+    weight: Any  # (weights (m, d), row) -> g: each component spread over all lanes
+    outer: Any  # (h, u, g) -> h + u (x) g
+    inner: Any  # (f, T, g) -> f + T g
+    total: Any  # (h, other) -> their sum
+    put: Any  # (array, at, plane, tensor)
+    get: Any  # (array, at, plane) -> tensor
 
 
 def register_bytes() -> int:
@@ -51,50 +60,135 @@ def register_bytes() -> int:
 
 
 @cache
-def words(dtype: str, count: int) -> Words:
-    """The words for lanes of `count` numbers of type `dtype`."""
+def words(dtype: str, count: int, dimension: int) -> Words:
+    """The words for lanes of `count` numbers of type `dtype`, and tensors of a dimension."""
     element = from_dtype(np.dtype(dtype))
     lanes = Lanes(element, count)
+    tensor = types.UniTuple(lanes, dimension)
     size = np.dtype(dtype).itemsize
+    axes = range(dimension)
 
-    def pointer(context: Any, builder: Any, array_type: Any, array: Any, at: Any) -> Any:
+    def address(context: Any, builder: Any, array_type: Any, array: Any, at: Any) -> Any:
         data = context.make_array(array_type)(context, builder, array).data
+        return builder.gep(data, [at])
+
+    def lanes_at(context: Any, builder: Any, array_type: Any, array: Any, at: Any) -> Any:
+        vector = context.get_value_type(lanes)
         return builder.bitcast(
-            builder.gep(data, [at]), context.get_value_type(lanes).as_pointer()
+            address(context, builder, array_type, array, at), vector.as_pointer()
         )
+
+    def spread(context: Any, builder: Any, number: Any) -> Any:
+        empty = ir.Constant(context.get_value_type(lanes), ir.Undefined)
+        first = builder.insert_element(empty, number, ir.Constant(ir.IntType(32), 0))
+        everywhere = ir.Constant(ir.VectorType(ir.IntType(32), count), [0] * count)
+        return builder.shuffle_vector(first, empty, everywhere)
+
+    def built(context: Any, builder: Any, column: Callable[[int], Any]) -> Any:
+        value = ir.Constant(context.get_value_type(tensor), ir.Undefined)
+        for k in axes:
+            value = builder.insert_value(value, column(k), k)
+        return value
+
+    def add_product(builder: Any, a: Any, b: Any, c: Any) -> Any:
+        # May be rounded once, where the machine can do both at once; nothing else is reordered.
+        product = builder.fmul(b, c, flags=("contract",))
+        return builder.fadd(a, product, flags=("contract",))
 
     @intrinsic
     def load(typing: Any, array: Any, at: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            return builder.load(pointer(context, builder, signature.args[0], *args), align=size)
+            return builder.load(lanes_at(context, builder, signature.args[0], *args), align=size)
 
         return lanes(array, types.intp), code
 
     @intrinsic
-    def store(typing: Any, array: Any, at: Any, value: Any) -> Any:
+    def store(typing: Any, array: Any, at: Any, vector: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            target = pointer(context, builder, signature.args[0], args[0], args[1])
-            builder.store(args[2], target, align=size)
+            array, at, value = args
+            target = lanes_at(context, builder, signature.args[0], array, at)
+            builder.store(value, target, align=size)
             return context.get_dummy_value()
 
         return types.void(array, types.intp, lanes), code
 
     @intrinsic
-    def spread(typing: Any, value: Any) -> Any:
+    def zeros(typing: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            empty = ir.Constant(context.get_value_type(lanes), ir.Undefined)
-            first = builder.insert_element(empty, args[0], ir.Constant(ir.IntType(32), 0))
-            everywhere = ir.Constant(ir.VectorType(ir.IntType(32), count), [0] * count)
-            return builder.shuffle_vector(first, empty, everywhere)
+            return ir.Constant(context.get_value_type(tensor), None)
 
-        return lanes(element), code
+        return tensor(), code
 
     @intrinsic
-    def add_product(typing: Any, a: Any, b: Any, c: Any) -> Any:
+    def weight(typing: Any, weights: Any, row: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            product = builder.fmul(args[1], args[2], flags=("contract",))
-            return builder.fadd(args[0], product, flags=("contract",))
+            first = builder.mul(args[1], ir.Constant(args[1].type, dimension))
 
-        return lanes(lanes, lanes, lanes), code
+            def component(k: int) -> Any:
+                at = builder.add(first, ir.Constant(first.type, k))
+                where = address(context, builder, signature.args[0], args[0], at)
+                return spread(context, builder, builder.load(where, align=size))
 
-    return Words(load, store, spread, add_product)
+            return built(context, builder, component)
+
+        return tensor(weights, types.intp), code
+
+    @intrinsic
+    def outer(typing: Any, h: Any, u: Any, g: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            h, u, g = args
+            part = builder.extract_value
+            return built(
+                context, builder, lambda k: add_product(builder, part(h, k), u, part(g, k))
+            )
+
+        return tensor(tensor, lanes, tensor), code
+
+    @intrinsic
+    def inner(typing: Any, f: Any, T: Any, g: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            f, T, g = args
+            part = builder.extract_value
+            for k in axes:
+                f = add_product(builder, f, part(T, k), part(g, k))
+            return f
+
+        return lanes(lanes, tensor, tensor), code
+
+    @intrinsic
+    def total(typing: Any, h: Any, other: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            part = builder.extract_value
+            return built(
+                context, builder, lambda k: builder.fadd(part(args[0], k), part(args[1], k))
+            )
+
+        return tensor(tensor, tensor), code
+
+    @intrinsic
+    def put(typing: Any, array: Any, at: Any, plane: Any, value: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            array, at, plane, value = args
+            for k in axes:
+                target = lanes_at(context, builder, signature.args[0], array, at)
+                builder.store(builder.extract_value(value, k), target, align=size)
+                at = builder.add(at, plane)
+            return context.get_dummy_value()
+
+        return types.void(array, types.intp, types.intp, tensor), code
+
+    @intrinsic
+    def get(typing: Any, array: Any, at: Any, plane: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            array, first, plane = args
+
+            def column(k: int) -> Any:
+                at = builder.add(first, builder.mul(plane, ir.Constant(plane.type, k)))
+                source = lanes_at(context, builder, signature.args[0], array, at)
+                return builder.load(source, align=size)
+
+            return built(context, builder, column)
+
+        return tensor(array, types.intp, types.intp), code
+
+    return Words(load, store, zeros, weight, outer, inner, total, put, get)

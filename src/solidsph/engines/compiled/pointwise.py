@@ -10,9 +10,8 @@ from functools import cache
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
-from numba import njit
+from numba import njit, types
 from numba.core.errors import NumbaError
-from numba.core.types import UniTuple, float64
 from numba.extending import register_jitable
 
 from solidsph.arrays import Tensor
@@ -32,10 +31,10 @@ def compiled_flux(formulation: Formulation, material: Material, dimension: int) 
     Raises:
         NotCompilableError: one of their functions cannot be compiled.
     """
-    law = _flux(formulation.deformation_gradient, material.first_piola, formulation.flux)
-    tensor = UniTuple(UniTuple(float64, dimension), dimension)
+    law = _flux(dimension, formulation.deformation_gradient, material.first_piola, formulation.flux)
+    tensor = types.UniTuple(types.UniTuple(types.float64, dimension), dimension)
     try:
-        law.compile((tensor, UniTuple(float64, len(material.params))))
+        law.compile((tensor, types.UniTuple(types.float64, len(material.params))))
     except NumbaError as cause:
         raise NotCompilableError(str(cause)) from cause
     return law
@@ -49,15 +48,40 @@ def no_law(H: Tensor, params: tuple[float, ...]) -> Tensor:
 
 # By the identity of the functions: a process compiles each combination once.
 @cache
-def _flux(deformation_gradient: Any, first_piola: Any, flux: Any) -> Any:
+def _flux(dimension: int, deformation_gradient: Any, first_piola: Any, flux: Any) -> Any:
     F_of, P_of, T_of = (_registered(f) for f in (deformation_gradient, first_piola, flux))
+
+    numbers = _NUMBERS[dimension]
 
     @njit
     def law(H: Tensor, params: tuple[float, ...]) -> Tensor:
         F = F_of(H)
-        return T_of(F, P_of(F, params))
+        return numbers(T_of(F, P_of(F, params)))
 
     return law
+
+
+# A constant component may be of another type; loops need one for all.
+@njit
+def _numbers_1(T: Tensor) -> Tensor:
+    return ((float(T[0][0]),),)
+
+
+@njit
+def _numbers_2(T: Tensor) -> Tensor:
+    return ((float(T[0][0]), float(T[0][1])), (float(T[1][0]), float(T[1][1])))
+
+
+@njit
+def _numbers_3(T: Tensor) -> Tensor:
+    return (
+        (float(T[0][0]), float(T[0][1]), float(T[0][2])),
+        (float(T[1][0]), float(T[1][1]), float(T[1][2])),
+        (float(T[2][0]), float(T[2][1]), float(T[2][2])),
+    )
+
+
+_NUMBERS = {1: _numbers_1, 2: _numbers_2, 3: _numbers_3}
 
 
 @cache
@@ -81,7 +105,10 @@ def _called(function: FunctionType) -> Iterator[FunctionType]:
         if isinstance(value, FunctionType):
             yield value
         # NumPy's functions are the compiler's own business.
-        elif isinstance(value, ModuleType) and value.__name__.split(".")[0] not in ("numpy", "math"):
+        elif isinstance(value, ModuleType) and value.__name__.split(".")[0] not in (
+            "numpy",
+            "math",
+        ):
             inside = (vars(value).get(name) for name in names)
             yield from (one for one in inside if isinstance(one, FunctionType))
 

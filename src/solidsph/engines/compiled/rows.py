@@ -56,7 +56,7 @@ class Rows(NamedTuple):
 
     def costs(self) -> Array:
         """Pairs of each block, those of a run counted by what they cost beside a row's, (b,)."""
-        first, count, where = self.blocks.T
+        _, count, where = self.blocks.T
         costs = np.empty(len(self.blocks))
         run = where >= 0
         sizes = np.diff(self.members)
@@ -104,8 +104,8 @@ class _Compressor:
         """All that was added."""
         blocks = np.concatenate([np.empty((0, 3), dtype=np.intp), *self._blocks])
         offsets = [one[0] for one in self._stencils]
-        bands = [_bands(one) for one in offsets]
         members = _starts(np.array([len(one) for one in offsets], dtype=np.intp))
+        bands = [_bands(one, start) for one, start in zip(offsets, members[:-1], strict=True)]
         none = np.empty((0, dimension), dtype=self._dtype)
         stencil_weights = [one[1].astype(self._dtype) for one in self._stencils]
         return Rows(
@@ -114,10 +114,7 @@ class _Compressor:
             stencils=_starts(np.array([len(one) for one in bands], dtype=np.intp)),
             offsets=np.concatenate([np.empty(0, dtype=np.intp), *offsets]),
             stencil_weights=np.concatenate([none, *stencil_weights]),
-            bands=np.concatenate(
-                [np.empty((0, 3), dtype=np.intp)]
-                + [one + [start, 0, 0] for one, start in zip(bands, members[:-1], strict=True)]
-            ),
+            bands=np.concatenate([np.empty((0, 3), dtype=np.intp), *bands]),
             starts=_starts(np.concatenate([np.empty(0, dtype=np.intp), *self._lengths])),
             columns=np.concatenate([np.empty(0, dtype=np.int32), *self._columns]),
             weights=np.concatenate([none, *self._weights]),
@@ -165,9 +162,7 @@ def compressed(
         # A particle's own weight makes the row add up to zero, however small it is.
         matters[pairs.self_pairs] = True
         counts = np.add.reduceat(matters, pairs.starts[:-1], dtype=np.intp)
-        compressor.add(
-            int(pairs.rows[0]), counts, pairs.columns[matters], weights[matters]
-        )
+        compressor.add(int(pairs.rows[0]), counts, pairs.columns[matters], weights[matters])
     return compressor.rows(dimension)
 
 
@@ -190,14 +185,17 @@ def _starts(lengths: Indices) -> Indices:
     return np.concatenate([[0], np.cumsum(lengths)]).astype(np.intp)
 
 
-def _bands(offsets: Indices) -> Indices:
-    """Stretches of offsets that follow each other, (c, 3): first member, offset, width."""
+def _bands(offsets: Indices, start: int) -> Indices:
+    """Stretches of offsets that follow each other, (c, 3): first member, offset, width.
+
+    `start` is the first member of all.
+    """
     fresh = np.diff(offsets, prepend=offsets[:1] - 2) != 1
     since = np.arange(len(offsets))
     since = since - np.maximum.accumulate(np.where(fresh, since, 0))
     first = np.flatnonzero(since % BAND == 0)
     width = np.diff([*first, len(offsets)])
-    return np.stack([first, offsets[first], width], axis=1).astype(np.intp)
+    return np.stack([start + first, offsets[first], width], axis=1).astype(np.intp)
 
 
 @njit
@@ -216,9 +214,7 @@ def _run_heads(starts: Indices, offsets: Indices, weights: Array, tolerance: flo
 
 
 @njit
-def _alike(
-    starts: Indices, offsets: Indices, weights: Array, p: int, q: int, close: float
-) -> bool:
+def _alike(starts: Indices, offsets: Indices, weights: Array, p: int, q: int, close: float) -> bool:
     a, b = starts[p], starts[q]
     if starts[p + 1] - a != starts[q + 1] - b:
         return False

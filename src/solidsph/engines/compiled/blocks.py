@@ -1,0 +1,182 @@
+"""Loops over one block of rows: gather the gradient of a field, scatter the force of a stress.
+
+Vectors are kept flat, with 1, 2 or 4 numbers a particle in 1, 2 or 3 dimensions: one layout in
+which a register holds either the values of one neighbour or those of several particles that follow
+each other. The tensors of the block in hand are in a small scratch array, with a margin of zeros
+on both sides so that loops may overrun it.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from solidsph.engines.compiled.lanes import register_bytes, words
+from solidsph.engines.compiled.rows import BAND, RUN
+
+STRIDE = {1: 1, 2: 2, 3: 4}  # numbers kept for a particle, by dimension
+
+_REGISTERS = 4  # of consecutive particles that go through a stencil together
+
+
+def group(dimension: int, dtype: str) -> int:
+    """How many particles of a run go through its stencil together."""
+    return _REGISTERS * _lanes(dimension, dtype) // STRIDE[dimension]
+
+
+def _lanes(dimension: int, dtype: str) -> int:
+    return max(register_bytes() // np.dtype(dtype).itemsize, STRIDE[dimension])
+
+
+class BlockLoops(NamedTuple):
+    """Compiled loops, and where they keep the tensors of a block's particles.
+
+    Component T_ik of the particle in a slot is `scratch[k * plane + (margin + slot) * stride + i]`.
+    """
+
+    gather: Any  # (rows, block, u, scratch): scratch = gradient of u
+    scatter: Any  # (rows, block, scratch, f, shift): f += from scratch; particle 0 is at `shift`
+    tensor: Any  # (scratch, slot) -> a particle's tensor, as pointwise functions take it
+    margin: int  # slots
+    plane: int  # numbers in a plane of scratch
+
+
+@cache
+def block_loops(dimension: int, dtype: str) -> BlockLoops:
+    """The loops for one dimension and number type."""
+    d, D = dimension, STRIDE[dimension]
+    W, G = _lanes(d, dtype), group(d, dtype)
+    margin = BAND + G
+    plane = (margin + RUN + margin) * D
+    # Of several particles, and of one.
+    load, store, zeros, weight, outer, inner, _, put, get = words(dtype, W, d)
+    load_1, store_1, zeros_1, weight_1, outer_1, inner_1, total_1, put_1, get_1 = words(dtype, D, d)
+
+    @njit
+    def gather_run(rows, first, count, stencil, u, scratch):
+        begin, end = rows.members[stencil], rows.members[stencil + 1]
+        for slot in range(0, count, G):
+            h0, h1, h2, h3 = zeros(), zeros(), zeros(), zeros()
+            for m in range(begin, end):
+                g = weight(rows.stencil_weights, m)
+                at = (first + slot + rows.offsets[m]) * D
+                h0 = outer(h0, load(u, at), g)
+                h1 = outer(h1, load(u, at + W), g)
+                h2 = outer(h2, load(u, at + 2 * W), g)
+                h3 = outer(h3, load(u, at + 3 * W), g)
+            at = (margin + slot) * D
+            put(scratch, at, plane, h0)
+            put(scratch, at + W, plane, h1)
+            put(scratch, at + 2 * W, plane, h2)
+            put(scratch, at + 3 * W, plane, h3)
+
+    @njit
+    def gather_rows(rows, count, row, u, scratch):
+        for slot in range(count):
+            m, end = rows.starts[row + slot], rows.starts[row + slot + 1]
+            # Two sums side by side, because each addition waits for the one before it.
+            h, other = zeros_1(), zeros_1()
+            while m + 1 < end:
+                h = outer_1(h, load_1(u, rows.columns[m] * D), weight_1(rows.weights, m))
+                m += 1
+                other = outer_1(other, load_1(u, rows.columns[m] * D), weight_1(rows.weights, m))
+                m += 1
+            if m < end:
+                h = outer_1(h, load_1(u, rows.columns[m] * D), weight_1(rows.weights, m))
+            put_1(scratch, (margin + slot) * D, plane, total_1(h, other))
+
+    @njit
+    def gather(rows, block, u, scratch):
+        first, count, where = rows.blocks[block]
+        if where >= 0:
+            gather_run(rows, first, count, where, u, scratch)
+        else:
+            gather_rows(rows, count, -1 - where, u, scratch)
+
+    @njit
+    def scatter_run(rows, first, count, stencil, scratch, f, shift):
+        # What an earlier block, or an overrun, has left behind the last particle.
+        for k in range(d):
+            scratch[k * plane + (margin + count) * D : k * plane + (2 * margin + count) * D] = 0
+        # The members of a band add to the same particles: while their sums stay in registers,
+        # the tensors move past them.
+        for band in range(rows.stencils[stencil], rows.stencils[stencil + 1]):
+            member, offset, width = rows.bands[band]
+            for slot in range(0, count + width - 1, G):
+                to = (first + offset + slot) * D + shift
+                f0, f1 = load(f, to), load(f, to + W)
+                f2, f3 = load(f, to + 2 * W), load(f, to + 3 * W)
+                for k in range(width):
+                    g = weight(rows.stencil_weights, member + k)
+                    at = (margin + slot - k) * D
+                    f0 = inner(f0, get(scratch, at, plane), g)
+                    f1 = inner(f1, get(scratch, at + W, plane), g)
+                    f2 = inner(f2, get(scratch, at + 2 * W, plane), g)
+                    f3 = inner(f3, get(scratch, at + 3 * W, plane), g)
+                store(f, to, f0)
+                store(f, to + W, f1)
+                store(f, to + 2 * W, f2)
+                store(f, to + 3 * W, f3)
+
+    @njit
+    def scatter_rows(rows, count, row, scratch, f, shift):
+        for slot in range(count):
+            T = get_1(scratch, (margin + slot) * D, plane)
+            for m in range(rows.starts[row + slot], rows.starts[row + slot + 1]):
+                to = rows.columns[m] * D + shift
+                store_1(f, to, inner_1(load_1(f, to), T, weight_1(rows.weights, m)))
+
+    @njit
+    def scatter(rows, block, scratch, f, shift):
+        first, count, where = rows.blocks[block]
+        if where >= 0:
+            scatter_run(rows, first, count, where, scratch, f, shift)
+        else:
+            scatter_rows(rows, count, -1 - where, scratch, f, shift)
+
+    tensor_at = _tensor_at(d, plane)
+
+    @njit
+    def tensor(scratch, slot):
+        return tensor_at(scratch, (margin + slot) * D)
+
+    return BlockLoops(gather, scatter, tensor, margin, plane)
+
+
+def _tensor_at(dimension: int, plane: int) -> Any:
+    """Compiled (scratch, at) -> nested tuples, in double precision."""
+
+    def number(scratch, at):
+        return np.float64(scratch[at])
+
+    number = njit(number)
+    if dimension == 1:
+
+        @njit
+        def tensor_at(scratch, at):
+            return ((number(scratch, at),),)
+
+    elif dimension == 2:
+
+        @njit
+        def tensor_at(scratch, at):
+            return (
+                (number(scratch, at), number(scratch, at + plane)),
+                (number(scratch, at + 1), number(scratch, at + plane + 1)),
+            )
+
+    else:
+
+        @njit
+        def tensor_at(scratch, at):
+            x, y, z = at, at + plane, at + 2 * plane
+            return (
+                (number(scratch, x), number(scratch, y), number(scratch, z)),
+                (number(scratch, x + 1), number(scratch, y + 1), number(scratch, z + 1)),
+                (number(scratch, x + 2), number(scratch, y + 2), number(scratch, z + 2)),
+            )
+
+    return tensor_at

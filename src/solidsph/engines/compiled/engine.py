@@ -1,0 +1,255 @@
+"""The compiled engine: fused sweeps over stencils and rows, compiled for the parts in use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, final
+
+import attrs
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from solidsph.arrays import Array
+from solidsph.body import Body
+from solidsph.engines.compiled.blocks import STRIDE, group
+from solidsph.engines.compiled.chunks import weighted_chunks
+from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux, no_law
+from solidsph.engines.compiled.rows import Rows, compressed, in_chunks
+from solidsph.engines.compiled.shares import (
+    Passes,
+    Shares,
+    aligned,
+    passes,
+    shared,
+    spread_pass,
+)
+from solidsph.engines.engine import Engine, InternalForces, StressFields
+from solidsph.engines.matrix import MatrixEngine
+from solidsph.interfaces.condition import StressCondition
+from solidsph.interfaces.formulation import Configuration
+from solidsph.neighbours import Pairs
+from solidsph.tensors import components_first, particles_first
+
+# Below this many particles, waking a second thread costs more than it does.
+_ALONE = 2000
+
+
+@final
+@attrs.frozen
+class CompiledEngine(Engine):
+    """Sums over rows of weights, with the parts' pointwise functions compiled into the loops.
+
+    Where a part cannot be compiled, or the sums are taken in the current configuration, the matrix
+    engine does the work: for all bodies, because conditions see the stress of all at once.
+
+    The sums themselves are kept in `precision`. Displacements, and not positions, go into them, so
+    that single precision is precision of strain, as long as a body does not move by many times its
+    spacing; F, the stress and what the seam hands out are in double precision.
+    """
+
+    precision: str = attrs.field(
+        default="float64", validator=attrs.validators.in_(("float64", "float32"))
+    )
+
+    def prepare(
+        self, bodies: Sequence[Body], conditions: Sequence[StressCondition]
+    ) -> InternalForces:
+        if any(b.formulation.configuration is not Configuration.REFERENCE for b in bodies):
+            return MatrixEngine().prepare(bodies, conditions)
+        try:
+            laws = [compiled_flux(b.formulation, b.material, b.smoothing.dimension) for b in bodies]
+        except NotCompilableError:
+            return MatrixEngine().prepare(bodies, conditions)
+        parts = [_part(b, law, self.precision) for b, law in zip(bodies, laws, strict=True)]
+        return CompiledForces(tuple(parts), tuple(conditions))
+
+
+@final
+@attrs.frozen(eq=False)
+class CompiledBody:
+    """One body made ready: weights, work space, and the passes over them."""
+
+    body: Body
+    law: Any  # compiled (H, params) -> T
+    gradient: Rows
+    force: Rows  # those that are scattered with; the gradient's own for the adjoint divergence
+    factors: NDArray[Any]  # (n,) what multiplies the stress before it is scattered
+    gradient_shares: Shares
+    force_shares: Shares
+    u: NDArray[Any]  # flat
+    passes: Passes
+    gradients: Passes  # without a law
+    spread_pass: Any
+    pair_count: int
+
+    @property
+    def bytes(self) -> int:
+        """Memory of all arrays."""
+        rows = {id(one): one.bytes for one in (self.gradient, self.force)}
+        shares = {id(one): one.buffers.nbytes for one in (self.gradient_shares, self.force_shares)}
+        own = self.factors.nbytes + self.u.nbytes
+        return own + sum(rows.values()) + sum(shares.values())
+
+    @property
+    def fused(self) -> bool:
+        """Whether gathering and scattering go together where no condition comes between them."""
+        return self.force is self.gradient and not self._ghosts_act
+
+    @property
+    def _ghosts_act(self) -> bool:
+        uses = self.body.formulation.divergence.uses_ghost_stress
+        return uses and bool(self.body.particles.ghosts.any())
+
+    def forces(self, displacements: Array, out: Array) -> None:
+        """Forces (n, d) of a fused body from displacements (n, d)."""
+        shares = self.gradient_shares
+        self.passes.forces(
+            shares.table,
+            self.gradient,
+            displacements,
+            self.u,
+            self.body.material.params,
+            self.factors,
+            shares.buffers,
+            out,
+        )
+
+    def stress(self, displacements: Array, out: Array) -> None:
+        """Stress (d, d, n) from displacements (n, d); ghosts have none."""
+        self._stress(self.passes, displacements, out)
+        out[:, :, self.body.particles.ghosts] = 0.0
+
+    def gradient_of(self, displacements: Array) -> Array:
+        """Gradient H (d, d, n) of displacements (n, d); that of ghosts is 0."""
+        n, d = displacements.shape
+        H = np.zeros((d, d, n))
+        self._stress(self.gradients, displacements, H)
+        H[:, :, self.body.particles.ghosts] = 0.0
+        return H
+
+    def _stress(self, passes: Passes, displacements: Array, out: Array) -> None:
+        passes.stress(
+            self.gradient_shares.table,
+            self.gradient,
+            displacements,
+            self.u,
+            self.body.material.params,
+            out,
+        )
+
+    def spread(self, stress: Array, out: Array) -> None:
+        """Forces (n, d) from stress (d, d, n)."""
+        ghosts = self.body.particles.ghosts
+        acts = self.body.formulation.divergence.uses_ghost_stress
+        if not acts:
+            stress[:, :, ghosts] = 0.0
+        shares = self.force_shares
+        self.spread_pass(shares.table, self.force, stress, self.factors, shares.buffers, out)
+        if acts:
+            # Ghosts have acted through their stress; nothing acts on them.
+            out[ghosts] = 0.0
+
+
+def _part(body: Body, law: Any, dtype: str) -> CompiledBody:
+    particles, divergence = body.particles, body.formulation.divergence
+    n, d = particles.count, particles.dimension
+    shortest_run = max(2, group(d, dtype) // 2)
+    count = 0
+
+    def counted(chunks: Iterator[tuple[Pairs, Array]]) -> Iterator[tuple[Pairs, Array]]:
+        nonlocal count
+        for pairs, weights in chunks:
+            count += pairs.count
+            yield pairs, weights
+
+    if divergence.adjoint:
+        # Ghosts have no stress of the law, so their rows are wanted only to act through.
+        wanted = np.ones(n, dtype=np.bool_) if divergence.uses_ghost_stress else ~particles.ghosts
+        chunks = counted(weighted_chunks(body, wanted))
+        gradient = force = compressed(chunks, d, dtype, shortest_run)
+        factors = np.where(wanted, -particles.volumes, 0.0)
+    else:
+        pairs = body.pairs()
+        weights = body.formulation.gradient.weights(
+            pairs, body.smoothing.gradient(pairs.offsets, pairs.distances), particles.cells
+        )
+        gradient = compressed(counted(in_chunks(pairs, weights)), d, dtype, shortest_run)
+        # To gather with d_pq is to scatter with d_qp.
+        weights = divergence.weights(pairs, weights, particles.volumes)[pairs.reversed_order()]
+        force = compressed(in_chunks(pairs, weights), d, dtype, shortest_run)
+        factors = np.ones(n)
+    threads = 1 if n < _ALONE else numba.get_num_threads()
+    gradient_shares = shared(gradient, d, dtype, threads)
+    force_shares = gradient_shares if divergence.adjoint else shared(force, d, dtype, threads)
+    return CompiledBody(
+        body=body,
+        law=law,
+        gradient=gradient,
+        force=force,
+        factors=factors.astype(dtype),
+        gradient_shares=gradient_shares,
+        force_shares=force_shares,
+        # Loops over runs read beyond the last particle by up to a group.
+        u=aligned((n + group(d, dtype)) * STRIDE[d], dtype),
+        passes=passes(d, dtype, law, threads > 1),
+        gradients=passes(d, dtype, no_law, threads > 1),
+        spread_pass=spread_pass(d, dtype, threads > 1),
+        pair_count=count,
+    )
+
+
+@final
+@attrs.frozen(eq=False)
+class CompiledForces(InternalForces):
+    """Internal forces by compiled sweeps."""
+
+    parts: Sequence[CompiledBody]
+    conditions: Sequence[StressCondition]
+
+    @property
+    def pair_count(self) -> int:
+        return sum(part.pair_count for part in self.parts)
+
+    @property
+    def bytes(self) -> int:
+        """Memory of the arrays kept between evaluations."""
+        return sum(part.bytes for part in self.parts)
+
+    def forces(self, time: float, displacements: Array) -> Array:
+        forces = np.empty(displacements.shape)
+        fused = [part for part in self.parts if part.fused and not self.conditions]
+        staged = [part for part in self.parts if part not in fused]
+        for part in fused:
+            extent = part.body.extent
+            part.forces(displacements[extent], forces[extent])
+        if staged:
+            n, d = displacements.shape
+            stress = np.zeros((d, d, n))
+            for part in staged:
+                extent = part.body.extent
+                part.stress(displacements[extent], stress[:, :, extent])
+            for condition in self.conditions:
+                condition.impose_stress(time, stress)
+            for part in staged:
+                extent = part.body.extent
+                part.spread(stress[:, :, extent], forces[extent])
+        return forces
+
+    def fields(self, displacements: Array) -> StressFields:
+        n, d = displacements.shape
+        fields = StressFields(np.empty((n, d, d)), np.zeros((n, d, d)), np.zeros(n))
+        for part in self.parts:
+            body, extent = part.body, part.body.extent
+            count = body.particles.count
+            with np.errstate(all="ignore"):  # as in the matrix engine
+                H = part.gradient_of(displacements[extent])
+                F = particles_first(body.formulation.deformation_gradient(H), count)
+                F[body.particles.ghosts] = np.eye(d)
+                first = components_first(F)
+                P = body.material.first_piola(first, body.material.params)
+                energy = body.material.energy(first, body.material.params)
+            fields.deformation_gradients[extent] = F
+            fields.stresses[extent] = particles_first(P, count)
+            fields.energy_densities[extent] = energy
+        return fields
