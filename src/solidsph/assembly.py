@@ -156,6 +156,8 @@ class Assembly:
             if part is None:
                 continue
             label = entry.label or _label(kind, part)
+            if not label.isprintable():
+                self._problems.add([f"label {label!r} has signs that cannot be shown; use others"])
             if label in self._labels and entry.label:
                 self._problems.add(
                     [f"two accounts are labelled {label!r}; give each a label of its own"]

@@ -119,7 +119,9 @@ class Simulation:
     def _advance(self, state: State, stop: int) -> State:
         while state.step < stop:
             try:
-                state = self.integrator.advance(state, self.dynamics, self.step_size)
+                # What overflows or is undefined shows as a value that is not finite, below.
+                with np.errstate(all="ignore"):
+                    state = self.integrator.advance(state, self.dynamics, self.step_size)
             except BuildError as cause:  # a moving neighbourhood may stop determining a gradient
                 raise self._diverged(state, cause.problems[0]) from cause
             # One sum tells whether any entry is not finite, at a fraction of a step's cost.
