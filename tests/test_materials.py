@@ -22,11 +22,16 @@ def test_conformance(name: str, check: Check) -> None:
     assert result.passed, result
 
 
-@every_material
+@pytest.mark.parametrize(
+    "name",
+    [
+        name
+        for name in registry.names("materials")
+        if "poissons_ratio" in attrs.fields_dict(registry.load("materials", name))
+    ],
+)
 @pytest.mark.parametrize("poissons_ratio", [-0.5, 0.0, 0.49])
 def test_conformance_for_other_ratios(name: str, poissons_ratio: float) -> None:
-    if "poissons_ratio" not in attrs.fields_dict(registry.load("materials", name)):
-        pytest.skip("it has no such constant")
     part = example_part("materials", name, youngs_modulus=200e9, poissons_ratio=poissons_ratio)
     assert [result for result in conformance("materials", part) if not result.passed] == []
 
