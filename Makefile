@@ -14,7 +14,7 @@ test: $(STAMP) lint  ## lint, types and every test but the slow physics
 	$(BIN)/pytest -n 2 -m "not validation"
 
 validate: $(STAMP)  ## the slow physics
-	$(BIN)/pytest -n 2 -m validation
+	$(BIN)/pytest -n 2 -m validation -rP
 
 bench: $(STAMP)  ## throughput against a plain C loop, and by size up to a million particles
 	$(BIN)/python benchmarks/throughput.py

@@ -8,8 +8,6 @@ refined towards the clamp, extrapolated; the same program gives -66.1035 mm for 
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 
@@ -87,6 +85,9 @@ def test_first_minimum_of_five_particles_across() -> None:
 def test_at_rest_the_error_falls_at_every_refinement() -> None:
     across = np.array([5, 9, 17, 25, 33])
     errors = np.array([error_at_rest(int(n)) for n in across])
+    print(
+        "beam at rest, error by particles across:", dict(zip(across.tolist(), errors, strict=True))
+    )
     assert np.all(errors > 0.0)
     assert np.all(np.diff(errors) < 0.0), errors
     assert errors[-1] < 0.003
@@ -97,7 +98,7 @@ def test_at_rest_the_error_falls_at_every_refinement() -> None:
 
 @pytest.mark.validation
 def test_in_motion_the_error_falls_at_every_refinement() -> None:
-    begun = time.perf_counter()
     errors = [error_of_first_minimum(across) for across in (5, 9, 17)]
+    print("beam in motion, error of the first minimum at 5, 9, 17 across:", errors)
     assert errors[0] > errors[1] > errors[2] > 0.0, errors
-    assert errors[2] < 0.005, (errors, time.perf_counter() - begun)
+    assert errors[2] < 0.005

@@ -100,6 +100,7 @@ def test_the_literal_form_misses_as_the_notes_on_the_paper_say() -> None:
     """41 particles, cover 5.5: the boundary value comes out 0.0787 instead of 0.0625."""
     setting = lattice_setting(1, 5.5, 40)
     miss, _ = approximation_errors(setting, dirichlet(LiteralDirichlet, 1))
+    # The notes give four decimals.
     assert miss == pytest.approx(0.0787 - 0.0625, abs=5e-5)
 
 
@@ -134,6 +135,7 @@ def test_dirichlet_reports_its_miss_in_a_run(kind: type) -> None:
     u = (state.positions - simulation.particles.positions)[:, 0]
     left = simulation.particles.tagged("left")
     achieved = (simulation.setting.smoothing_matrix() @ u)[left][0]
+    # The same sum of values of 1e-2, in another order.
     assert report["drive miss [m]"] == pytest.approx(abs(achieved - asked), abs=1e-15)
     if kind is LiteralDirichlet:
         assert report["drive miss [m]"] > 0.05 * abs(asked)
@@ -172,6 +174,7 @@ def test_neumann_where_one_normal_stands_for_two_faces_is_approximate() -> None:
     corner = np.flatnonzero((np.abs(X - 1.0) < 1e-9).all(axis=1) & ~setting.particles.ghosts)
     P = smoothed.reshape(-1, 2, 2)[corner][0]
     diagonal = np.array([1.0, 1.0]) / np.sqrt(2.0)
+    # Two passes through an ill-conditioned solve; asked is 1e3.
     assert P @ diagonal == pytest.approx([1e3, 0.0], abs=1e-3)
     assert abs((P @ [1.0, 0.0])[0] - 1e3) > 50.0
 
@@ -219,6 +222,7 @@ def test_uniaxial_strain_under_dead_load_matches_the_closed_form() -> None:
     from scipy.optimize import brentq
 
     exact = brentq(lambda s: mu * (s - 1 / s) + lam * np.log(s) / s - 1e4, 0.9, 1.2)
+    # Two particles in from the ends, what is left of their one-sided gradients.
     middle = stretches[2:-2]
     assert middle == pytest.approx(exact, abs=2e-3 * (exact - 1.0) + 1e-6)
 

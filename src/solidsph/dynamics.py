@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
+from solidsph.arrays import Array, Mask
 from solidsph.engines.engine import InternalForces
 from solidsph.interfaces.condition import (
     ExtensionCondition,
@@ -39,6 +39,11 @@ class Dynamics:
     internal: InternalForces
     motions: Sequence[MotionCondition]
     loads: Sequence[ForceCondition]
+    held: Sequence[Mask] = attrs.field(init=False)  # freedoms (n, d) that each motion determines
+
+    @held.default
+    def _held_by_each(self) -> Sequence[Mask]:
+        return [motion.held for motion in self.motions]
 
     def place(self, time: float, positions: Array) -> Array:
         """Positions (n, d) with every imposed motion applied at `time` [s]."""
@@ -83,8 +88,8 @@ class Dynamics:
             motion.impose(time, 2, accelerations)
         if self.motions:
             missing = self.masses[:, None] * accelerations - total
-        for motion in self.motions:
-            applied[motion.label] += np.where(motion.held, missing, 0.0)
+        for motion, held in zip(self.motions, self.held, strict=True):
+            applied[motion.label] += np.where(held, missing, 0.0)
         return Response(accelerations, applied)
 
     def observe(self, state: State) -> Observation:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any, TypeAlias
 
 import attrs
@@ -67,7 +68,7 @@ class VectorField:
             variables: dict[str, Any] = {
                 name: positions[:, k] for k, name in enumerate(AXES[: positions.shape[1]])
             }
-            expression = Expression.parse(component, [*variables, "t"])
+            expression = _parsed(component, (*variables, "t"))
             result = expression({**variables, "t": time})
         elif callable(component):
             result = component(positions, time)
@@ -103,6 +104,12 @@ class VectorField:
         ]
         derivative: Array = np.sum(terms, axis=0) / step**order
         return derivative
+
+
+@cache
+def _parsed(text: str, variables: tuple[str, ...]) -> Expression:
+    """A formula is asked at every step, and parsed once."""
+    return Expression.parse(text, variables)
 
 
 def _checked(value: Component, what: str) -> Component:

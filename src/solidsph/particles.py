@@ -127,6 +127,22 @@ class State:
     applied: Mapping[str, Array] = attrs.field(factory=dict)  # force of each account, (n, d) [N]
     work: Mapping[str, float] = attrs.field(factory=dict)  # work done by each account so far [J]
 
+    def begun(
+        self,
+        *,
+        accelerations: Array,
+        applied: Mapping[str, Array],
+        memory: Mapping[str, Array] | None = None,
+    ) -> State:
+        """The first state of a run, all its energy accounts at zero."""
+        return attrs.evolve(
+            self,
+            accelerations=accelerations,
+            applied=applied,
+            work=dict.fromkeys(applied, 0.0),
+            memory={**self.memory, **(memory or {})},
+        )
+
     def advanced(
         self,
         *,

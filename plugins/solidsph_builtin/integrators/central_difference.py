@@ -30,12 +30,8 @@ class CentralDifference(Integrator):
         a = response.accelerations
         # u_-1 such that the velocity at the start is the one given.
         increment = step_size * state.velocities - 0.5 * step_size**2 * a
-        return attrs.evolve(
-            state,
-            accelerations=a,
-            applied=response.applied,
-            work=dict.fromkeys(response.applied, 0.0),
-            memory={**state.memory, _INCREMENT: increment},
+        return state.begun(
+            accelerations=a, applied=response.applied, memory={_INCREMENT: increment}
         )
 
     def advance(self, state: State, dynamics: Dynamics, step_size: float) -> State:

@@ -24,12 +24,7 @@ class VelocityVerlet(Integrator):
 
     def start(self, state: State, dynamics: Dynamics, step_size: float) -> State:
         response = dynamics.respond(state.time, state.positions, state.velocities)
-        return attrs.evolve(
-            state,
-            accelerations=response.accelerations,
-            applied=response.applied,
-            work=dict.fromkeys(response.applied, 0.0),
-        )
+        return state.begun(accelerations=response.accelerations, applied=response.applied)
 
     def advance(self, state: State, dynamics: Dynamics, step_size: float) -> State:
         time = state.time + step_size

@@ -51,8 +51,8 @@ def stiffness(dynamics: Dynamics, state: State) -> tuple[Array, Mask]:
     """
     particles = dynamics.particles
     free = np.repeat(~particles.ghosts[:, None], particles.dimension, axis=1)
-    for motion in dynamics.motions:
-        free &= ~motion.held
+    for held in dynamics.held:
+        free &= ~held
     count = int(free.sum())
     if count > MOST_FREEDOMS:
         raise SolidsphError(
