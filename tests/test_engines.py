@@ -293,14 +293,21 @@ def test_a_run_is_the_same_by_either_engine() -> None:
     assert np.allclose(*ends, rtol=0.0, atol=1e-13)
 
 
-def test_auto_compiles_for_many_pairs_only() -> None:
+def test_auto_compiles_where_there_is_much_to_do() -> None:
     assert isinstance(engine_named("auto"), AutomaticEngine)
-    small = block(2, lengths=[0.8, 0.7]).build()
-    assert isinstance(prepared(AutomaticEngine(), small), MatrixForces)
-    large = block(2, lengths=[6.0, 6.0]).build()
-    assert isinstance(prepared(AutomaticEngine(), large), CompiledForces)
-    moving = block(2, lengths=[6.0, 6.0], formulation="updated-lagrangian").build()
-    assert isinstance(prepared(AutomaticEngine(), moving), MatrixForces)
+    bodies, stresses = parts_of(block(2, lengths=[0.8, 0.7]).build())
+
+    def chosen(bodies: Sequence[Body], evaluations: int) -> InternalForces:
+        return AutomaticEngine().prepare(bodies, stresses, evaluations)
+
+    # By itself each step of a small body takes 0.1 ms, and compiling as long as 1e5 of them.
+    assert isinstance(chosen(bodies, 10_000), MatrixForces)
+    assert isinstance(chosen(bodies, 1_000_000), CompiledForces)
+    larger, _ = parts_of(block(2, lengths=[6.0, 6.0]).build())
+    assert isinstance(chosen(larger, 100), MatrixForces)
+    assert isinstance(chosen(larger, 10_000), CompiledForces)
+    moving, _ = parts_of(block(2, lengths=[0.8, 0.7], formulation="updated-lagrangian").build())
+    assert isinstance(chosen(moving, 1_000_000), MatrixForces)
 
 
 def test_small_problems_do_not_bring_the_compiler() -> None:

@@ -17,5 +17,7 @@ Indices: TypeAlias = NDArray[np.intp]
 
 # A number at one point, or an array of them at many points: a pointwise function takes both.
 Scalar: TypeAlias = Any
+# d of such scalars: a tuple, or an array with component axes first.
+Vector: TypeAlias = Any
 # A d x d matrix of such scalars: nested tuples, or an array with component axes first.
 Tensor: TypeAlias = Any

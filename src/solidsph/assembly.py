@@ -106,7 +106,7 @@ class Assembly:
         problems.add(compatibility.stresses(stresses, problems.settled(formulation)))
         initial = problems.attempt(self._initial_state, particles)
         chosen_engine = problems.settled(engine)
-        internal = problems.attempt(chosen_engine.prepare, setting.bodies, stresses)
+        internal = problems.attempt(chosen_engine.prepare, setting.bodies, stresses, steps)
         problems.stop_if_any()
 
         return Simulation(

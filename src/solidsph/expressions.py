@@ -10,6 +10,7 @@ import ast
 import difflib
 import operator
 from collections.abc import Callable, Collection, Mapping
+from functools import cache
 from typing import Any
 
 import attrs
@@ -98,6 +99,13 @@ class Expression:
         # A formula may divide by zero or leave a function's domain; whoever uses the value checks.
         with np.errstate(all="ignore"):
             return _evaluate(self._tree, {**_CONSTANTS, **values})
+
+
+@cache
+def names_in(text: str) -> frozenset[str]:
+    """Names that a formula, which can be parsed, uses."""
+    tree = ast.parse(text.strip(), mode="eval")
+    return frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
 
 
 def _depth(node: ast.AST) -> int:

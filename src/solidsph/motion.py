@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import attrs
 import numpy as np
 
 from solidsph.arrays import Array
 from solidsph.errors import SceneError
-from solidsph.expressions import Expression
+from solidsph.expressions import Expression, names_in
 from solidsph.where import AXES
 
 Component: TypeAlias = float | str | Callable[[Array, float], Array]
@@ -57,53 +57,96 @@ class VectorField:
                     "leave it out"
                 )
 
-    def values(self, axis: int, positions: Array, time: float) -> Array:
-        """The component along `axis` at `positions` (k, d) and `time` [s], (k,).
+    def varies(self, axis: int) -> bool:
+        """Whether the component along `axis` may change in time."""
+        component = self.components[axis]
+        if isinstance(component, str):
+            return "t" in names_in(component)
+        return callable(component)
+
+    def schedule(self, axis: int, positions: Array, times: Array) -> Array:
+        """The component along `axis` at `positions` (k, d) and `times` (t,) [s], (t, k).
+
+        (1, k) if it does not vary.
 
         Raises:
             SceneError: a value is not a finite number.
         """
-        component = self.components[axis]
-        if isinstance(component, str):
-            variables: dict[str, Any] = {
-                name: positions[:, k] for k, name in enumerate(AXES[: positions.shape[1]])
-            }
+        component, count = self.components[axis], len(positions)
+        if not self.varies(axis):
+            times = times[:1]
+        if callable(component):
+            found = np.stack([_spread(component(positions, float(t)), count) for t in times])
+        elif isinstance(component, str):
+            variables = {name: positions[:, k] for k, name in enumerate(AXES[: positions.shape[1]])}
             expression = _parsed(component, (*variables, "t"))
-            result = expression({**variables, "t": time})
-        elif callable(component):
-            result = component(positions, time)
+            result = expression({**variables, "t": times[:, None]})
+            found = np.broadcast_to(np.asarray(result, dtype=np.float64), (len(times), count))
         else:
-            result = component
-        spread = np.broadcast_to(np.asarray(result, dtype=np.float64), (len(positions),))
-        if not np.all(np.isfinite(spread)):
-            bad = int(np.flatnonzero(~np.isfinite(spread))[0])
+            found = np.full((1, count), float(component))
+        if not np.all(np.isfinite(found)):
+            row, bad = (int(k) for k in np.argwhere(~np.isfinite(found))[0])
             raise SceneError(
-                f"{component!r} is {spread[bad]} at X = {positions[bad].tolist()}, "
-                f"t = {time:.6g} s; it must be finite everywhere it is used"
+                f"{component!r} is {found[row, bad]} at X = {positions[bad].tolist()}, "
+                f"t = {times[row]:.6g} s; it must be finite everywhere it is used"
             )
-        return spread
+        return found
+
+    def values(self, axis: int, positions: Array, time: float) -> Array:
+        """As `schedule`, at one time, (k,)."""
+        found: Array = self.schedule(axis, positions, np.array([time]))[0]
+        return found
+
+    def derivative_schedule(
+        self, axis: int, positions: Array, times: Array, order: int, step: float
+    ) -> Array:
+        """Time derivative of order 0, 1 or 2 of a component, by second order differences.
+
+        (t, k), or (1, k) if it does not vary. Differences over the time `step` [s] of the run are
+        what the integrators see: a kink in the motion, such as the end of a ramp, becomes the
+        impulse that the step delivers, and the work of the reaction stays right. Before t = 0 the
+        formula is never asked.
+        """
+        if order == 0:
+            return self.schedule(axis, positions, times)
+        if not self.varies(axis):
+            return np.zeros((1, len(positions)))
+        centred = times >= step * (1.0 - 1e-9)
+        derivative = np.empty((len(times), len(positions)))
+        for chosen, weights in ((centred, _CENTRED[order]), (~centred, _AT_START[order])):
+            if chosen.any():
+                terms = [
+                    weight
+                    * self.schedule(axis, positions, np.maximum(0.0, times[chosen] + k * step))
+                    for k, weight in weights.items()
+                ]
+                derivative[chosen] = np.sum(terms, axis=0) / step**order
+        return derivative
 
     def derivative(
         self, axis: int, positions: Array, time: float, order: int, step: float
     ) -> Array:
-        """Time derivative of order 0, 1 or 2 of a component, by second order differences.
+        """As `derivative_schedule`, at one time, (k,)."""
+        times = np.array([time])
+        found: Array = self.derivative_schedule(axis, positions, times, order, step)[0]
+        return found
 
-        Differences over the time `step` [s] of the run are what the integrators see: a kink in
-        the motion, such as the end of a ramp, becomes the impulse that the step delivers, and the
-        work of the reaction stays right. Before t = 0 the formula is never asked.
-        """
-        if order == 0:
-            return self.values(axis, positions, time)
-        component = self.components[axis]
-        if not isinstance(component, str) and not callable(component):
-            return np.zeros(len(positions))
-        weights = _CENTRED[order] if time >= step * (1.0 - 1e-9) else _AT_START[order]
-        terms = [
-            weight * self.values(axis, positions, max(0.0, time + k * step))
-            for k, weight in weights.items()
-        ]
-        derivative: Array = np.sum(terms, axis=0) / step**order
-        return derivative
+
+def scheduled_forces(field: VectorField, positions: Array, amounts: Array, times: Array) -> Array:
+    """Forces `amounts` (k,) times the field at `positions` (k, d) and `times` (t,), (t, k, d).
+
+    (1, k, d) if no component varies.
+    """
+    columns = {axis: field.schedule(axis, positions, times) for axis in field.components}
+    rows = max((len(one) for one in columns.values()), default=1)
+    forces = np.zeros((rows, *positions.shape))
+    for axis, one in columns.items():
+        forces[:, :, axis] = amounts * one
+    return forces
+
+
+def _spread(result: object, count: int) -> Array:
+    return np.broadcast_to(np.asarray(result, dtype=np.float64), (count,))
 
 
 @cache

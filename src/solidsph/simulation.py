@@ -13,7 +13,7 @@ import pluggy
 
 from solidsph.dynamics import Dynamics
 from solidsph.engines.engine import Engine
-from solidsph.errors import BuildError, DivergedError
+from solidsph.errors import DivergedError
 from solidsph.interfaces.condition import Condition, Observation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.integrator import Integrator
@@ -21,6 +21,7 @@ from solidsph.particles import Particles, State
 from solidsph.registry import Entry
 from solidsph.scene import Scene
 from solidsph.setting import Setting
+from solidsph.time_loop import StepError, TimeLoop
 
 if TYPE_CHECKING:
     from solidsph.builder import Builder
@@ -71,6 +72,10 @@ class Simulation:
         state = attrs.evolve(self.initial, positions=positions, velocities=velocities)
         return self.integrator.start(state, self.dynamics, self.step_size)
 
+    def time_loop(self) -> TimeLoop:
+        """What carries out the steps."""
+        return self.dynamics.internal.time_loop(self.dynamics, self.integrator, self.step_size)
+
     def run(self, *, record: Path | str | None = None, observers: Sequence[object] = ()) -> Result:
         """Advance from the start to the end of the duration.
 
@@ -94,10 +99,14 @@ class Simulation:
         begun = clock.perf_counter()
         try:
             hook.solidsph_setup(simulation=self)
+            loop = self.time_loop()
             state = self.start()
             hook.solidsph_step_end(simulation=self, observation=self._observe(state))
             for stop in self.output_steps():
-                state = self._advance(state, stop)
+                try:
+                    state = loop.advance(state, stop)
+                except StepError as failed:
+                    raise self._diverged(failed.state, failed.cause) from failed
                 hook.solidsph_step_end(simulation=self, observation=self._observe(state))
             outcome = "finished"
         except BaseException as cause:
@@ -115,19 +124,6 @@ class Simulation:
         count = min(self.scene.outputs, self.steps)
         marks = np.linspace(0, self.steps, count + 1)[1:]
         return tuple(int(step) for step in np.unique(np.rint(marks)))
-
-    def _advance(self, state: State, stop: int) -> State:
-        while state.step < stop:
-            try:
-                # What overflows or is undefined shows as a value that is not finite, below.
-                with np.errstate(all="ignore"):
-                    state = self.integrator.advance(state, self.dynamics, self.step_size)
-            except BuildError as cause:  # a moving neighbourhood may stop determining a gradient
-                raise self._diverged(state, cause.problems[0]) from cause
-            # One sum tells whether any entry is not finite, at a fraction of a step's cost.
-            if not np.isfinite(state.accelerations.sum()):
-                raise self._diverged(state, "the acceleration is not finite")
-        return state
 
     def _observe(self, state: State) -> Observation:
         observation = self.dynamics.observe(state)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from solidsph.arrays import Array, Scalar, Tensor
+from solidsph.arrays import Array, Scalar, Tensor, Vector
 
 
 def identity(like: Tensor) -> Tensor:
@@ -84,6 +84,15 @@ def transpose(A: Tensor) -> Tensor:
         (A[0][1], A[1][1], A[2][1]),
         (A[0][2], A[1][2], A[2][2]),
     )
+
+
+def scaled(a: Scalar, v: Vector) -> Vector:
+    """a v."""
+    if len(v) == 1:
+        return (a * v[0],)
+    if len(v) == 2:
+        return (a * v[0], a * v[1])
+    return (a * v[0], a * v[1], a * v[2])
 
 
 def scale(a: Scalar, A: Tensor) -> Tensor:

@@ -8,8 +8,9 @@ from typing import final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Indices, Mask
-from solidsph.interfaces.condition import MotionCondition, Observation
+from solidsph.arrays import Array, Indices
+from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.declared import ScheduledMotion
 from solidsph.motion import VectorField
 from solidsph.particles import Face
 from solidsph.setting import Setting
@@ -18,7 +19,7 @@ from solidsph_builtin.boundaries._reports import reaction, stress_reaction
 
 @final
 @attrs.frozen(eq=False)
-class ImposedMotion(MotionCondition):
+class ImposedMotion(ScheduledMotion):
     """u = field(X, t) on some particles, in the components that the field has."""
 
     label: str
@@ -29,18 +30,22 @@ class ImposedMotion(MotionCondition):
     stressed_face: Face | None  # of these particles, where the reaction must be read off the stress
 
     @property
-    def held(self) -> Mask:
-        held = np.zeros(self.positions.shape, dtype=np.bool_)
-        for axis in self.field.components:
-            held[self.indices, axis] = True
-        return held
+    def shape(self) -> tuple[int, ...]:
+        return self.positions.shape
 
-    def impose(self, time: float, derivative: int, values: Array) -> None:
+    @property
+    def entries(self) -> tuple[Indices, Indices]:
+        axes = np.array(list(self.field.components), dtype=np.intp)
+        return np.tile(self.indices, len(axes)), np.repeat(axes, len(self.indices))
+
+    def schedule(self, times: Array, derivative: int) -> Array:
         X = self.positions[self.indices]
-        for axis in self.field.components:
-            values[self.indices, axis] = self.field.derivative(
-                axis, X, time, derivative, self.step_size
-            )
+        columns = [
+            self.field.derivative_schedule(axis, X, times, derivative, self.step_size)
+            for axis in self.field.components
+        ]
+        rows = max(len(one) for one in columns)
+        return np.hstack([np.broadcast_to(one, (rows, len(X))) for one in columns])
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         if self.stressed_face is not None:

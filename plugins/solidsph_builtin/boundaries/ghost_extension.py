@@ -9,15 +9,11 @@ import attrs
 import numpy as np
 from scipy.sparse import csr_array
 
-from solidsph.arrays import Array, Indices, Mask
+from solidsph.arrays import Array, Indices
 from solidsph.errors import SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.interfaces.condition import (
-    Condition,
-    ExtensionCondition,
-    Observation,
-    StressCondition,
-)
+from solidsph.interfaces.condition import Condition, Observation
+from solidsph.interfaces.declared import LinearExtension
 from solidsph.setting import Setting
 from solidsph.where import Where
 from solidsph_builtin.boundaries._images import interpolation, reflected
@@ -67,7 +63,7 @@ def chosen_ghosts(setting: Setting, where: Where, handler: str) -> Indices:
 
 @final
 @attrs.frozen(eq=False)
-class Extension(ExtensionCondition, StressCondition):
+class Extension(LinearExtension):
     """Ghost values as linear combinations of the values of real particles."""
 
     label: str
@@ -77,22 +73,8 @@ class Extension(ExtensionCondition, StressCondition):
     stress: csr_array  # (k, n)
 
     @property
-    def held(self) -> Mask:
-        held = np.zeros(self.shape, dtype=np.bool_)
-        held[self.ghosts] = True
-        return held
-
-    def impose(self, time: float, derivative: int, values: Array) -> None:
-        values[self.ghosts] = self.displacement @ values
-
-    def return_forces(self, forces: Array) -> None:
-        forces += self.displacement.T @ forces[self.ghosts]
-        forces[self.ghosts] = 0.0
-
-    def impose_stress(self, time: float, stress: Array) -> None:
-        for row in stress:
-            for component in row:
-                component[self.ghosts] = self.stress @ component
+    def signs(self) -> Array:
+        return np.ones((len(self.ghosts), self.shape[1]))
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         return {}

@@ -9,15 +9,11 @@ import attrs
 import numpy as np
 from scipy.sparse import csr_array
 
-from solidsph.arrays import Array, Indices, Mask
+from solidsph.arrays import Array, Indices
 from solidsph.errors import SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.interfaces.condition import (
-    Condition,
-    ExtensionCondition,
-    Observation,
-    StressCondition,
-)
+from solidsph.interfaces.condition import Condition, Observation
+from solidsph.interfaces.declared import LinearExtension
 from solidsph.motion import VectorField
 from solidsph.parameters import number
 from solidsph.setting import Setting
@@ -94,7 +90,7 @@ def _ghosts_of(setting: Setting, normal: int, at: float) -> Indices:
 
 @final
 @attrs.frozen(eq=False)
-class Mirror(ExtensionCondition, StressCondition):
+class Mirror(LinearExtension):
     """Ghosts as mirror images: u = R u, T = R T R with R the reflection."""
 
     label: str
@@ -104,23 +100,12 @@ class Mirror(ExtensionCondition, StressCondition):
     signs: Array  # (k, d) the diagonals of R
 
     @property
-    def held(self) -> Mask:
-        held = np.zeros(self.shape, dtype=np.bool_)
-        held[self.ghosts] = True
-        return held
+    def displacement(self) -> csr_array:
+        return self.images
 
-    def impose(self, time: float, derivative: int, values: Array) -> None:
-        values[self.ghosts] = self.signs * (self.images @ values)
-
-    def return_forces(self, forces: Array) -> None:
-        forces += self.images.T @ (self.signs * forces[self.ghosts])
-        forces[self.ghosts] = 0.0
-
-    def impose_stress(self, time: float, stress: Array) -> None:
-        for i, row in enumerate(stress):
-            for k, component in enumerate(row):
-                sign = self.signs[:, i] * self.signs[:, k]
-                component[self.ghosts] = sign * (self.images @ component)
+    @property
+    def stress(self) -> csr_array:
+        return self.images
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         return reaction(observation, self.label)

@@ -12,7 +12,8 @@ from solidsph.arrays import Array, Indices
 from solidsph.errors import SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.condition import Condition, Observation, SurfaceLoad
-from solidsph.motion import Component, VectorField
+from solidsph.interfaces.declared import ScheduledForce
+from solidsph.motion import Component, VectorField, scheduled_forces
 from solidsph.particles import Face
 from solidsph.setting import Setting
 from solidsph.where import Where
@@ -73,7 +74,7 @@ def surface_at(setting: Setting, where: Where, handler: str) -> Face:
 
 @final
 @attrs.frozen(eq=False)
-class DeadLoad(SurfaceLoad):
+class DeadLoad(SurfaceLoad, ScheduledForce):
     """Traction times area on each surface particle."""
 
     label: str
@@ -82,11 +83,8 @@ class DeadLoad(SurfaceLoad):
     face: Face
     field: VectorField
 
-    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
-        forces = np.zeros_like(self.positions)
-        for axis in self.field.components:
-            forces[:, axis] = self.face.areas * self.field.values(axis, self.positions, time)
-        return forces
+    def schedule(self, times: Array) -> Array:
+        return scheduled_forces(self.field, self.positions, self.face.areas, times)
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         total_area = self.face.areas.sum()

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import final
 
 import attrs
-import numpy as np
 
 from solidsph.arrays import Array, Indices
 from solidsph.body import Body
 from solidsph.interfaces.condition import ForceCondition, Observation
+from solidsph.interfaces.declared import ScheduledForce
 from solidsph.interfaces.effect import Effect
-from solidsph.motion import Component, VectorField
+from solidsph.motion import Component, VectorField, scheduled_forces
 from solidsph.setting import Setting
 from solidsph.where import Where
 
@@ -51,18 +51,15 @@ class BodyForce(Effect):
 
 @final
 @attrs.frozen(eq=False)
-class _MassTimesField(ForceCondition):
+class _MassTimesField(ScheduledForce):
     label: str
     particles: Indices  # (k,)
     positions: Array  # (k, d) reference positions
     masses: Array  # (k,)
     field: VectorField
 
-    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
-        forces = np.zeros_like(self.positions)
-        for axis in self.field.components:
-            forces[:, axis] = self.masses * self.field.values(axis, self.positions, time)
-        return forces
+    def schedule(self, times: Array) -> Array:
+        return scheduled_forces(self.field, self.positions, self.masses, times)
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         return {}

@@ -10,10 +10,11 @@ import attrs
 import numpy as np
 from scipy.sparse import block_diag, csr_array, diags_array, kron
 
-from solidsph.arrays import Array, Indices
+from solidsph.arrays import Array
 from solidsph.body import Body
 from solidsph.errors import SceneError
 from solidsph.interfaces.condition import ForceCondition, Observation
+from solidsph.interfaces.declared import LinearForce
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Configuration
 from solidsph.parameters import check_positive, number
@@ -49,7 +50,6 @@ class HourglassControl(Effect):
         blocks = [self.strength * _penalty(body) for body in setting.bodies]
         return _Penalty(
             label=label,
-            particles=np.arange(setting.particles.count),
             reference=setting.particles.positions,
             matrix=csr_array(block_diag(blocks, format="csr")),
         )
@@ -104,15 +104,10 @@ def _penalty(body: Body) -> csr_array:
 
 @final
 @attrs.frozen(eq=False)
-class _Penalty(ForceCondition):
+class _Penalty(LinearForce):
     label: str
-    particles: Indices  # (n,)
     reference: Array  # (n, d)
     matrix: csr_array  # (n, n), the same for every component
-
-    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
-        forces: Array = -(self.matrix @ (positions - self.reference))
-        return forces
 
     def stiffness(self, displacements: Array) -> csr_array:
         """Minus the derivative of the force, (d n, d n), particle by particle."""

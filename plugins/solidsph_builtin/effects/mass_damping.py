@@ -7,12 +7,14 @@ from typing import final
 
 import attrs
 
-from solidsph.arrays import Array, Indices
+from solidsph.arrays import Array, Indices, Vector
 from solidsph.body import Body
 from solidsph.interfaces.condition import ForceCondition, Observation
+from solidsph.interfaces.declared import PointwiseForce
 from solidsph.interfaces.effect import Effect
 from solidsph.parameters import check_positive, number
 from solidsph.setting import Setting
+from solidsph.tensors import scaled
 from solidsph.where import Where
 
 
@@ -29,7 +31,7 @@ class MassDamping(Effect):
 
     def bind(self, setting: Setting, label: str) -> ForceCondition:
         indices = setting.select(self.where)
-        return _Drag(label, indices, self.rate * setting.masses[indices])
+        return _Drag(label, indices, self.rate * setting.masses[indices, None])
 
     def arrays(self, setting: Setting) -> Mapping[str, int]:
         count = len(setting.select(self.where))
@@ -44,13 +46,14 @@ class MassDamping(Effect):
 
 @final
 @attrs.frozen(eq=False)
-class _Drag(ForceCondition):
+class _Drag(PointwiseForce):
     label: str
     particles: Indices  # (k,)
-    drag: Array  # c m, (k,) [kg/s]
+    values: Array  # c m, (k, 1) [kg/s]
 
-    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
-        return -self.drag[:, None] * velocities[self.particles]
+    @staticmethod
+    def force(position: Vector, velocity: Vector, values: Vector) -> Vector:
+        return scaled(-values[0], velocity)
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         return {}

@@ -6,14 +6,13 @@ from typing import ClassVar, final
 
 import attrs
 
-from solidsph.dynamics import Dynamics
-from solidsph.interfaces.integrator import Integrator
-from solidsph.particles import State
+from solidsph.arrays import Scalar
+from solidsph.interfaces.integrator import PointwiseIntegrator
 
 
 @final
 @attrs.frozen
-class VelocityVerlet(Integrator):
+class VelocityVerlet(PointwiseIntegrator):
     """Half a kick, a drift, half a kick. Swope et al. (1982).
 
     Forces that depend on velocity see the one predicted with the old acceleration.
@@ -22,21 +21,10 @@ class VelocityVerlet(Integrator):
     order: ClassVar[int] = 2
     stability_limit: ClassVar[float] = 2.0
 
-    def start(self, state: State, dynamics: Dynamics, step_size: float) -> State:
-        response = dynamics.respond(state.time, state.positions, state.velocities)
-        return state.begun(accelerations=response.accelerations, applied=response.applied)
+    @staticmethod
+    def leap(velocity: Scalar, acceleration: Scalar, last: Scalar, step_size: float) -> Scalar:
+        return velocity + 0.5 * step_size * acceleration
 
-    def advance(self, state: State, dynamics: Dynamics, step_size: float) -> State:
-        time = state.time + step_size
-        half = state.velocities + 0.5 * step_size * state.accelerations
-        positions = dynamics.place(time, state.positions + step_size * half)
-        predicted = dynamics.carry(time, half + 0.5 * step_size * state.accelerations)
-        response = dynamics.respond(time, positions, predicted)
-        return state.advanced(
-            time=time,
-            positions=positions,
-            velocities=dynamics.carry(time, half + 0.5 * step_size * response.accelerations),
-            accelerations=response.accelerations,
-            applied=response.applied,
-            memory=state.memory,
-        )
+    @staticmethod
+    def arrive(mean_velocity: Scalar, acceleration: Scalar, step_size: float) -> Scalar:
+        return mean_velocity + 0.5 * step_size * acceleration

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import attrs
 
 from solidsph.arrays import Array
 from solidsph.body import Body
 from solidsph.interfaces.condition import StressCondition
+
+if TYPE_CHECKING:
+    from solidsph.dynamics import Dynamics
+    from solidsph.interfaces.integrator import Integrator
+    from solidsph.time_loop import TimeLoop
 
 
 @attrs.frozen(eq=False)
@@ -37,15 +43,30 @@ class InternalForces(ABC):
     def fields(self, displacements: Array) -> StressFields:
         """Deformation, stress and energy at the same displacements, for reports and records."""
 
+    def time_loop(self, dynamics: Dynamics, integrator: Integrator, step_size: float) -> TimeLoop:
+        """How steps under these forces are carried out; an engine may have a way of its own."""
+        from solidsph.time_loop import StepByStep  # which knows what forces are
+
+        return StepByStep(dynamics, integrator, step_size)
+
 
 class Engine(ABC):
     """Prepares bodies for fast evaluation; owns whatever arrays that takes."""
 
     @abstractmethod
     def prepare(
-        self, bodies: Sequence[Body], conditions: Sequence[StressCondition]
+        self,
+        bodies: Sequence[Body],
+        conditions: Sequence[StressCondition],
+        evaluations: int = 1,
     ) -> InternalForces:
         """The internal forces of `bodies`, which together hold all particles, in order.
+
+        Args:
+            bodies: what exerts the forces.
+            conditions: what changes the stress before they are formed.
+            evaluations: about how often the forces will be asked for, which preparation should
+                be in proportion to.
 
         Raises:
             BuildError: a formulation's operators cannot be formed on these particles.

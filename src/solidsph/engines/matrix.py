@@ -160,7 +160,10 @@ class MatrixEngine(Engine):
     """Sums as sparse matrix products."""
 
     def prepare(
-        self, bodies: Sequence[Body], conditions: Sequence[StressCondition]
+        self,
+        bodies: Sequence[Body],
+        conditions: Sequence[StressCondition],
+        evaluations: int = 1,
     ) -> InternalForces:
         parts: list[_FixedBody | _FollowedBody] = []
         count = 0

@@ -17,23 +17,30 @@ from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.formulation import Configuration
 from solidsph.smoothing import UNIT_SPHERE
 
-# Compilation takes about 5 s, and the matrix engine about 20 ns a pair more than the compiled one:
-# from here on it pays within some 5000 steps.
-_MANY_PAIRS = 50_000
+# What the matrix engine takes for a step and for each pair in it, and what compilation takes, all
+# [s], about; beside them the compiled engine's own steps are as good as free.
+_STEP, _PAIR, _COMPILATION = 1e-4, 25e-9, 10.0
+
+# Beyond so many pairs the matrices alone fill a gigabyte, however few steps there are.
+_MANY_PAIRS = 1e7
 
 
 @final
 @attrs.frozen
 class AutomaticEngine(Engine):
-    """The compiled engine where it pays: many pairs, and sums in the reference configuration."""
+    """The compiled engine where it pays: much work, and sums in the reference configuration."""
 
     def prepare(
-        self, bodies: Sequence[Body], conditions: Sequence[StressCondition]
+        self,
+        bodies: Sequence[Body],
+        conditions: Sequence[StressCondition],
+        evaluations: int = 1,
     ) -> InternalForces:
         constant = all(b.formulation.configuration is Configuration.REFERENCE for b in bodies)
-        many = sum(_expected_pairs(body) for body in bodies) > _MANY_PAIRS
-        engine = _compiled() if constant and many else MatrixEngine()
-        return engine.prepare(bodies, conditions)
+        pairs = sum(_expected_pairs(body) for body in bodies)
+        pays = evaluations * (_STEP + _PAIR * pairs) > _COMPILATION or pairs > _MANY_PAIRS
+        engine = _compiled() if constant and pays else MatrixEngine()
+        return engine.prepare(bodies, conditions, evaluations)
 
 
 def _expected_pairs(body: Body) -> float:

@@ -5,10 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
+from solidsph.arrays import Scalar
 from solidsph.particles import State
 
 if TYPE_CHECKING:
     from solidsph.dynamics import Dynamics
+
+MEAN_VELOCITY = "mean velocity of the step"
+"""What a pointwise integrator keeps in `memory`: (u_n - u_n-1) / dt of every particle [m/s]."""
 
 
 class Integrator(ABC):
@@ -27,3 +31,55 @@ class Integrator(ABC):
     @abstractmethod
     def advance(self, state: State, dynamics: Dynamics, step_size: float) -> State:
         """The state one time step [s] later."""
+
+
+class PointwiseIntegrator(Integrator):
+    """A scheme that is two formulas for each component of each particle's motion.
+
+    A step moves every particle by dt h with a mean velocity h, finds the accelerations where it
+    arrives, and from both the velocity there. The formulas are pure pointwise functions of numbers
+    or arrays, so an engine can carry out whole steps by itself.
+    """
+
+    @staticmethod
+    @abstractmethod
+    def leap(velocity: Scalar, acceleration: Scalar, last: Scalar, step_size: float) -> Scalar:
+        """h, from what holds before the step; `last` is the h of the step before [m/s]."""
+
+    @staticmethod
+    @abstractmethod
+    def arrive(mean_velocity: Scalar, acceleration: Scalar, step_size: float) -> Scalar:
+        """Velocity at the end of the step [m/s], from h and the acceleration there.
+
+        With the acceleration before the step it is the velocity that forces see.
+        """
+
+    def start(self, state: State, dynamics: Dynamics, step_size: float) -> State:
+        """The first state: the step before it is one that would have led to its velocity."""
+        response = dynamics.respond(state.time, state.positions, state.velocities)
+        a = response.accelerations
+        return state.begun(
+            accelerations=a,
+            applied=response.applied,
+            memory={MEAN_VELOCITY: state.velocities - 0.5 * step_size * a},
+        )
+
+    def advance(self, state: State, dynamics: Dynamics, step_size: float) -> State:
+        """The state one time step [s] later."""
+        time = state.time + step_size
+        a = state.accelerations
+        h = self.leap(state.velocities, a, state.memory[MEAN_VELOCITY], step_size)
+        free = state.positions + step_size * h
+        positions = dynamics.place(time, free)
+        # Only what was imposed: the difference of positions would bring their rounding back.
+        h = h + (positions - free) / step_size
+        predicted = dynamics.carry(time, self.arrive(h, a, step_size))
+        response = dynamics.respond(time, positions, predicted)
+        return state.advanced(
+            time=time,
+            positions=positions,
+            velocities=dynamics.carry(time, self.arrive(h, response.accelerations, step_size)),
+            accelerations=response.accelerations,
+            applied=response.applied,
+            memory={**state.memory, MEAN_VELOCITY: h},
+        )

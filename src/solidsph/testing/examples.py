@@ -17,7 +17,9 @@ TYPICAL: Mapping[str, Any] = {
     "shear_modulus": 1e6 / 2.6,  # [Pa], of the same solid
     "bulk_modulus": 1e6 / 1.2,  # [Pa], of the same solid
     "density": 1000.0,  # [kg/m^3]
+    "acceleration": {"x": "-9.81*cos(50*t)"},  # [m/s^2]
     "amplitude": 0.2,  # [-]
+    "rate": 20.0,  # [1/s]
     "seed": 1,
 }
 

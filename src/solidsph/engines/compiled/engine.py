@@ -6,14 +6,15 @@ from collections.abc import Iterator, Sequence
 from typing import Any, final
 
 import attrs
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from solidsph.arrays import Array
 from solidsph.body import Body
+from solidsph.dynamics import Dynamics
 from solidsph.engines.compiled.blocks import STRIDE, group
 from solidsph.engines.compiled.chunks import weighted_chunks
+from solidsph.engines.compiled.loop import compiled_loop
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux, no_law
 from solidsph.engines.compiled.rows import Rows, compressed, in_chunks
 from solidsph.engines.compiled.shares import (
@@ -23,16 +24,16 @@ from solidsph.engines.compiled.shares import (
     passes,
     shared,
     spread_pass,
+    thread_count,
 )
 from solidsph.engines.engine import Engine, InternalForces, StressFields
 from solidsph.engines.matrix import MatrixEngine
 from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.formulation import Configuration
+from solidsph.interfaces.integrator import Integrator
 from solidsph.neighbours import Pairs
 from solidsph.tensors import components_first, particles_first
-
-# Below this many particles, waking a second thread costs more than it does.
-_ALONE = 2000
+from solidsph.time_loop import TimeLoop
 
 
 @final
@@ -53,7 +54,10 @@ class CompiledEngine(Engine):
     )
 
     def prepare(
-        self, bodies: Sequence[Body], conditions: Sequence[StressCondition]
+        self,
+        bodies: Sequence[Body],
+        conditions: Sequence[StressCondition],
+        evaluations: int = 1,
     ) -> InternalForces:
         if any(b.formulation.configuration is not Configuration.REFERENCE for b in bodies):
             return MatrixEngine().prepare(bodies, conditions)
@@ -179,7 +183,7 @@ def _part(body: Body, law: Any, dtype: str) -> CompiledBody:
         weights = divergence.weights(pairs, weights, particles.volumes)[pairs.reversed_order()]
         force = compressed(in_chunks(pairs, weights), d, dtype, shortest_run)
         factors = np.ones(n)
-    threads = 1 if n < _ALONE else numba.get_num_threads()
+    threads = thread_count(n)
     gradient_shares = shared(gradient, d, dtype, threads)
     force_shares = gradient_shares if divergence.adjoint else shared(force, d, dtype, threads)
     return CompiledBody(
@@ -215,6 +219,12 @@ class CompiledForces(InternalForces):
     def bytes(self) -> int:
         """Memory of the arrays kept between evaluations."""
         return sum(part.bytes for part in self.parts)
+
+    def time_loop(self, dynamics: Dynamics, integrator: Integrator, step_size: float) -> TimeLoop:
+        try:
+            return compiled_loop(self, dynamics, integrator, step_size)
+        except NotCompilableError:
+            return super().time_loop(dynamics, integrator, step_size)
 
     def forces(self, time: float, displacements: Array) -> Array:
         forces = np.empty(displacements.shape)

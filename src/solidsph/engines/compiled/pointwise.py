@@ -49,7 +49,7 @@ def no_law(H: Tensor, params: tuple[float, ...]) -> Tensor:
 # By the identity of the functions: a process compiles each combination once.
 @cache
 def _flux(dimension: int, deformation_gradient: Any, first_piola: Any, flux: Any) -> Any:
-    F_of, P_of, T_of = (_registered(f) for f in (deformation_gradient, first_piola, flux))
+    F_of, P_of, T_of = (registered(f) for f in (deformation_gradient, first_piola, flux))
 
     numbers = _NUMBERS[dimension]
 
@@ -85,14 +85,18 @@ _NUMBERS = {1: _numbers_1, 2: _numbers_2, 3: _numbers_3}
 
 
 @cache
-def _registered(function: Callable[..., Any], depth: int = 0) -> Any:
-    """The same function, known to the compiler with every plain function that it calls."""
+def registered(function: Callable[..., Any], depth: int = 0) -> Any:
+    """The same function, known to the compiler with every plain function that it calls.
+
+    Raises:
+        NotCompilableError: it is no plain function, or calls itself.
+    """
     if not isinstance(function, FunctionType):
         raise NotCompilableError(f"{function!r} is not a plain function")
     if depth > _DEEPEST:
         raise NotCompilableError(f"{function.__qualname__} calls itself, or nests too deeply")
     for helper in _called(function):
-        _registered(helper, depth + 1)
+        registered(helper, depth + 1)
     return register_jitable(function)
 
 

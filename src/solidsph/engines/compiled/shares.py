@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
-from numba import njit, prange
+from numba import get_num_threads, njit, prange
 from numpy.typing import NDArray
 
 from solidsph.arrays import Indices
@@ -21,11 +21,19 @@ from solidsph.engines.compiled.blocks import STRIDE, group
 from solidsph.engines.compiled.rows import Rows
 from solidsph.engines.compiled.sweeps import spread_sweep, sweeps
 
+# Below this many particles, waking a second thread costs more than it does.
+_ALONE = 2000
+
 _ALIGNMENT = 64  # bytes of a cache line
 
 # OpenMP threads that have done their share spin until the others have too: where a core is busy
 # with something else, that costs time slices. Read when the first parallel loop starts.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+
+
+def thread_count(particles: int) -> int:
+    """How many threads go through so many particles."""
+    return 1 if particles < _ALONE else int(get_num_threads())
 
 
 @attrs.frozen(eq=False)

@@ -1,0 +1,174 @@
+"""Loads in the compiled loop: their forces, and the work that they do."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, prange, types
+from numba.core.errors import NumbaError
+from numba.np.unsafe.ndarray import to_fixed_tuple
+from numpy.typing import NDArray
+
+from solidsph.arrays import Array, Indices
+from solidsph.engines.compiled.pointwise import NotCompilableError, registered
+from solidsph.interfaces.condition import ForceCondition
+from solidsph.interfaces.declared import LinearForce, PointwiseForce, ScheduledForce
+
+
+class Load(NamedTuple):
+    """What the loop holds of one load; `own` is what its kind needs."""
+
+    particles: Indices  # (k,)
+    before: Array  # (k, d) force at the end of the last step [N]
+    work: Array  # (threads,) done so far, by thread [J]
+    own: Any
+
+
+class Scheduled(NamedTuple):
+    """Forces known ahead."""
+
+    table: Array  # (t, k, d) for the steps to come, or (1, k, d) for all of them [N]
+
+
+class Pointwise(NamedTuple):
+    """Forces by a formula."""
+
+    reference: Array  # (n, d) X [m]
+    values: Array  # (k, m)
+
+
+class Linear(NamedTuple):
+    """Forces by a constant sparse matrix, whose rows stand as its particles do."""
+
+    starts: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    weights: Array
+
+
+def load_pass(load: ForceCondition, dimension: int, threaded: bool) -> Any:
+    """Compiled (load, step, u, v, path, total): total += its force, work += that along `path`.
+
+    Raises:
+        NotCompilableError: the load is not of a declared kind, or its formula does not compile.
+    """
+    match load:
+        case ScheduledForce():
+            return _accounted(_scheduled(dimension), dimension, threaded)
+        case LinearForce():
+            return _accounted(_linear(dimension), dimension, threaded)
+        case PointwiseForce():
+            formula = _formula(load.force, dimension, load.values.shape[1])
+            return _accounted(
+                _pointwise(formula, dimension, load.values.shape[1]), dimension, threaded
+            )
+    raise NotCompilableError(f"load {load.label!r} is not of a declared kind")
+
+
+def load_data(
+    load: ForceCondition, reference: Array, times: Array, before: Array, threads: int
+) -> Load:
+    """What the loop holds of a load over steps that end at `times` (t,) [s].
+
+    `reference` is X (n, d) [m], and `before` (k, d) its force at the start [N].
+    """
+    match load:
+        case ScheduledForce():
+            own: Any = Scheduled(np.ascontiguousarray(load.schedule(times)))
+        case LinearForce():
+            matrix = load.matrix
+            own = Linear(matrix.indptr, matrix.indices, matrix.data)
+        case PointwiseForce():
+            own = Pointwise(reference, np.ascontiguousarray(load.values))
+        case _:
+            raise AssertionError("load_pass has refused it")
+    return Load(load.particles, before, np.zeros(threads), own)
+
+
+@cache
+def _accounted(fill: Any, dimension: int, threaded: bool) -> Any:
+    # Threads are handed arrays, or arguments that are tuples of them, but no tuple within a tuple.
+    @njit(parallel=threaded)
+    def add(particles, before, works, own, step, u, v, path, total):
+        threads, count = len(works), len(particles)
+        for t in prange(threads):
+            force = np.empty(dimension)
+            work = 0.0
+            for m in range(t * count // threads, (t + 1) * count // threads):
+                p = particles[m]
+                fill(own, step, m, p, u, v, force)
+                for i in range(dimension):
+                    work += 0.5 * (before[m, i] + force[i]) * path[p, i]
+                    before[m, i] = force[i]
+                    total[p, i] += force[i]
+            works[t] += work
+
+    @njit
+    def apply(load, step, u, v, path, total):
+        add(load.particles, load.before, load.work, load.own, step, u, v, path, total)
+
+    return apply
+
+
+@cache
+def _scheduled(dimension: int) -> Any:
+    @njit
+    def fill(own, step, m, p, u, v, force):
+        row = min(step, len(own.table) - 1)
+        for i in range(dimension):
+            force[i] = own.table[row, m, i]
+
+    return fill
+
+
+@cache
+def _linear(dimension: int) -> Any:
+    @njit
+    def fill(own, step, m, p, u, v, force):
+        force[:] = 0.0
+        for k in range(own.starts[m], own.starts[m + 1]):
+            q, weight = own.columns[k], own.weights[k]
+            for i in range(dimension):
+                force[i] -= weight * u[q, i]
+
+    return fill
+
+
+@cache
+def _pointwise(formula: Any, dimension: int, count: int) -> Any:
+    vector, moved = _VECTOR[dimension], _MOVED[dimension]
+
+    @njit
+    def fill(own, step, m, p, u, v, force):
+        values = to_fixed_tuple(own.values[m], count)
+        found = formula(moved(own.reference, u, p), vector(v, p), values)
+        for i in range(dimension):
+            force[i] = found[i]
+
+    return fill
+
+
+# Rows of arrays (n, d) as tuples: (values, p) -> values[p], and (X, u, p) -> X[p] + u[p].
+_VECTOR = {
+    1: njit(lambda a, p: (a[p, 0],)),
+    2: njit(lambda a, p: (a[p, 0], a[p, 1])),
+    3: njit(lambda a, p: (a[p, 0], a[p, 1], a[p, 2])),
+}
+_MOVED = {
+    1: njit(lambda a, b, p: (a[p, 0] + b[p, 0],)),
+    2: njit(lambda a, b, p: (a[p, 0] + b[p, 0], a[p, 1] + b[p, 1])),
+    3: njit(lambda a, b, p: (a[p, 0] + b[p, 0], a[p, 1] + b[p, 1], a[p, 2] + b[p, 2])),
+}
+
+
+@cache
+def _formula(force: Any, dimension: int, count: int) -> Any:
+    """The compiled formula of a pointwise force."""
+    formula = njit(registered(force))
+    vector = types.UniTuple(types.float64, dimension)
+    try:
+        formula.compile((vector, vector, types.UniTuple(types.float64, count)))
+    except NumbaError as cause:
+        raise NotCompilableError(str(cause)) from cause
+    return formula

@@ -1,0 +1,300 @@
+"""The compiled time loop: whole steps without Python between two outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple, final
+
+import attrs
+import numpy as np
+from numba import njit, prange, types
+from numba.core.errors import NumbaError
+
+from solidsph.arrays import Array
+from solidsph.dynamics import Dynamics
+from solidsph.engines.compiled.chain import chain
+from solidsph.engines.compiled.internal import Internal, internal_forces
+from solidsph.engines.compiled.loads import Load, load_data, load_pass
+from solidsph.engines.compiled.motions import (
+    Following,
+    MotionWords,
+    Scheduled,
+    motion_data,
+    motion_words,
+)
+from solidsph.engines.compiled.pointwise import NotCompilableError, registered
+from solidsph.engines.compiled.shares import thread_count
+from solidsph.interfaces.condition import ExtensionCondition
+from solidsph.interfaces.declared import ScheduledForce, ScheduledMotion
+from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
+from solidsph.particles import State
+from solidsph.time_loop import NOT_FINITE, StepError, TimeLoop
+
+if TYPE_CHECKING:
+    from solidsph.engines.compiled.engine import CompiledForces
+
+# Numbers in the tables of what varies in time, for the steps that go together.
+_TABLE = 1 << 18
+
+
+class _Moving(NamedTuple):
+    """Arrays that evolve, each (n, d)."""
+
+    u: Array  # displacement [m]
+    v: Array  # velocity [m/s]
+    a: Array  # acceleration [m/s^2]
+    h: Array  # mean velocity of the last step [m/s]
+    path: Array  # way of the last step [m]
+    total: Array  # force [N]
+
+
+def compiled_loop(
+    forces: CompiledForces, dynamics: Dynamics, integrator: Integrator, step_size: float
+) -> TimeLoop:
+    """The loop for these parts.
+
+    Raises:
+        NotCompilableError: one of the parts is not of a declared kind, or does not compile.
+    """
+    if not isinstance(integrator, PointwiseIntegrator):
+        raise NotCompilableError(f"integrator {type(integrator).__name__} is not pointwise")
+    particles = dynamics.particles
+    d, threads = particles.dimension, thread_count(particles.count)
+    internal = internal_forces(forces.parts, forces.conditions)
+    words = [motion_words(motion, d) for motion in dynamics.motions]
+    by_word = [tuple(one[k] for one in words) for k in range(len(MotionWords._fields))]
+    steps = _steps(
+        d,
+        threads > 1,
+        _formula(integrator.leap, 4),
+        _formula(integrator.arrive, 3),
+        internal.forces,
+        chain(tuple(load_pass(load, d, threads > 1) for load in dynamics.loads)),
+        MotionWords(*(chain(functions) for functions in by_word)),
+    )
+    return CompiledLoop(dynamics, step_size, internal, steps, threads)
+
+
+@final
+@attrs.frozen(eq=False)
+class CompiledLoop(TimeLoop):
+    """Steps by one compiled function."""
+
+    dynamics: Dynamics
+    step_size: float  # [s]
+    internal: Internal
+    steps: Any  # compiled
+    threads: int
+    most_steps: int = attrs.field(init=False)  # for which tables are made at once
+
+    @most_steps.default
+    def _within_memory(self) -> int:
+        two = np.array([0.0, self.step_size])
+        parts = [load.schedule(two) for load in self._scheduled_loads]
+        parts += [motion.schedule(two, k) for motion in self._scheduled_motions for k in range(3)]
+        width = sum(int(part[0].size) for part in parts if len(part) > 1)
+        return max(1, _TABLE // max(1, width))
+
+    @property
+    def _scheduled_loads(self) -> Sequence[ScheduledForce]:
+        return [c for c in self.dynamics.loads if isinstance(c, ScheduledForce)]
+
+    @property
+    def _scheduled_motions(self) -> Sequence[ScheduledMotion]:
+        return [c for c in self.dynamics.motions if isinstance(c, ScheduledMotion)]
+
+    def advance(self, state: State, stop: int) -> State:
+        dynamics, X = self.dynamics, self.dynamics.particles.positions
+        moving = _Moving(
+            u=state.positions - X,
+            v=state.velocities.copy(),
+            a=state.accelerations.copy(),
+            h=state.memory[MEAN_VELOCITY].copy(),
+            path=np.zeros_like(X),
+            total=np.zeros_like(X),
+        )
+        # Ghosts have no mass, and no equation of motion.
+        inverse_masses = np.zeros_like(dynamics.masses)
+        np.divide(1.0, dynamics.masses, out=inverse_masses, where=dynamics.masses > 0.0)
+        accounts = _Accounts.of(dynamics, state)
+        done = 0
+        while state.step + done < stop:
+            count = min(stop - state.step - done, self.most_steps)
+            numbers = np.arange(done + 1, done + count + 1, dtype=np.float64)
+            times = state.time + self.step_size * numbers
+            loads = accounts.loads(times, self.threads)
+            motions = accounts.motions(times)
+            carried_out = self.steps(
+                count,
+                self.step_size,
+                self.threads,
+                moving,
+                dynamics.masses,
+                inverse_masses,
+                self.internal.data,
+                loads,
+                motions,
+            )
+            done += carried_out
+            accounts.settle(loads, motions)
+            if not np.isfinite(moving.a.sum()):
+                break
+        time = state.time + self.step_size * done
+        end = State(
+            time=time,
+            step=state.step + done,
+            positions=X + moving.u,
+            velocities=moving.v,
+            accelerations=moving.a,
+            applied=accounts.applied(time, moving.u),
+            work=accounts.work,
+            memory={**state.memory, MEAN_VELOCITY: moving.h},
+        )
+        if not np.isfinite(moving.a.sum()):
+            raise StepError(end, NOT_FINITE)
+        return end
+
+
+@attrs.define(eq=False)
+class _Accounts:
+    """Forces and work of every load and motion, between the loop's arrays and those of State."""
+
+    dynamics: Dynamics
+    work: dict[str, float]  # by account [J]
+    load_forces: list[Array]  # (k, d) of each load, on its particles [N]
+    reactions: list[Array]  # (m,) of each motion [N]; nothing of one that ghosts follow by
+
+    @classmethod
+    def of(cls, dynamics: Dynamics, state: State) -> _Accounts:
+        """The accounts as a state holds them."""
+        u = state.positions - dynamics.particles.positions
+        loads = [state.applied[load.label][load.particles] for load in dynamics.loads]
+        # An account may hold more than the reaction: what ghosts of the same handler hand on.
+        handed = _handed_on(dynamics, state.time, u, loads)
+        reactions = [
+            (state.applied[motion.label] - handed.get(motion.label, 0.0))[motion.entries]
+            if isinstance(motion, ScheduledMotion)
+            else np.empty(0)
+            for motion in dynamics.motions
+        ]
+        return cls(dynamics, dict(state.work), loads, reactions)
+
+    def loads(self, times: Array, threads: int) -> tuple[Load, ...]:
+        """What the loop holds of the loads."""
+        X = self.dynamics.particles.positions
+        pairs = zip(self.dynamics.loads, self.load_forces, strict=True)
+        return tuple(load_data(load, X, times, before, threads) for load, before in pairs)
+
+    def motions(self, times: Array) -> tuple[Scheduled | Following, ...]:
+        """What the loop holds of the motions."""
+        pairs = zip(self.dynamics.motions, self.reactions, strict=True)
+        return tuple(motion_data(motion, times, before) for motion, before in pairs)
+
+    def settle(self, loads: Sequence[Load], motions: Sequence[Scheduled | Following]) -> None:
+        """Take back what the loop has done with them."""
+        conditions = (*self.dynamics.loads, *self.dynamics.motions)
+        for condition, part in zip(conditions, (*loads, *motions), strict=True):
+            self.work[condition.label] += float(part.work.sum())
+        # The arrays `before` are the ones handed out: the loop has written on them.
+
+    def applied(self, time: float, u: Array) -> Mapping[str, Array]:
+        """Force of every account on every particle, (n, d) [N], at displacements u (n, d)."""
+        dynamics = self.dynamics
+        applied = {c.label: np.zeros_like(u) for c in (*dynamics.loads, *dynamics.motions)}
+        for load, force in zip(dynamics.loads, self.load_forces, strict=True):
+            applied[load.label][load.particles] += force
+        for motion, reaction in zip(dynamics.motions, self.reactions, strict=True):
+            if isinstance(motion, ScheduledMotion):
+                applied[motion.label][motion.entries] += reaction
+        for label, force in _handed_on(dynamics, time, u, self.load_forces).items():
+            applied[label] += force
+        return applied
+
+
+def _handed_on(
+    dynamics: Dynamics, time: float, u: Array, load_forces: Sequence[Array]
+) -> Mapping[str, Array]:
+    """What ghosts take from themselves and give to those they follow, (n, d) [N] by account."""
+    extensions = [c for c in dynamics.motions if isinstance(c, ExtensionCondition)]
+    if not extensions:
+        return {}
+    with np.errstate(all="ignore"):
+        total = dynamics.internal.forces(time, u)
+    for load, force in zip(dynamics.loads, load_forces, strict=True):
+        total[load.particles] += force
+    handed = {c.label: np.zeros_like(u) for c in extensions}
+    for extension in extensions:
+        before = total.copy()
+        extension.return_forces(total)
+        handed[extension.label] += total - before
+    return handed
+
+
+@cache
+def _formula(function: Any, arguments: int) -> Any:
+    """A pointwise formula of numbers, compiled."""
+    formula = njit(registered(function))
+    try:
+        formula.compile((types.float64,) * arguments)
+    except NumbaError as cause:
+        raise NotCompilableError(str(cause)) from cause
+    return formula
+
+
+@cache
+def _steps(
+    dimension: int,
+    threaded: bool,
+    leap: Any,
+    arrive: Any,
+    internal: Any,
+    loads: Any,
+    motion: MotionWords,
+) -> Any:
+    move, hand_on, react = motion
+
+    @njit(parallel=threaded)
+    def drift(threads, dt, moving):
+        u, v, a, h, path, _ = moving
+        n = len(u)
+        for t in prange(threads):
+            for p in range(t * n // threads, (t + 1) * n // threads):
+                for i in range(dimension):
+                    mean = leap(v[p, i], a[p, i], h[p, i], dt)
+                    h[p, i] = mean
+                    path[p, i] = dt * mean
+                    u[p, i] += dt * mean
+                    v[p, i] = arrive(mean, a[p, i], dt)
+
+    @njit(parallel=threaded)
+    def kick(threads, dt, moving, inverse_masses):
+        _, v, a, h, _, total = moving
+        n = len(v)
+        sums = np.zeros(threads)
+        for t in prange(threads):
+            added = 0.0
+            for p in range(t * n // threads, (t + 1) * n // threads):
+                for i in range(dimension):
+                    a[p, i] = total[p, i] * inverse_masses[p]
+                    v[p, i] = arrive(h[p, i], a[p, i], dt)
+                    added += a[p, i]
+            sums[t] = added
+        return np.isfinite(sums.sum())
+
+    @njit
+    def steps(count, dt, threads, moving, masses, inverse_masses, bodies, load_parts, motion_parts):
+        u, v, a, h, path, total = moving
+        for step in range(count):
+            drift(threads, dt, moving)
+            move(motion_parts, step, dt, u, h, path, v)
+            internal(bodies, u, total)
+            loads(load_parts, step, u, v, path, total)
+            hand_on(motion_parts, total)
+            finite = kick(threads, dt, moving, inverse_masses)
+            react(motion_parts, step, masses, total, path, a, v)
+            if not finite:
+                return step + 1
+        return count
+
+    return steps

@@ -1,0 +1,156 @@
+"""Conditions that declare what they depend on, so that an engine can carry them out by itself.
+
+A condition may be any code that the time loop calls. One of these kinds is described by arrays and
+a pointwise formula instead; from that description follow both what the interface asks of it, here,
+and what an engine compiles into its own loop.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from solidsph.arrays import Array, Indices, Mask, Vector
+from solidsph.interfaces.condition import (
+    ExtensionCondition,
+    ForceCondition,
+    MotionCondition,
+    StressCondition,
+)
+
+
+class ScheduledMotion(MotionCondition):
+    """Determines motion as a function of time alone."""
+
+    @property
+    @abstractmethod
+    def shape(self) -> tuple[int, ...]:
+        """(n, d) of all particles."""
+
+    @property
+    @abstractmethod
+    def entries(self) -> tuple[Indices, Indices]:
+        """Particle (m,) and axis (m,) of every degree of freedom that it determines."""
+
+    @abstractmethod
+    def schedule(self, times: Array, derivative: int) -> Array:
+        """Values of these entries at `times` (t,) [s], (t, m); (1, m) if they are always the same.
+
+        Displacements for derivative 0, velocities for 1, accelerations for 2.
+        """
+
+    @property
+    def held(self) -> Mask:
+        held = np.zeros(self.shape, dtype=np.bool_)
+        held[self.entries] = True
+        return held
+
+    def impose(self, time: float, derivative: int, values: Array) -> None:
+        values[self.entries] = self.schedule(np.array([time]), derivative)[0]
+
+
+class LinearExtension(ExtensionCondition, StressCondition):
+    """Ghosts whose values are linear combinations of others', each component by itself.
+
+    u_i = s_i A u_i and T_ik = s_i s_k B T_ik, with signs s that turn components over.
+    """
+
+    @property
+    @abstractmethod
+    def shape(self) -> tuple[int, ...]:
+        """(n, d) of all particles."""
+
+    @property
+    @abstractmethod
+    def ghosts(self) -> Indices:
+        """Those that follow, (k,)."""
+
+    @property
+    @abstractmethod
+    def displacement(self) -> csr_array:
+        """A, (k, n)."""
+
+    @property
+    @abstractmethod
+    def stress(self) -> csr_array:
+        """B, (k, n)."""
+
+    @property
+    @abstractmethod
+    def signs(self) -> Array:
+        """s, (k, d)."""
+
+    @property
+    def held(self) -> Mask:
+        held = np.zeros(self.shape, dtype=np.bool_)
+        held[self.ghosts] = True
+        return held
+
+    def impose(self, time: float, derivative: int, values: Array) -> None:
+        values[self.ghosts] = self.signs * (self.displacement @ values)
+
+    def return_forces(self, forces: Array) -> None:
+        forces += self.displacement.T @ (self.signs * forces[self.ghosts])
+        forces[self.ghosts] = 0.0
+
+    def impose_stress(self, time: float, stress: Array) -> None:
+        for i, row in enumerate(stress):
+            for k, component in enumerate(row):
+                sign = self.signs[:, i] * self.signs[:, k]
+                component[self.ghosts] = sign * (self.stress @ component)
+
+
+class ScheduledForce(ForceCondition):
+    """Forces that are a function of time alone."""
+
+    @abstractmethod
+    def schedule(self, times: Array) -> Array:
+        """Forces on its particles at `times` (t,) [s], (t, k, d) [N]; (1, k, d) if they are always
+        the same."""
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        forces: Array = self.schedule(np.array([time]))[0]
+        return forces
+
+
+class PointwiseForce(ForceCondition):
+    """The force on a particle by its own position and velocity."""
+
+    @property
+    @abstractmethod
+    def values(self) -> Array:
+        """(k, m) m numbers for each of its particles, which the formula is handed."""
+
+    @staticmethod
+    @abstractmethod
+    def force(position: Vector, velocity: Vector, values: Vector) -> Vector:
+        """Force [N], a tuple of components; each argument is indexed by component."""
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        x, v = positions[self.particles], velocities[self.particles]
+        found = self.force(x.T, v.T, self.values.T)
+        return np.column_stack([np.broadcast_to(one, len(x)) for one in found])
+
+
+class LinearForce(ForceCondition):
+    """f = -K u, the same for every component of the displacement u = x - X of all particles."""
+
+    @property
+    @abstractmethod
+    def reference(self) -> Array:
+        """X, (n, d) [m]."""
+
+    @property
+    @abstractmethod
+    def matrix(self) -> csr_array:
+        """K, (n, n) [N/m]."""
+
+    @property
+    def particles(self) -> Indices:
+        return np.arange(len(self.reference))
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        forces: Array = -(self.matrix @ (positions - self.reference))
+        return forces

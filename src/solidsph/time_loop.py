@@ -1,0 +1,61 @@
+"""TimeLoop: how steps between two outputs are carried out."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import final
+
+import attrs
+import numpy as np
+
+from solidsph.dynamics import Dynamics
+from solidsph.errors import BuildError
+from solidsph.interfaces.integrator import Integrator
+from solidsph.particles import State
+
+
+class StepError(Exception):
+    """A step that cannot be gone on from; for whoever runs the loop, who knows what to say."""
+
+    def __init__(self, state: State, cause: str) -> None:
+        self.state = state
+        self.cause = cause
+        super().__init__(cause)
+
+
+class TimeLoop(ABC):
+    """Steps of one scene."""
+
+    @abstractmethod
+    def advance(self, state: State, stop: int) -> State:
+        """The state after `stop` steps in all.
+
+        Raises:
+            StepError: an acceleration is not finite, or the forces cannot be formed any more.
+        """
+
+
+@final
+@attrs.frozen(eq=False)
+class StepByStep(TimeLoop):
+    """One step after the other, as the parts themselves carry it out: it fits all of them."""
+
+    dynamics: Dynamics
+    integrator: Integrator
+    step_size: float  # [s]
+
+    def advance(self, state: State, stop: int) -> State:
+        while state.step < stop:
+            try:
+                # What overflows or is undefined shows as a value that is not finite, below.
+                with np.errstate(all="ignore"):
+                    state = self.integrator.advance(state, self.dynamics, self.step_size)
+            except BuildError as cause:  # a moving neighbourhood may stop determining a gradient
+                raise StepError(state, cause.problems[0]) from cause
+            # One sum tells whether any entry is not finite, at a fraction of a step's cost.
+            if not np.isfinite(state.accelerations.sum()):
+                raise StepError(state, NOT_FINITE)
+        return state
+
+
+NOT_FINITE = "the acceleration is not finite"

@@ -1,0 +1,259 @@
+"""The compiled time loop: the same steps as those of the parts themselves, and its own limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import attrs
+import numpy as np
+import pytest
+
+from solidsph import DivergedError, Simulation, registry
+from solidsph.arrays import Array, Indices, Vector
+from solidsph.builder import Builder
+from solidsph.engines.compiled.loop import CompiledLoop
+from solidsph.interfaces.condition import ForceCondition, Observation
+from solidsph.interfaces.declared import PointwiseForce
+from solidsph.interfaces.effect import Effect
+from solidsph.particles import State
+from solidsph.testing import example_part
+from solidsph.time_loop import StepByStep, StepError
+from tests.scenes import box
+
+STEPS = 25
+
+# Relative to the largest value. Positions of size 1 m carry displacements of a hundredth of that:
+# rounding of the one is 1e-14 of the other, and each step adds its own.
+ROUNDING = 1e-12
+
+
+def stretched(builder: Builder) -> Builder:
+    """Set in motion so that every stress and every speed is there."""
+    d = len(builder.scene().bodies["block"].shape.get("lengths", [1.0]))
+    field = {"x": "0.05*X", "y": "-0.02*X*Y", "z": "0.03*Y*Z"}
+    speed = {"x": "3*sin(2*X)", "y": "2*X", "z": "-Y"}
+    names = "xyz"[:d]
+    return builder.initial(
+        displacement={k: field[k] for k in names}, velocity={k: speed[k] for k in names}
+    )
+
+
+def loops(builder: Builder) -> tuple[Simulation, CompiledLoop, StepByStep]:
+    simulation = stretched(builder.engine("compiled")).build()
+    loop = simulation.time_loop()
+    assert isinstance(loop, CompiledLoop)
+    parts = simulation.dynamics, simulation.integrator, simulation.step_size
+    return simulation, loop, StepByStep(*parts)
+
+
+def assert_same(one: State, other: State, simulation: Simulation) -> None:
+    X = simulation.particles.positions
+    assert one.step == other.step
+    assert one.time == pytest.approx(other.time, rel=1e-14)
+    arrays = {
+        "displacements": (one.positions - X, other.positions - X),
+        "velocities": (one.velocities, other.velocities),
+        "accelerations": (one.accelerations, other.accelerations),
+        **{name: (one.memory[name], other.memory[name]) for name in other.memory},
+    }
+    for name, (found, expected) in arrays.items():
+        assert np.abs(found - expected).max() <= ROUNDING * np.abs(expected).max(), name
+    assert one.applied.keys() == other.applied.keys()
+    # An account may be rounding alone, beside the forces and the energy that are there.
+    masses = simulation.dynamics.masses[:, None]
+    force = np.abs(masses * other.accelerations).max()
+    energy = 0.5 * float(np.sum(masses * other.velocities**2))
+    for name, expected in other.applied.items():
+        allowed = ROUNDING * max(force, np.abs(expected).max())
+        assert np.abs(one.applied[name] - expected).max() <= allowed, name
+    for name, work in other.work.items():
+        assert abs(one.work[name] - work) <= ROUNDING * max(energy, abs(work)), name
+
+
+def assert_agree(builder: Builder) -> None:
+    simulation, loop, by_step = loops(builder)
+    state = simulation.start()
+    # In two stretches: what goes from one to the other goes through State.
+    ours = loop.advance(loop.advance(state, STEPS // 2), STEPS)
+    theirs = by_step.advance(state, STEPS)
+    assert_same(ours, theirs, simulation)
+
+
+@pytest.mark.parametrize("integrator", registry.names("integrators"))
+def test_every_integrator_and_condition_of_a_bar(integrator: str) -> None:
+    assert_agree(
+        box(1, 24)
+        .boundary("clamp", where="left")
+        .boundary("prescribed-motion", where="right", displacement={"x": "0.05 + 0.01*sin(900*t)"})
+        .boundary("traction", where="right", traction={"x": "1e3*min(t/1e-3, 1)"})
+        .effect("body-force", acceleration={"x": "X + 50*t"})
+        .effect("mass-damping", rate=200.0)
+        .effect("hourglass-control")
+        .integrator(integrator)
+    )
+
+
+@pytest.mark.parametrize("effect", registry.names("effects"))
+def test_every_effect(effect: str) -> None:
+    assert_agree(box(2, 7).effect(example_part("effects", effect)))
+
+
+@pytest.mark.parametrize("divergence", registry.names("divergences"))
+def test_ghosts_of_a_symmetric_body(divergence: str) -> None:
+    """Their motion, their forces handed on, and their stress where it acts."""
+    ghosts = {
+        "type": "lattice",
+        "on_boundary": True,
+        "ghosts": 3,
+        "ghost_faces": ["left", "bottom"],
+    }
+    assert_agree(
+        box(2, 8, discretisation=ghosts)
+        .formulation("total-lagrangian", divergence=divergence)
+        .boundary("symmetry", axis="x")
+        .boundary("symmetry", axis="y")
+    )
+
+
+def test_the_paper_s_bar() -> None:
+    """Plain sums, ghosts beyond both ends, a smoothed extension."""
+    ghosts = {"type": "lattice", "on_boundary": True, "ghosts": 3}
+    assert_agree(
+        box(1, 24, discretisation=ghosts)
+        .formulation("total-lagrangian", gradient="difference", divergence="plain")
+        .boundary("clamp", where="left")
+        .boundary("ghost-extension")
+    )
+
+
+def test_several_bodies_and_threads() -> None:
+    """Enough particles for two threads to share."""
+    builder = box(3, 14).body(
+        "other",
+        shape={"type": "box", "lengths": [0.4, 0.4, 0.4], "origin": [3.0, 0.0, 0.0]},
+        spacing=0.1,
+        material={
+            "type": "saint-venant-kirchhoff",
+            "youngs_modulus": 3e6,
+            "poissons_ratio": 0.2,
+            "density": 900.0,
+        },
+    )
+    builder = builder.boundary("clamp", where="left").effect("mass-damping", rate=50.0)
+    simulation, loop, by_step = loops(builder)
+    state = simulation.start()
+    ours = loop.advance(state, 4)
+    assert_same(ours, by_step.advance(state, 4), simulation)
+    again = loop.advance(state, 4)
+    assert np.array_equal(ours.positions, again.positions)
+    assert ours.work == again.work
+
+
+def test_tables_may_be_made_in_portions() -> None:
+    """What varies in time is known some steps ahead; how many changes nothing."""
+    builder = (
+        box(1, 24)
+        .boundary("prescribed-motion", where="right", displacement={"x": "0.05 + 0.01*sin(900*t)"})
+        .effect("body-force", acceleration={"x": "50*t"})
+    )
+    simulation, loop, _ = loops(builder)
+    assert 10 * STEPS < loop.most_steps < 1 << 18
+    short = attrs.evolve(loop)
+    object.__setattr__(short, "most_steps", 3)
+    state = simulation.start()
+    one, other = loop.advance(state, STEPS), short.advance(state, STEPS)
+    for name in ("positions", "velocities", "accelerations"):
+        assert np.array_equal(getattr(one, name), getattr(other, name))
+    assert_same(one, other, simulation)
+
+
+def test_a_run_by_the_loop_ends_where_a_run_by_steps_does() -> None:
+    builder = stretched(box(2, 7).boundary("clamp", where="left")).outputs(3)
+    ends = [builder.engine(name).build().run().state for name in ("matrix", "compiled")]
+    assert ends[0].step == ends[1].step
+    assert np.allclose(ends[0].positions, ends[1].positions, rtol=0.0, atol=1e-12)
+
+
+def test_it_stops_at_the_step_that_goes_wrong() -> None:
+    # A speed at which neighbours pass each other within some steps.
+    builder = box(1, 24).initial(velocity={"x": "-40000*(X - 0.5)"})
+    simulation = builder.engine("compiled").build()
+    state = simulation.start()
+    parts = simulation.dynamics, simulation.integrator, simulation.step_size
+    with pytest.raises(StepError) as ours:
+        simulation.time_loop().advance(state, 1000)
+    with pytest.raises(StepError) as theirs:
+        StepByStep(*parts).advance(state, 1000)
+    assert ours.value.state.step == theirs.value.state.step < 1000
+    with pytest.raises(DivergedError, match="not finite"):
+        simulation.run()
+
+
+@attrs.frozen
+class Spring(Effect):
+    """An effect of a third party: a formula, and nothing about any compiler."""
+
+    def bind(self, setting, label: str) -> ForceCondition:
+        return _Springs(label, setting.select("all"), np.ones((setting.particles.count, 1)))
+
+    def arrays(self, setting) -> Mapping[str, int]:
+        return {}
+
+    def damping_rate(self) -> float:
+        return 0.0
+
+    def stiffness_rate(self, bodies) -> float:
+        return 100.0
+
+
+@attrs.frozen(eq=False)
+class _Springs(PointwiseForce):
+    label: str
+    particles: Indices
+    values: Array
+
+    @staticmethod
+    def force(position: Vector, velocity: Vector, values: Vector) -> Vector:
+        return (-values[0] * np.sin(position[0]), 0.0)
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {}
+
+
+def test_an_effect_of_one_s_own_goes_into_the_loop() -> None:
+    assert_agree(box(2, 7).effect(Spring()))
+
+
+@attrs.frozen(eq=False)
+class _Opaque(ForceCondition):
+    label: str
+    particles: Indices
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return -10.0 * velocities[self.particles]
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {}
+
+
+@attrs.frozen
+class Opaque(Spring.__base__):
+    """An effect that is any code."""
+
+    def bind(self, setting, label: str) -> ForceCondition:
+        return _Opaque(label, setting.select("all"))
+
+    def arrays(self, setting) -> Mapping[str, int]:
+        return {}
+
+    def damping_rate(self) -> float:
+        return 0.0
+
+    def stiffness_rate(self, bodies) -> float:
+        return 0.0
+
+
+def test_what_declares_nothing_is_carried_out_step_by_step() -> None:
+    simulation = box(1, 24).effect(Opaque()).engine("compiled").build()
+    assert isinstance(simulation.time_loop(), StepByStep)
+    simulation.run()
