@@ -337,14 +337,18 @@ def test_a_multiple_that_rounding_hides_keeps_the_spacing() -> None:
     np.testing.assert_array_equal(particles.spacings, 0.1)
 
 
-def test_particles_run_along_the_last_axis_with_ghosts_last() -> None:
-    particles = Lattice(ghosts=1).particles(Box([0.3, 0.2]), 0.1)
-    real = particles.positions[:6]
-    np.testing.assert_allclose(real[:, 0], [0.05, 0.05, 0.15, 0.15, 0.25, 0.25])
-    np.testing.assert_allclose(real[:, 1], [0.05, 0.15] * 3)
-    np.testing.assert_array_equal(particles.ghosts, np.arange(20) >= 6)
-    ghosts = particles.positions[6:]
-    np.testing.assert_array_equal(np.lexsort((ghosts[:, 1], ghosts[:, 0])), np.arange(14))
+def test_particles_run_along_the_longest_axis_with_ghosts_last() -> None:
+    for lengths, fast in ([0.3, 0.2], 0), ([0.2, 0.3], 1), ([0.3, 0.3], 1):
+        slow = 1 - fast
+        particles = Lattice(ghosts=1).particles(Box(lengths), 0.1)
+        real = particles.positions[~particles.ghosts]
+        count = round(lengths[fast] / 0.1)
+        np.testing.assert_allclose(real[:count, fast], 0.05 + 0.1 * np.arange(count))
+        np.testing.assert_allclose(real[:count, slow], 0.05)
+        assert not particles.ghosts[: len(real)].any()
+        ghosts = particles.positions[particles.ghosts]
+        in_order = np.lexsort((ghosts[:, fast], ghosts[:, slow]))
+        np.testing.assert_array_equal(in_order, np.arange(len(ghosts)))
 
 
 def test_symmetric_shapes_have_symmetric_volumes_and_areas() -> None:

@@ -20,7 +20,11 @@ _CHUNK = 1 << 15
 
 @attrs.frozen(eq=False)
 class Grid:
-    """Lattice points, numbered with the last axis fastest, and the cell around each."""
+    """Lattice points, and the cell around each.
+
+    They are numbered along the axis with most of them first, so that as many as can be follow each
+    other with the same neighbourhood: engines treat such a run as one.
+    """
 
     lower: Array  # (d,) lower corner of the bounding box [m]
     lengths: Array  # (d,) of the bounding box [m]
@@ -40,6 +44,16 @@ class Grid:
         return math.prod(self.counts)
 
     @property
+    def order(self) -> tuple[int, ...]:
+        """Axes from the slowest in the numbering to the fastest; of equal ones the last is."""
+        return tuple(sorted(range(len(self.counts)), key=lambda axis: self.counts[axis]))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lattice points along the axes in that order."""
+        return tuple(self.counts[axis] for axis in self.order)
+
+    @property
     def cell_volume(self) -> float:
         """Volume of one cell [m^d]."""
         return float(np.prod(self.steps))
@@ -51,7 +65,8 @@ class Grid:
 
     def positions(self, numbers: Indices) -> Array:
         """Lattice points of these `numbers` (n,), (n, d) [m]."""
-        index = np.stack(np.unravel_index(numbers, self.counts), axis=1)
+        index = np.stack(np.unravel_index(numbers, self.shape), axis=1)
+        index = index[:, np.argsort(self.order)]
         # One rounding less than with the step: the last point is on the far face exactly.
         result: Array = self.lower + (index + self.first) / np.array(self.cells) * self.lengths
         return result
@@ -60,11 +75,12 @@ class Grid:
         """Number of the cell that holds each of `points` (n, d), or the nearest one, (n,)."""
         index = np.rint((points - self.lower) / self.steps - self.first).astype(np.intp)
         index = np.clip(index, 0, np.array(self.counts) - 1)
-        return np.asarray(np.ravel_multi_index(tuple(index.T), self.counts), dtype=np.intp)
+        index = index[:, self.order]
+        return np.asarray(np.ravel_multi_index(tuple(index.T), self.shape), dtype=np.intp)
 
     def near(self, marked: Mask, layers: int) -> Mask:
         """Points at most so many `layers` of cells away from one that is `marked`, (size,)."""
-        grown = marked.reshape(self.counts)
+        grown = marked.reshape(self.shape)
         for axis in range(grown.ndim):
             along = np.moveaxis(grown, axis, 0)
             wider = along.copy()
@@ -76,8 +92,8 @@ class Grid:
 
     def completed(self, occupied: Mask) -> Array:
         """What part of each cell has `occupied` points on both sides along every axis, (size,)."""
-        filled = occupied.reshape(self.counts)
-        part = np.ones(self.counts)
+        filled = occupied.reshape(self.shape)
+        part = np.ones(self.shape)
         for axis in range(filled.ndim):
             along, own = np.moveaxis(filled, axis, 0), np.moveaxis(part, axis, 0)
             own[1:] *= np.where(along[:-1], 1.0, 0.5)

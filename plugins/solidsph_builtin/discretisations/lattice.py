@@ -24,8 +24,8 @@ class Lattice(Discretisation):
 
     The volume of a particle is that part of the shape which is nearest to it: half a cell on a
     face with `on_boundary`, a quarter or an eighth on an edge or in a corner. The total is exact
-    where the shape knows its own. Particles come in the order of their coordinates, the last
-    axis running fastest, ghosts after all others.
+    where the shape knows its own. Particles come in the order of their coordinates, the axis with
+    most of them running fastest, ghosts after all others.
 
     `ghosts` adds so many layers of lattice points beyond the surface, in holes as well, or only
     behind some faces: with `ghost_faces = ["left", "bottom"]` at those two and their corner. Each
