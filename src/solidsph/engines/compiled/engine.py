@@ -14,6 +14,7 @@ from solidsph.arrays import Array
 from solidsph.body import Body
 from solidsph.engines.compiled.blocks import STRIDE, group
 from solidsph.engines.compiled.chunks import weighted_chunks
+from solidsph.engines.compiled.moving import MovingBody, moving_body
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux, no_law
 from solidsph.engines.compiled.rows import Rows, compressed, in_chunks
 from solidsph.engines.compiled.shares import (
@@ -40,10 +41,11 @@ _ALONE = 2000
 class CompiledEngine(Engine):
     """Sums over rows of weights, with the parts' pointwise functions compiled into the loops.
 
-    Where a part cannot be compiled, or the sums are taken in the current configuration, the matrix
-    engine does the work: for all bodies, because conditions see the stress of all at once.
+    Where a material or a formulation cannot be compiled, the matrix engine does the work: for all
+    bodies, because conditions see the stress of all at once.
 
-    The sums themselves are kept in `precision`. Displacements, and not positions, go into them, so
+    The sums themselves are kept in `precision`, if they are taken in the reference configuration:
+    what moves is summed in double precision. Displacements, and not positions, go into them, so
     that single precision is precision of strain, as long as a body does not move by many times its
     spacing; F, the stress and what the seam hands out are in double precision.
     """
@@ -55,14 +57,17 @@ class CompiledEngine(Engine):
     def prepare(
         self, bodies: Sequence[Body], conditions: Sequence[StressCondition]
     ) -> InternalForces:
-        if any(b.formulation.configuration is not Configuration.REFERENCE for b in bodies):
-            return MatrixEngine().prepare(bodies, conditions)
         try:
             laws = [compiled_flux(b.formulation, b.material, b.smoothing.dimension) for b in bodies]
         except NotCompilableError:
             return MatrixEngine().prepare(bodies, conditions)
-        parts = [_part(b, law, self.precision) for b, law in zip(bodies, laws, strict=True)]
+        parts = [self._part(b, law) for b, law in zip(bodies, laws, strict=True)]
         return CompiledForces(tuple(parts), tuple(conditions))
+
+    def _part(self, body: Body, law: Any) -> CompiledBody | MovingBody:
+        if body.formulation.configuration is Configuration.REFERENCE:
+            return _part(body, law, self.precision)
+        return moving_body(body, law)
 
 
 @final
@@ -204,7 +209,7 @@ def _part(body: Body, law: Any, dtype: str) -> CompiledBody:
 class CompiledForces(InternalForces):
     """Internal forces by compiled sweeps."""
 
-    parts: Sequence[CompiledBody]
+    parts: Sequence[CompiledBody | MovingBody]
     conditions: Sequence[StressCondition]
 
     @property
