@@ -31,4 +31,5 @@ class Corrected(PointwiseGradient):
     def correction(moment: Tensor) -> Tensor:
         K = inverse_transpose(moment)
         condition = np.sqrt(contraction(moment, moment) * contraction(K, K))
-        return scale(np.where(condition < _WORST_CONDITION, 1.0, np.nan), K)
+        # 1 where it is to be trusted, and infinite elsewhere.
+        return scale(1.0 / (condition < _WORST_CONDITION), K)

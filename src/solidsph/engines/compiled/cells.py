@@ -1,4 +1,4 @@
-"""Neighbours of moving particles, by cells; a list with a margin serves many steps.
+"""Near pairs of moving particles, by cells; a list with a margin serves many steps.
 
 The pairs are those of `solidsph.neighbours`, in the same order and with the same bits, whenever
 the list was made: each is tested anew at every step, on the square of its distance as the k-d tree
@@ -17,8 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices
-from solidsph.neighbours import Pairs
+from solidsph.arrays import Array, Indices, Mask
 
 # The list holds pairs up to this much beyond the support radius. A wider margin lasts longer, but
 # in 3D a step tests a third more pairs than there are already.
@@ -35,32 +34,21 @@ _WIDER = 1.001
 # With more cells than these for a particle, most of them empty, the k-d tree is the better list.
 _MOST_CELLS = 8
 
+# Coordinates from here on are as good as infinite: their squares no longer are numbers [m].
+_FURTHEST = 1e150
 
-class Neighbours(NamedTuple):
-    """Ordered pairs in rows, as in `Pairs`, for compiled loops; arrays may be longer than m."""
 
-    starts: Indices  # (n + 1,) row p is starts[p] : starts[p + 1]; the last is m
-    own: Indices  # (n,) place of the pair (p, p)
-    columns: NDArray[np.int32]  # (m,)
-    reverse: Indices  # (m,) place of (q, p) for (p, q)
-    distances: Array  # (m,) [m]
+class Near(NamedTuple):
+    """Pairs p < q, once each: those of p stand together, q rising. Arrays may be longer than k."""
+
+    starts: Indices  # (n + 1,) those of p are starts[p] : starts[p + 1]; the last is k
+    columns: NDArray[np.int32]  # (k,) q
+    distances: Array  # (k,) [m]
 
     @property
-    def count(self) -> int:
-        """Number of ordered pairs m."""
+    def pair_count(self) -> int:
+        """Number of pairs k."""
         return int(self.starts[-1])
-
-    def pairs(self, positions: Array) -> Pairs:
-        """The same for array functions."""
-        rows = np.repeat(np.arange(len(positions)), np.diff(self.starts))
-        columns = self.columns[: self.count].astype(np.intp)
-        return Pairs(
-            starts=self.starts,
-            rows=rows,
-            columns=columns,
-            offsets=positions[columns] - positions[rows],
-            distances=self.distances[: self.count],
-        )
 
 
 @final
@@ -69,85 +57,73 @@ class NeighbourSearch:
     """Finds neighbours at positions that change little from one call to the next.
 
     What it keeps between calls saves time and has no influence on what it finds. A particle whose
-    position is not finite has no neighbour but itself.
+    position is not finite, or as good as infinite, has no neighbours.
     """
 
     radius: float  # [m]
-    made_at: Array = attrs.field(init=False)  # (n, d) positions of the list below
-    # Pairs (p, q) with p < q and less than the margin beyond the radius: q rising, in rows
-    starts: Indices = attrs.field(init=False)
-    columns: NDArray[np.int32] = attrs.field(init=False)
-    _found: Neighbours = attrs.field(init=False)
-    _near: NDArray[np.int32] = attrs.field(init=False)
-    _distances: Array = attrs.field(init=False)
+    _made_at: Array = attrs.field(init=False)  # (n, d) positions of the list
+    _list: Near = attrs.field(init=False)  # pairs up to the margin beyond the radius
+    _found: Near = attrs.field(init=False)
 
     def __attrs_post_init__(self) -> None:
-        self.made_at = np.empty((0, 0))
+        self._made_at = np.empty((0, 0))
+        none = np.empty(0, np.int32)
+        self._list = self._found = Near(np.zeros(1, np.intp), none, np.empty(0))
 
-    def neighbours(self, positions: Array) -> Neighbours:
+    def near(self, positions: Array) -> Near:
         """All pairs at `positions` (n, d); the arrays are overwritten by the next call."""
-        d = positions.shape[1]
-        loops = search_loops(d)
-        stale = positions.shape != self.made_at.shape
-        if stale or loops.moved(positions, self.made_at, 0.5 * _SPENT * _MARGIN * self.radius):
+        loops = search_loops(positions.shape[1])
+        stale = positions.shape != self._made_at.shape
+        if stale or loops.moved(positions, self._made_at, 0.5 * _SPENT * _MARGIN * self.radius):
             self._make_list(positions)
-        loops.test(
-            positions,
-            self.radius,
-            self.starts,
-            self.columns,
-            self._near,
-            self._distances,
-            self._found,
-        )
+        loops.test(positions, self.radius, self._list, self._found)
         return self._found
+
+    @property
+    def list_origin(self) -> Array:
+        """Positions at which the list in use was made, (n, d)."""
+        return self._made_at
 
     @property
     def bytes(self) -> int:
         """Memory of all arrays."""
-        own = (self.made_at, self.starts, self.columns, self._near, self._distances)
-        return sum(array.nbytes for array in (*own, *self._found))
+        return self._made_at.nbytes + sum(array.nbytes for array in (*self._list, *self._found))
 
     def _make_list(self, positions: Array) -> None:
         n = len(positions)
-        self.made_at = positions.copy()
-        self.starts, self.columns = candidates(positions, (1.0 + _MARGIN) * self.radius)
-        most = len(self.columns)
-        if not hasattr(self, "_near") or len(self._found.own) != n or len(self._near) <= most:
-            room = most + most // 8 + 1  # so that a list a little longer needs no other arrays
-            self._near, self._distances = np.empty(room, np.int32), np.empty(room)
-            self._found = Neighbours(
-                starts=np.empty(n + 1, np.intp),
-                own=np.empty(n, np.intp),
-                columns=np.empty(n + 2 * room, np.int32),
-                reverse=np.empty(n + 2 * room, np.intp),
-                distances=np.empty(n + 2 * room),
-            )
+        self._made_at = positions.copy()
+        starts, columns = candidates(positions, (1.0 + _MARGIN) * self.radius)
+        self._list = Near(starts, columns, np.empty(0))  # distances are asked for when they count
+        most = len(columns) + 1  # the loop writes a pair before it knows whether it counts
+        if len(self._found.starts) != n + 1 or len(self._found.columns) < most:
+            room = most + most // 8  # so that a list a little longer needs no other arrays
+            self._found = Near(np.empty(n + 1, np.intp), np.empty(room, np.int32), np.empty(room))
 
 
 def candidates(positions: Array, radius: float) -> tuple[Indices, NDArray[np.int32]]:
     """Pairs p < q no further apart than `radius`: where rows begin (n + 1,), and q rising (k,)."""
     n, d = positions.shape
-    finite = np.isfinite(positions).all(axis=1)
+    finite: Mask = np.all(np.abs(positions) < _FURTHEST, axis=1)
     if not finite.any():
         return np.zeros(n + 1, np.intp), np.empty(0, np.int32)
     width = _WIDER * radius
+    low, high = positions[finite].min(axis=0), positions[finite].max(axis=0)
+    # A layer of empty cells all round, so that every cell has all its neighbours.
+    cells = np.floor((high - low) / width) + 3.0
     with np.errstate(over="ignore"):
-        low, high = positions[finite].min(axis=0), positions[finite].max(axis=0)
-        # A layer of empty cells all round, so that every cell has all its neighbours.
-        cells = np.floor((high - low) / width) + 3.0
         few = np.prod(cells) <= _MOST_CELLS * n + 5**d
     if not few:
         return _by_tree(positions, finite, radius)
     strides = np.cumprod([1, *cells[:0:-1]])[::-1].astype(np.intp)
     around = np.array(list(product((-1, 0, 1), repeat=d)), dtype=np.intp) @ strides
     total = int(np.prod(cells))
-    return search_loops(d).by_cells(positions, finite, radius, low, width, strides, around, total)
+    starts, columns = search_loops(d).by_cells(
+        positions, finite, radius, low, width, strides, around, total
+    )
+    return starts, columns
 
 
-def _by_tree(
-    positions: Array, finite: NDArray[np.bool_], radius: float
-) -> tuple[Indices, NDArray[np.int32]]:
+def _by_tree(positions: Array, finite: Mask, radius: float) -> tuple[Indices, NDArray[np.int32]]:
     place = np.flatnonzero(finite)
     ends = np.sort(cKDTree(positions[finite]).query_pairs(radius, output_type="ndarray"), axis=1)
     p, q = place[ends[:, 0]], place[ends[:, 1]]
@@ -161,7 +137,7 @@ class SearchLoops(NamedTuple):
 
     moved: Any  # (positions, made_at, limit) -> whether a particle has moved further
     by_cells: Any  # (positions, finite, radius, low, width, strides, around, total) -> starts, q
-    test: Any  # (positions, radius, starts, columns, near, distances, found): found = neighbours
+    test: Any  # (positions, radius, list, found): found = those of the list within the radius
 
 
 @cache
@@ -181,8 +157,9 @@ def search_loops(dimension: int) -> SearchLoops:
     @njit
     def moved(x, made_at, limit):
         for p in range(len(x)):
-            if not square(x, p, made_at, p) <= limit * limit:  # not a number has moved too
-                return True
+            if square(x, p, made_at, p) <= limit * limit:
+                continue
+            return True  # what is not a number has moved too
         return False
 
     @njit
@@ -229,43 +206,16 @@ def search_loops(dimension: int) -> SearchLoops:
                         cursor[q] += 1
 
     @njit
-    def test(x, radius, starts, columns, near, distances, found):
-        n, k = len(x), 0
-        own, ends = found.own, found.starts
-        own[:] = 0
-        for p in range(n):
-            for c in range(starts[p], starts[p + 1]):
-                q = columns[c]
+    def test(x, radius, listed, found):
+        k = 0
+        found.starts[0] = 0
+        for p in range(len(x)):
+            for c in range(listed.starts[p], listed.starts[p + 1]):
+                q = listed.columns[c]
                 apart = square(x, p, x, q)
                 # Written in any case and counted if near: nothing to mispredict.
-                near[k], distances[k] = q, apart
-                inside = np.intp(apart <= radius * radius)
-                k += inside
-                own[q] += inside
-            ends[p + 1] = k
-        # Neighbours before p come first in its row, then p, then those after it.
-        cursor = np.empty(n, np.intp)
-        ends[0] = total = 0
-        before = 0
-        for p in range(n):
-            after = ends[p + 1] - before
-            before = ends[p + 1]
-            cursor[p] = total
-            own[p] += total
-            total = own[p] + 1 + after
-            ends[p + 1] = total
-        # Rows are visited in rising order, so those before q arrive in rising order too.
-        k = 0
-        for p in range(n):
-            here = own[p]
-            found.columns[here], found.reverse[here] = p, here
-            found.distances[here] = np.sqrt(square(x, p, x, p))  # 0, or not a number
-            for here in range(own[p] + 1, ends[p + 1]):
-                q, r = near[k], np.sqrt(distances[k])
-                back = cursor[q]
-                cursor[q] += 1
-                found.columns[here], found.reverse[here], found.distances[here] = q, back, r
-                found.columns[back], found.reverse[back], found.distances[back] = p, here, r
-                k += 1
+                found.columns[k], found.distances[k] = q, np.sqrt(apart)
+                k += int(apart <= radius * radius)
+            found.starts[p + 1] = k
 
     return SearchLoops(moved, by_cells, test)

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 from numba import njit, types
 
 from solidsph.arrays import Array
-from solidsph.engines.compiled.cells import Neighbours
+from solidsph.engines.compiled.cells import Near
 from solidsph.engines.compiled.pointwise import (
     NotCompilableError,
     compiled_function,
@@ -18,8 +18,8 @@ from solidsph.engines.compiled.pointwise import (
 from solidsph.interfaces.kernel import Kernel
 from solidsph.smoothing import COMPLEX_STEP, SmoothingKernel
 
-# (neighbours, values (m,), slopes (m,)): W [m^-d] and W'(r) / r [m^-(d+2)] of every pair
-KernelPass: TypeAlias = Callable[[Neighbours, Array, Array], None]
+# (near, values (k,), slopes (k,)): W [m^-d] and W'(r) / r [m^-(d+2)] of every pair
+KernelPass: TypeAlias = Callable[[Near, Array, Array], None]
 
 
 def kernel_pass(smoothing: SmoothingKernel) -> KernelPass:
@@ -32,18 +32,18 @@ def kernel_pass(smoothing: SmoothingKernel) -> KernelPass:
     params = tuple(float(number) for number in smoothing.kernel.params)
     of_value, of_slope = smoothing.normalisation / H**d, smoothing.normalisation / H ** (d + 1)
 
-    def compiled(neighbours: Neighbours, values: Array, slopes: Array) -> None:
-        loop(neighbours, H, params, of_value, of_slope, values, slopes)
+    def compiled(near: Near, values: Array, slopes: Array) -> None:
+        loop(near.distances[: near.pair_count], H, params, of_value, of_slope, values, slopes)
 
     return compiled
 
 
 def _by_arrays(smoothing: SmoothingKernel) -> KernelPass:
-    def arrays(neighbours: Neighbours, values: Array, slopes: Array) -> None:
-        m = neighbours.count
-        r = neighbours.distances[:m]
-        values[:m] = smoothing.value(r)
-        slopes[:m] = smoothing.slope_by_distance(r)
+    def arrays(near: Near, values: Array, slopes: Array) -> None:
+        k = near.pair_count
+        r = near.distances[:k]
+        values[:k] = smoothing.value(r)
+        slopes[:k] = smoothing.slope_by_distance(r)
 
     return arrays
 
@@ -71,23 +71,14 @@ def _stepped(profile: Any) -> Any:
 @cache
 def _loop(profile: Any, slope: Any) -> Any:
     @njit(error_model="numpy")
-    def loop(neighbours, H, params, of_value, of_slope, values, slopes):
-        for p in range(len(neighbours.own)):
-            own = neighbours.own[p]
-            values[own] = slopes[own] = 0.0
-            if neighbours.distances[own] == 0.0:  # of a particle that is somewhere
-                values[own] = profile(0.0, params) * of_value
-            # Those of (q, p) are the same.
-            for m in range(own + 1, neighbours.starts[p + 1]):
-                r = neighbours.distances[m]
-                q = r / H
-                w = dw = 0.0
-                if q < 1.0:
-                    w = profile(q, params) * of_value
-                    if r > 0.0:
-                        dw = slope(q, params) * of_slope / r
-                back = neighbours.reverse[m]
-                values[m] = values[back] = w
-                slopes[m] = slopes[back] = dw
+    def loop(distances, H, params, of_value, of_slope, values, slopes):
+        for k in range(len(distances)):
+            r = distances[k]
+            q = r / H
+            values[k] = slopes[k] = 0.0
+            if q < 1.0:
+                values[k] = profile(q, params) * of_value
+                if r > 0.0:
+                    slopes[k] = slope(q, params) * of_slope / r
 
     return loop

@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, final
 
 import attrs
 import numpy as np
+from numba import njit
 
 from solidsph.arrays import Array
 from solidsph.body import Body
-from solidsph.engines.compiled.cells import Neighbours, NeighbourSearch
+from solidsph.engines.compiled.cells import NeighbourSearch
 from solidsph.engines.compiled.kernels import KernelPass, kernel_pass
-from solidsph.engines.compiled.operators import (
-    force_loop,
-    kernel_sums,
-    stress_loop,
-    weighted_forces,
-    weights_loop,
-)
-from solidsph.engines.compiled.pointwise import no_law
+from solidsph.engines.compiled.neighbourhoods import Neighbourhoods, fill, kernel_sums
+from solidsph.engines.compiled.pointwise import NotCompilableError
+from solidsph.engines.compiled.pointwise_sums import PointwiseSums
+from solidsph.engines.compiled.vectors import MATRIX
+from solidsph.engines.compiled.weighted_sums import WeightedSums
 
 
 @attrs.frozen(eq=False)
-class _Weights:
-    """What one set of displacements gives."""
+class _Place:
+    """What the positions of a step determine."""
 
-    neighbours: Neighbours
-    positions: Array  # (n, d) [m]
-    volumes: Array  # (n,) that particles have now [m^d]
-    gradient: Array  # (m, d) [1/m]
+    positions: Array  # (n, d) x [m]
+    cells: Array  # (n,) weights in sums over neighbours now [m^d]
+    volumes: Array  # (n,) [m^d]
 
 
 @final
@@ -36,27 +34,31 @@ class _Weights:
 class MovingBody:
     """One body made ready: the loops over its pairs, and the arrays that they fill.
 
-    Nothing that is kept between two evaluations has an influence on their results. Unlike sums in
-    the reference configuration, which are of differences, these are in double precision always.
+    What is kept between evaluations has no influence on their results. These sums are in double
+    precision always: they are of positions, not of displacements alone.
     """
 
     body: Body
-    law: Any  # compiled (H, params) -> T
+    law: Any  # compiled (tensors (n, d, d), params): T in place of H
     search: NeighbourSearch
     kernel: KernelPass
+    sums: PointwiseSums | WeightedSums
     pair_count: int = attrs.field(init=False)
     reference_sums: Array = attrs.field(init=False)  # (n,) of the kernel, as in the matrix engine
-    tensors: Array = attrs.field(init=False)  # (n, d, d) the stress that acts [Pa]
-    weights: _Weights | None = attrs.field(init=False, default=None)
-    _pairs: tuple[Array, Array, Array] = attrs.field(init=False)  # W, W'(r) / r, g of all pairs
+    tensors: Array = attrs.field(init=False)  # (n, d, d) H, or the stress that acts
+    _own_value: float = attrs.field(init=False)  # W(0) [m^-d]
+    _rows: Neighbourhoods = attrs.field(init=False)
+    _values: Array = attrs.field(init=False)  # (k,) W of near pairs
+    _slopes: Array = attrs.field(init=False)  # (k,) W'(r) / r of near pairs
+    _place: _Place | None = attrs.field(init=False, default=None)
 
     def __attrs_post_init__(self) -> None:
         particles = self.body.particles
-        n, d = particles.count, particles.dimension
-        self.tensors = np.zeros((n, d, d))
-        self._pairs = np.empty(0), np.empty(0), np.empty((0, d))
-        neighbours, _, self.reference_sums = self._crowding(particles.positions)
-        self.pair_count = neighbours.count
+        self.tensors = np.empty((particles.count, particles.dimension, particles.dimension))
+        self._values = self._slopes = np.empty(0)
+        self._own_value = float(self.body.smoothing.value(np.zeros(1))[0])
+        self.reference_sums = self._found(particles.positions)
+        self.pair_count = self._rows.pair_count
 
     @property
     def fused(self) -> bool:
@@ -65,90 +67,97 @@ class MovingBody:
 
     @property
     def bytes(self) -> int:
-        """Memory of all arrays."""
-        own = self.reference_sums.nbytes + self.tensors.nbytes
-        return own + self.search.bytes + sum(array.nbytes for array in self._pairs)
+        """Memory of the arrays kept between evaluations."""
+        own = (self.reference_sums, self.tensors, self._values, self._slopes, *self._rows)
+        return self.search.bytes + sum(array.nbytes for array in own)
 
     def forces(self, displacements: Array, out: Array) -> None:
         """Forces (n, d) from displacements (n, d) where no condition changes the stress."""
-        weights = self._form(displacements)
-        self._stress(weights, self.law, displacements, self.tensors)
-        self.tensors[self.body.particles.ghosts] = 0.0
-        self._spread(weights, out)
+        self._stress(displacements)
+        self._spread(out)
 
     def stress(self, displacements: Array, out: Array) -> None:
         """Stress (d, d, n) from displacements (n, d); ghosts have none."""
-        self.weights = self._form(displacements)
-        self._stress(self.weights, self.law, displacements, self.tensors)
-        self.tensors[self.body.particles.ghosts] = 0.0
+        self._stress(displacements)
         out[...] = np.moveaxis(self.tensors, 0, -1)
 
     def spread(self, stress: Array, out: Array) -> None:
-        """Forces (n, d) from stress (d, d, n), at the displacements it was found from."""
+        """Forces (n, d) from stress (d, d, n), at the displacements that `stress` had last."""
         self.tensors[...] = np.moveaxis(stress, -1, 0)
         if not self.body.formulation.divergence.uses_ghost_stress:
             self.tensors[self.body.particles.ghosts] = 0.0
-        assert self.weights is not None, "stress comes first"
-        self._spread(self.weights, out)
+        self._spread(out)
 
     def gradient_of(self, displacements: Array) -> Array:
         """Gradient H (d, d, n) of displacements (n, d); that of ghosts is 0."""
-        H = np.empty_like(self.tensors)
-        self._stress(self._form(displacements), no_law, displacements, H)
-        H[self.body.particles.ghosts] = 0.0
-        return np.moveaxis(H, 0, -1)
+        self._gradients(displacements)
+        self.tensors[self.body.particles.ghosts] = 0.0
+        return np.moveaxis(self.tensors, 0, -1).copy()
 
-    def _form(self, displacements: Array) -> _Weights:
-        """Everything that depends on where the particles are."""
-        particles, formulation = self.body.particles, self.body.formulation
+    def _stress(self, displacements: Array) -> None:
+        self._gradients(displacements)
+        self.law(self.tensors, self.body.material.params)
+        self.tensors[self.body.particles.ghosts] = 0.0
+
+    def _gradients(self, displacements: Array) -> None:
+        particles = self.body.particles
         positions = particles.positions + displacements
-        neighbours, slopes, sums = self._crowding(positions)
+        sums = self._found(positions)
         # As in the matrix engine, the volume follows the crowding relative to the reference.
         with np.errstate(all="ignore"):
             crowding = self.reference_sums / sums
-        cells, volumes = particles.cells * crowding, particles.volumes * crowding
-        gradient = self._pairs[2]
-        loop = weights_loop(formulation.gradient, particles.dimension)
-        if loop is None or not loop(neighbours, positions, slopes, cells, gradient):
-            # The array form says in its own words what a loop cannot make.
-            pairs = neighbours.pairs(positions)
-            kernel_gradients = -slopes[: pairs.count, None] * pairs.offsets
-            gradient = formulation.gradient.weights(pairs, kernel_gradients, cells)
-        return _Weights(neighbours, positions, volumes, gradient)
+        place = _Place(positions, particles.cells * crowding, particles.volumes * crowding)
+        self._place = place
+        self.sums.gradients(self._rows, positions, place.cells, displacements, self.tensors)
 
-    def _crowding(self, positions: Array) -> tuple[Neighbours, Array, Array]:
-        """Neighbours, W'(r) / r of their pairs, and the kernel's sums, (n,)."""
-        particles = self.body.particles
-        neighbours = self.search.neighbours(positions)
-        room = len(neighbours.columns)
-        if len(self._pairs[0]) != room:
-            self._pairs = np.empty(room), np.empty(room), np.empty((room, particles.dimension))
-        values, slopes, _ = self._pairs
-        self.kernel(neighbours, values, slopes)
-        sums = np.empty(particles.count)
-        kernel_sums(neighbours, values, particles.cells, sums)
-        return neighbours, slopes, sums
-
-    def _stress(self, weights: _Weights, law: Any, displacements: Array, out: Array) -> None:
-        loop = stress_loop(self.body.particles.dimension, law)
-        params = self.body.material.params
-        loop(weights.neighbours, weights.gradient, displacements, params, out)
-
-    def _spread(self, weights: _Weights, out: Array) -> None:
-        divergence, d = self.body.formulation.divergence, self.body.particles.dimension
-        loop = force_loop(divergence, d)
-        if loop is not None:
-            loop(weights.neighbours, weights.gradient, weights.volumes, self.tensors, out)
-        else:
-            pairs = weights.neighbours.pairs(weights.positions)
-            own = divergence.weights(pairs, weights.gradient[: pairs.count], weights.volumes)
-            weighted_forces(d)(weights.neighbours, own, self.tensors, out)
-        if divergence.uses_ghost_stress:
+    def _spread(self, out: Array) -> None:
+        place = self._place
+        assert place is not None, "stress comes first"
+        self.sums.forces(self._rows, place.positions, place.cells, place.volumes, self.tensors, out)
+        if self.body.formulation.divergence.uses_ghost_stress:
             # Ghosts have acted through their stress; nothing acts on them.
             out[self.body.particles.ghosts] = 0.0
+
+    def _found(self, positions: Array) -> Array:
+        """The kernel's sums at `positions`, (n,), once the rows are filled."""
+        particles = self.body.particles
+        near = self.search.near(positions)
+        room = len(near.columns)
+        if len(self._values) != room:
+            self._values, self._slopes = np.empty(room), np.empty(room)
+            self._rows = Neighbourhoods.with_room(particles.count, room)
+        self.kernel(near, self._values, self._slopes)
+        fill(near, self._slopes, self._rows)
+        sums = np.empty(particles.count)
+        kernel_sums(near, self._values, self._own_value, particles.cells, sums)
+        return sums
 
 
 def moving_body(body: Body, law: Any) -> MovingBody:
     """A body made ready, with its compiled law (H, params) -> T."""
-    search = NeighbourSearch(body.smoothing.support_radius)
-    return MovingBody(body, law, search, kernel_pass(body.smoothing))
+    try:
+        sums: PointwiseSums | WeightedSums = PointwiseSums.of(body)
+    except NotCompilableError:
+        sums = WeightedSums(body.formulation)
+    return MovingBody(
+        body=body,
+        law=_law_loop(body.particles.dimension, law),
+        search=NeighbourSearch(body.smoothing.support_radius),
+        kernel=kernel_pass(body.smoothing),
+        sums=sums,
+    )
+
+
+@cache
+def _law_loop(dimension: int, law: Any) -> Any:
+    matrix = MATRIX[dimension]
+
+    @njit(error_model="numpy")
+    def loop(tensors, params):
+        for p in range(len(tensors)):
+            T = law(matrix(tensors, p), params)
+            for i in range(dimension):
+                for k in range(dimension):
+                    tensors[p, i, k] = T[i][k]
+
+    return loop

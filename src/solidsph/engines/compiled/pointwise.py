@@ -66,7 +66,7 @@ def _try(function: Any, *arguments: Any) -> None:
 
 @cache
 def _call(function: Callable[..., Any]) -> Any:
-    return njit(error_model="numpy")(_registered(function))
+    return njit(error_model="numpy")(registered(function))
 
 
 @njit
@@ -78,7 +78,7 @@ def no_law(H: Tensor, params: tuple[float, ...]) -> Tensor:
 # By the identity of the functions: a process compiles each combination once.
 @cache
 def _flux(dimension: int, deformation_gradient: Any, first_piola: Any, flux: Any) -> Any:
-    F_of, P_of, T_of = (_registered(f) for f in (deformation_gradient, first_piola, flux))
+    F_of, P_of, T_of = (registered(f) for f in (deformation_gradient, first_piola, flux))
 
     numbers = NUMBERS[dimension]
 
@@ -116,14 +116,14 @@ NUMBERS = {1: _numbers_1, 2: _numbers_2, 3: _numbers_3}
 
 
 @cache
-def _registered(function: Callable[..., Any], depth: int = 0) -> Any:
+def registered(function: Callable[..., Any], depth: int = 0) -> Any:
     """The same function, known to the compiler with every plain function that it calls."""
     if not isinstance(function, FunctionType):
         raise NotCompilableError(f"{function!r} is not a plain function")
     if depth > _DEEPEST:
         raise NotCompilableError(f"{function.__qualname__} calls itself, or nests too deeply")
     for helper in _called(function):
-        _registered(helper, depth + 1)
+        registered(helper, depth + 1)
     return register_jitable(function)
 
 

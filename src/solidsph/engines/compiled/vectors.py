@@ -6,7 +6,7 @@ from typing import Any
 
 from numba import njit
 
-from solidsph.arrays import Array, Tensor
+from solidsph.arrays import Array, Scalar, Tensor
 
 Vector = Any  # a tuple of 1, 2 or 3 numbers
 
@@ -51,8 +51,8 @@ ROW = {1: _row_1, 2: _row_2, 3: _row_3}
 MATRIX = {1: _matrix_1, 2: _matrix_2, 3: _matrix_3}
 """Compiled (array (n, d, d), at) -> tensor, by dimension."""
 
-ZERO = {d: (0.0,) * d for d in (1, 2, 3)}
-"""The zero vector, by dimension; d of them are the zero tensor."""
+IDENTITY = {d: tuple(tuple(float(i == k) for k in range(d)) for i in range(d)) for d in ROW}
+"""I as nested tuples, by dimension."""
 
 
 @njit
@@ -66,6 +66,16 @@ def moved(a: Vector, s: float, b: Vector) -> Vector:
 
 
 @njit
+def times(s: float, a: Vector) -> Vector:
+    """s a."""
+    if len(a) == 1:
+        return (s * a[0],)
+    if len(a) == 2:
+        return s * a[0], s * a[1]
+    return s * a[0], s * a[1], s * a[2]
+
+
+@njit
 def with_outer(A: Tensor, a: Vector, b: Vector) -> Tensor:
     """A + a (x) b."""
     if len(a) == 1:
@@ -76,7 +86,7 @@ def with_outer(A: Tensor, a: Vector, b: Vector) -> Tensor:
 
 
 @njit
-def dot(a: Vector, b: Vector) -> float:
+def dot(a: Vector, b: Vector) -> Scalar:
     """a . b."""
     if len(a) == 1:
         return a[0] * b[0]
