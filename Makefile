@@ -16,9 +16,10 @@ test: $(STAMP) lint  ## lint, types and every test but the slow physics
 validate: $(STAMP)  ## the slow physics
 	$(BIN)/pytest -n 2 -m validation -rP
 
-bench: $(STAMP)  ## throughput against a plain C loop, and by size up to a million particles
+bench: $(STAMP)  ## throughput against a plain C loop, by size up to a million particles, and the updated form
 	$(BIN)/python benchmarks/throughput.py
 	$(BIN)/python benchmarks/throughput.py --sizes
+	$(BIN)/python benchmarks/moving.py
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

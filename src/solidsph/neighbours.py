@@ -40,7 +40,7 @@ class Pairs:
     def reversed_order(self) -> Indices:
         """For every pair (p, q) the place of (q, p), (m,)."""
         # In column order the pairs of column p appear as (q, p) with q rising: row p's order.
-        return np.lexsort((self.rows, self.columns))
+        return np.asarray(self.matrix(np.arange(self.count)).tocsc().data, dtype=np.intp)
 
     def row_sums(self, values: Array) -> Array:
         """Sum of `values` (m, ...) over each particle's pairs, (n, ...)."""
@@ -51,7 +51,14 @@ class Pairs:
         """Values of the particles listed (n, ...), given to each of their pairs, (m, ...)."""
         return np.repeat(values, np.diff(self.starts), axis=0)
 
-    def matrix(self, values: Array) -> csr_array:
+    def of_differences(self, weights: Array) -> Array:
+        """The same weights (m, d) acting on f_q - f_p: each row is made to add up to zero."""
+        weights = weights.copy()
+        weights[self.self_pairs] = 0.0
+        weights[self.self_pairs] = -self.row_sums(weights)
+        return weights
+
+    def matrix(self, values: NDArray[Any]) -> csr_array:
         """Sparse n x n matrix with `values` (m,) at (p, q)."""
         n = self.row_count
         return csr_array((values, self.columns, self.starts), shape=(n, n))

@@ -18,7 +18,9 @@ UNIT_SPHERE = {1: 2.0, 2: 2.0 * pi, 3: 4.0 * pi}
 # The edge value that rounding may leave of a profile that is zero there by formula.
 _EDGE_TOLERANCE = 1e-12
 
-_COMPLEX_STEP = 1e-40
+COMPLEX_STEP = 1e-40
+"""Along the imaginary axis: far below any q, so that its square is nothing, and no difference
+is taken that could cancel."""
 
 
 @attrs.frozen(eq=False)
@@ -47,10 +49,13 @@ class SmoothingKernel:
 
     def gradient(self, offsets: Array, distances: Array) -> Array:
         """Derivative of W(x_p - x_q) by x_p, (m, d), from offsets x_q - x_p (m, d)."""
-        # The slope of a smooth kernel vanishes at r = 0, where the direction has no meaning.
+        return -self.slope_by_distance(distances)[:, None] * offsets
+
+    def slope_by_distance(self, distances: Array) -> Array:
+        """dW/dr / r for r (m,) [m^-(d+2)], and 0 at r = 0, where a direction has no meaning."""
+        # The slope of a smooth kernel vanishes there.
         safe = np.where(distances > 0.0, distances, 1.0)
-        along = np.where(distances > 0.0, self.slope(distances) / safe, 0.0)
-        return -along[:, None] * offsets
+        return np.where(distances > 0.0, self.slope(distances) / safe, 0.0)
 
 
 def profile_slope(kernel: Kernel, q: Array) -> Array:
@@ -58,8 +63,8 @@ def profile_slope(kernel: Kernel, q: Array) -> Array:
     slope = kernel.slope(q, kernel.params)
     if slope is not None:
         return np.asarray(slope, dtype=np.float64)
-    stepped = kernel.profile(np.asarray(q) + 1j * _COMPLEX_STEP, kernel.params)
-    return np.asarray(np.imag(stepped) / _COMPLEX_STEP, dtype=np.float64)
+    stepped = kernel.profile(np.asarray(q) + 1j * COMPLEX_STEP, kernel.params)
+    return np.asarray(np.imag(stepped) / COMPLEX_STEP, dtype=np.float64)
 
 
 def profile_mass(kernel: Kernel, dimension: int) -> float:

@@ -6,14 +6,13 @@ from typing import ClassVar, final
 
 import attrs
 
-from solidsph.arrays import Array
-from solidsph.interfaces.divergence import Divergence
-from solidsph.neighbours import Pairs
+from solidsph.arrays import Scalar
+from solidsph.interfaces.divergence import PointwiseDivergence
 
 
 @final
 @attrs.frozen
-class Plain(Divergence):
+class Plain(PointwiseDivergence):
     """f_p = V_p sum over q of T_q g_pq without q = p: the sum of Ismail & Reddy, eq. 17.
 
     A gradient of differences has a weight at q = p; left in, it would make this a sum over
@@ -25,7 +24,10 @@ class Plain(Divergence):
     adjoint: ClassVar[bool] = False
     uses_ghost_stress: ClassVar[bool] = True
 
-    def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:
-        weights = volumes[pairs.rows, None] * gradient_weights
-        weights[pairs.self_pairs] = 0.0
-        return weights
+    @staticmethod
+    def pair_weight(there: Scalar, back: Scalar, volume: Scalar, other: Scalar) -> Scalar:
+        return volume * there
+
+    @staticmethod
+    def own_weight(own: Scalar, volume: Scalar) -> Scalar:
+        return 0.0 * own

@@ -6,14 +6,13 @@ from typing import ClassVar, final
 
 import attrs
 
-from solidsph.arrays import Array
-from solidsph.interfaces.divergence import Divergence
-from solidsph.neighbours import Pairs
+from solidsph.arrays import Scalar
+from solidsph.interfaces.divergence import PointwiseDivergence
 
 
 @final
 @attrs.frozen
-class Variational(Divergence):
+class Variational(PointwiseDivergence):
     """f_p = - sum over q of V_q T_q g_qp: minus the transpose of the gradient, weighted by volume.
 
     In the total Lagrangian form this is the exact derivative of the discrete strain energy
@@ -26,6 +25,10 @@ class Variational(Divergence):
     adjoint: ClassVar[bool] = True
     uses_ghost_stress: ClassVar[bool] = False
 
-    def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:
-        transposed = gradient_weights[pairs.reversed_order()]
-        return -volumes[pairs.columns, None] * transposed
+    @staticmethod
+    def pair_weight(there: Scalar, back: Scalar, volume: Scalar, other: Scalar) -> Scalar:
+        return -other * back
+
+    @staticmethod
+    def own_weight(own: Scalar, volume: Scalar) -> Scalar:
+        return -volume * own

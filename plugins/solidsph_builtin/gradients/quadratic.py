@@ -13,7 +13,6 @@ from solidsph.arrays import Array, Mask
 from solidsph.interfaces.gradient import Gradient
 from solidsph.neighbours import Pairs
 from solidsph_builtin.gradients.corrected import Corrected
-from solidsph_builtin.gradients.difference import differences
 
 # Beyond this condition number of the scaled moment matrix the neighbours do not determine the
 # second derivatives: well placed ones, surfaces included, stay below some thousands.
@@ -62,7 +61,7 @@ class Quadratic(Gradient):
             replaced = pairs.spread(poor)
             linear = Corrected().weights(pairs, kernel_gradients, volumes)
             weights[replaced] = linear[replaced]
-        return differences(pairs, weights)
+        return pairs.of_differences(weights)
 
 
 def _portions(pairs: Pairs) -> Iterator[slice]:

@@ -6,20 +6,16 @@ from typing import ClassVar, final
 
 import attrs
 
-from solidsph.arrays import Array
-from solidsph.interfaces.gradient import Gradient
-from solidsph.neighbours import Pairs
+from solidsph.interfaces.gradient import PointwiseGradient
 
 
 @final
 @attrs.frozen
-class Standard(Gradient):
+class Standard(PointwiseGradient):
     """g_pq = dW(x_p - x_q)/dx_p V_q. Ismail & Reddy, eqs. 5, 10 and 16.
 
     Needs complete supports: near a surface without ghosts not even a constant is exact.
     """
 
     exact_degree: ClassVar[int] = -1
-
-    def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
-        return kernel_gradients * volumes[pairs.columns, None]
+    of_differences: ClassVar[bool] = False

@@ -17,9 +17,12 @@ from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.formulation import Configuration
 from solidsph.smoothing import UNIT_SPHERE
 
-# What the matrix engine takes for a step and for each pair in it, and what compilation takes, all
-# [s], about; beside them the compiled engine's own steps are as good as free.
-_STEP, _PAIR, _COMPILATION = 1e-4, 25e-9, 10.0
+# What the matrix engine takes for a step and for each pair in it, if the pairs stay and if they
+# are found anew, and what compilation takes, all [s], about; beside them the compiled engine's own
+# steps are as good as free.
+_STEP, _PAIR = 1e-4, 25e-9
+_MOVING_STEP, _MOVING_PAIR = 1e-3, 400e-9
+_COMPILATION = 10.0
 
 # Beyond so many pairs the matrices alone fill a gigabyte, however few steps there are.
 _MANY_PAIRS = 1e7
@@ -28,7 +31,7 @@ _MANY_PAIRS = 1e7
 @final
 @attrs.frozen
 class AutomaticEngine(Engine):
-    """The compiled engine where it pays: much work, and sums in the reference configuration."""
+    """The compiled engine where it pays: where there is more to do than compiling is."""
 
     def prepare(
         self,
@@ -36,11 +39,17 @@ class AutomaticEngine(Engine):
         conditions: Sequence[StressCondition],
         evaluations: int = 1,
     ) -> InternalForces:
-        constant = all(b.formulation.configuration is Configuration.REFERENCE for b in bodies)
-        pairs = sum(_expected_pairs(body) for body in bodies)
-        pays = evaluations * (_STEP + _PAIR * pairs) > _COMPILATION or pairs > _MANY_PAIRS
-        engine = _compiled() if constant and pays else MatrixEngine()
+        work = evaluations * sum(_matrix_time(body) for body in bodies)
+        pays = work > _COMPILATION or sum(_expected_pairs(body) for body in bodies) > _MANY_PAIRS
+        engine = _compiled() if pays else MatrixEngine()
         return engine.prepare(bodies, conditions, evaluations)
+
+
+def _matrix_time(body: Body) -> float:
+    """What the matrix engine takes for a step of a body [s], about."""
+    if body.formulation.configuration is Configuration.REFERENCE:
+        return _STEP + _PAIR * _expected_pairs(body)
+    return _MOVING_STEP + _MOVING_PAIR * _expected_pairs(body)
 
 
 def _expected_pairs(body: Body) -> float:

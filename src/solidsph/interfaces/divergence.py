@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import ClassVar, final
 
-from solidsph.arrays import Array
+import numpy as np
+
+from solidsph.arrays import Array, Scalar
 from solidsph.neighbours import Pairs
 
 
@@ -33,3 +35,35 @@ class Divergence(ABC):
             gradient_weights: (m, d), those of the formulation's gradient [1/m].
             volumes: (n,) [m^d].
         """
+
+
+class PointwiseDivergence(Divergence):
+    """A divergence whose weight at a pair depends on the gradient's weights of that pair only.
+
+    As with a pointwise gradient, its author writes formulas of one component, and the core or an
+    engine forms the weights from them.
+    """
+
+    @staticmethod
+    @abstractmethod
+    def pair_weight(there: Scalar, back: Scalar, volume: Scalar, other: Scalar) -> Scalar:
+        """A component of d_pq, p not q, from those of g_pq and g_qp and from V_p and V_q."""
+
+    @staticmethod
+    @abstractmethod
+    def own_weight(own: Scalar, volume: Scalar) -> Scalar:
+        """A component of d_pp from that of g_pp and from V_p."""
+
+    @final
+    def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:
+        weights = np.array(
+            self.pair_weight(
+                gradient_weights,
+                gradient_weights[pairs.reversed_order()],
+                volumes[pairs.rows, None],
+                volumes[pairs.columns, None],
+            )
+        )
+        own = pairs.self_pairs
+        weights[own] = self.own_weight(gradient_weights[own], volumes[:, None])
+        return weights

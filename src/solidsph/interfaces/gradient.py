@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import ClassVar, final
 
-from solidsph.arrays import Array
+import numpy as np
+
+from solidsph.arrays import Array, Mask, Tensor
+from solidsph.errors import BuildError
 from solidsph.neighbours import Pairs
+from solidsph.tensors import components_first, particles_first
 
 
 class Gradient(ABC):
@@ -28,3 +32,55 @@ class Gradient(ABC):
         Raises:
             BuildError: the neighbours of a particle do not determine a gradient.
         """
+
+
+class PointwiseGradient(Gradient):
+    """A gradient whose weights are K_p dW/dx_p V_q, with one matrix K_p for every particle.
+
+    Its author writes K_p and nothing else. The core forms the weights, for arrays of pairs here,
+    and an engine in its own loops from the same formula.
+    """
+
+    of_differences: ClassVar[bool]
+    """Whether it acts on f_q - f_p: the weight at q = p is then minus the sum of the others."""
+
+    @staticmethod
+    def correction(moment: Tensor) -> Tensor | None:
+        """K_p from the moment M_p = sum over q of (x_q - x_p) (x) dW/dx_p V_q [-]; pointwise.
+
+        Not finite where the neighbours do not determine a gradient. Without it K_p is I.
+        """
+        return None
+
+    @property
+    def is_corrected(self) -> bool:
+        """Whether there is a K_p."""
+        return self.correction(((1.0,),)) is not None
+
+    @final
+    def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
+        weights: Array = kernel_gradients * volumes[pairs.columns, None]
+        if self.is_corrected:
+            corrections = self._corrections(pairs, weights)
+            weights = np.einsum("mij,mj->mi", pairs.spread(corrections), weights)
+        return pairs.of_differences(weights) if self.of_differences else weights
+
+    def _corrections(self, pairs: Pairs, plain: Array) -> Array:
+        """K_p of every particle, (n, d, d)."""
+        moments = pairs.row_sums(pairs.offsets[:, :, None] * plain[:, None, :])
+        with np.errstate(all="ignore"):  # a moment without an inverse is reported below
+            K = particles_first(self.correction(components_first(moments)), pairs.row_count)
+        undetermined: Mask = np.any(~np.isfinite(K), axis=(1, 2))
+        if undetermined.any():
+            first = int(np.flatnonzero(undetermined)[0])
+            neighbours = int(pairs.starts[first + 1] - pairs.starts[first]) - 1
+            worst = int(pairs.rows[pairs.starts[first]])
+            raise BuildError(
+                [
+                    f"gradient {type(self).__name__}: the {neighbours} neighbours of particle "
+                    f"{worst} do not span {moments.shape[1]} dimensions "
+                    f"({int(undetermined.sum())} such particles); a larger cover or a finer "
+                    "spacing gives them neighbours in every direction"
+                ]
+            )
+        return K

@@ -15,6 +15,7 @@ from solidsph.dynamics import Dynamics
 from solidsph.engines.compiled.blocks import STRIDE, group
 from solidsph.engines.compiled.chunks import weighted_chunks
 from solidsph.engines.compiled.loop import compiled_loop
+from solidsph.engines.compiled.moving import MovingBody, moving_body
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux, no_law
 from solidsph.engines.compiled.rows import Rows, compressed, in_chunks
 from solidsph.engines.compiled.shares import (
@@ -41,10 +42,11 @@ from solidsph.time_loop import TimeLoop
 class CompiledEngine(Engine):
     """Sums over rows of weights, with the parts' pointwise functions compiled into the loops.
 
-    Where a part cannot be compiled, or the sums are taken in the current configuration, the matrix
-    engine does the work: for all bodies, because conditions see the stress of all at once.
+    Where a material or a formulation cannot be compiled, the matrix engine does the work: for all
+    bodies, because conditions see the stress of all at once.
 
-    The sums themselves are kept in `precision`. Displacements, and not positions, go into them, so
+    The sums themselves are kept in `precision`, if they are taken in the reference configuration:
+    what moves is summed in double precision. Displacements, and not positions, go into them, so
     that single precision is precision of strain, as long as a body does not move by many times its
     spacing; F, the stress and what the seam hands out are in double precision.
     """
@@ -59,14 +61,17 @@ class CompiledEngine(Engine):
         conditions: Sequence[StressCondition],
         evaluations: int = 1,
     ) -> InternalForces:
-        if any(b.formulation.configuration is not Configuration.REFERENCE for b in bodies):
-            return MatrixEngine().prepare(bodies, conditions)
         try:
             laws = [compiled_flux(b.formulation, b.material, b.smoothing.dimension) for b in bodies]
         except NotCompilableError:
             return MatrixEngine().prepare(bodies, conditions)
-        parts = [_part(b, law, self.precision) for b, law in zip(bodies, laws, strict=True)]
+        parts = [self._part(b, law) for b, law in zip(bodies, laws, strict=True)]
         return CompiledForces(tuple(parts), tuple(conditions))
+
+    def _part(self, body: Body, law: Any) -> CompiledBody | MovingBody:
+        if body.formulation.configuration is Configuration.REFERENCE:
+            return _part(body, law, self.precision)
+        return moving_body(body, law)
 
 
 @final
@@ -208,7 +213,7 @@ def _part(body: Body, law: Any, dtype: str) -> CompiledBody:
 class CompiledForces(InternalForces):
     """Internal forces by compiled sweeps."""
 
-    parts: Sequence[CompiledBody]
+    parts: Sequence[CompiledBody | MovingBody]
     conditions: Sequence[StressCondition]
 
     @property
@@ -221,10 +226,13 @@ class CompiledForces(InternalForces):
         return sum(part.bytes for part in self.parts)
 
     def time_loop(self, dynamics: Dynamics, integrator: Integrator, step_size: float) -> TimeLoop:
+        fixed = [part for part in self.parts if isinstance(part, CompiledBody)]
         try:
-            return compiled_loop(self, dynamics, integrator, step_size)
+            if len(fixed) == len(self.parts):
+                return compiled_loop(fixed, self.conditions, dynamics, integrator, step_size)
         except NotCompilableError:
-            return super().time_loop(dynamics, integrator, step_size)
+            pass
+        return super().time_loop(dynamics, integrator, step_size)
 
     def forces(self, time: float, displacements: Array) -> Array:
         forces = np.empty(displacements.shape)

@@ -25,14 +25,14 @@ from solidsph.engines.compiled.motions import (
 )
 from solidsph.engines.compiled.pointwise import NotCompilableError, registered
 from solidsph.engines.compiled.shares import thread_count
-from solidsph.interfaces.condition import ExtensionCondition
+from solidsph.interfaces.condition import ExtensionCondition, StressCondition
 from solidsph.interfaces.declared import ScheduledForce, ScheduledMotion
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
 from solidsph.particles import State
 from solidsph.time_loop import NOT_FINITE, StepError, TimeLoop
 
 if TYPE_CHECKING:
-    from solidsph.engines.compiled.engine import CompiledForces
+    from solidsph.engines.compiled.engine import CompiledBody
 
 # Numbers in the tables of what varies in time, for the steps that go together.
 _TABLE = 1 << 18
@@ -50,9 +50,13 @@ class _Moving(NamedTuple):
 
 
 def compiled_loop(
-    forces: CompiledForces, dynamics: Dynamics, integrator: Integrator, step_size: float
+    bodies: Sequence[CompiledBody],
+    conditions: Sequence[StressCondition],
+    dynamics: Dynamics,
+    integrator: Integrator,
+    step_size: float,
 ) -> TimeLoop:
-    """The loop for these parts.
+    """The loop for these prepared bodies, conditions on their stress, and the scene's dynamics.
 
     Raises:
         NotCompilableError: one of the parts is not of a declared kind, or does not compile.
@@ -61,7 +65,7 @@ def compiled_loop(
         raise NotCompilableError(f"integrator {type(integrator).__name__} is not pointwise")
     particles = dynamics.particles
     d, threads = particles.dimension, thread_count(particles.count)
-    internal = internal_forces(forces.parts, forces.conditions)
+    internal = internal_forces(bodies, conditions)
     words = [motion_words(motion, d) for motion in dynamics.motions]
     by_word = [tuple(one[k] for one in words) for k in range(len(MotionWords._fields))]
     steps = _steps(

@@ -32,12 +32,41 @@ def compiled_flux(formulation: Formulation, material: Material, dimension: int) 
         NotCompilableError: one of their functions cannot be compiled.
     """
     law = _flux(dimension, formulation.deformation_gradient, material.first_piola, formulation.flux)
-    tensor = types.UniTuple(types.UniTuple(types.float64, dimension), dimension)
+    _try(law, tensor_type(dimension), numbers_type(len(material.params)))
+    return law
+
+
+def compiled_function(function: Callable[..., Any], *arguments: Any) -> Any:
+    """A pointwise function for use in compiled loops, tried on arguments of these types.
+
+    Raises:
+        NotCompilableError: it cannot be compiled.
+    """
+    call = _call(function)
+    _try(call, *arguments)
+    return call
+
+
+def numbers_type(count: int) -> Any:
+    """The compiler's type of `params`, and of a vector."""
+    return types.UniTuple(types.float64, count)
+
+
+def tensor_type(dimension: int) -> Any:
+    """The compiler's type of a tensor as nested tuples."""
+    return types.UniTuple(numbers_type(dimension), dimension)
+
+
+def _try(function: Any, *arguments: Any) -> None:
     try:
-        law.compile((tensor, types.UniTuple(types.float64, len(material.params))))
+        function.compile(arguments)
     except NumbaError as cause:
         raise NotCompilableError(str(cause)) from cause
-    return law
+
+
+@cache
+def _call(function: Callable[..., Any]) -> Any:
+    return njit(error_model="numpy")(registered(function))
 
 
 @njit
@@ -51,9 +80,10 @@ def no_law(H: Tensor, params: tuple[float, ...]) -> Tensor:
 def _flux(dimension: int, deformation_gradient: Any, first_piola: Any, flux: Any) -> Any:
     F_of, P_of, T_of = (registered(f) for f in (deformation_gradient, first_piola, flux))
 
-    numbers = _NUMBERS[dimension]
+    numbers = NUMBERS[dimension]
 
-    @njit
+    # What divides by zero is infinite or undefined, as it is for arrays, and no error.
+    @njit(error_model="numpy")
     def law(H: Tensor, params: tuple[float, ...]) -> Tensor:
         F = F_of(H)
         return numbers(T_of(F, P_of(F, params)))
@@ -81,7 +111,8 @@ def _numbers_3(T: Tensor) -> Tensor:
     )
 
 
-_NUMBERS = {1: _numbers_1, 2: _numbers_2, 3: _numbers_3}
+NUMBERS = {1: _numbers_1, 2: _numbers_2, 3: _numbers_3}
+"""Compiled tensor -> the same, all components of one type; by dimension."""
 
 
 @cache

@@ -1,0 +1,210 @@
+"""Sums over the neighbours of moving particles, with weights by formulas compiled into the loops.
+
+Weights are not stored: they are made from the kernel's slope of a pair and from one matrix a
+particle, which costs less than fetching them from memory.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, final
+
+import attrs
+import numpy as np
+from numba import njit, types
+
+from solidsph.arrays import Array
+from solidsph.body import Body
+from solidsph.engines.compiled.neighbourhoods import Neighbourhoods
+from solidsph.engines.compiled.pointwise import (
+    NUMBERS,
+    NotCompilableError,
+    compiled_function,
+    registered,
+    tensor_type,
+)
+from solidsph.engines.compiled.vectors import (
+    IDENTITY,
+    MATRIX,
+    ROW,
+    moved,
+    times,
+    with_outer,
+    with_product,
+)
+from solidsph.interfaces.divergence import Divergence, PointwiseDivergence
+from solidsph.interfaces.gradient import Gradient, PointwiseGradient
+from solidsph.tensors import product
+
+
+@final
+@attrs.frozen(eq=False)
+class PointwiseSums:
+    """Both sums of a body whose gradient and divergence are pointwise formulas."""
+
+    gradient: Gradient
+    gather: Any
+    scatter: Any
+    corrections: Array  # (n, d, d) K_p [-]
+    own: Array  # (n, d) g_pp [1/m]
+
+    @classmethod
+    def of(cls, body: Body) -> PointwiseSums:
+        """The sums of a body.
+
+        Raises:
+            NotCompilableError: its gradient or divergence is no such formula, or not compilable.
+        """
+        n, d = body.particles.count, body.particles.dimension
+        gradient, divergence = body.formulation.gradient, body.formulation.divergence
+        if not isinstance(gradient, PointwiseGradient):
+            raise NotCompilableError(f"{gradient} has no pointwise form")
+        correction = None
+        if gradient.is_corrected:
+            correction = compiled_function(gradient.correction, tensor_type(d))
+        corrects = correction is not None
+        return cls(
+            gradient,
+            _gather(d, correction, gradient.of_differences),
+            _adjoint(d, corrects) if divergence.adjoint else _pointwise(d, corrects, divergence),
+            np.empty((n, d, d)),
+            np.empty((n, d)),
+        )
+
+    def gradients(
+        self, rows: Neighbourhoods, positions: Array, cells: Array, u: Array, out: Array
+    ) -> None:
+        """H (n, d, d) of u (n, d), and what the forces will need.
+
+        Raises:
+            BuildError: the neighbours of a particle do not determine a gradient.
+        """
+        done = self.gather(rows, positions, cells, u, self.corrections, self.own, out)
+        if not done:
+            # The array form says whose neighbours they are.
+            pairs = rows.pairs(positions)
+            slopes = rows.slopes[: pairs.count]
+            self.gradient.weights(pairs, -slopes[:, None] * pairs.offsets, cells)
+
+    def forces(
+        self,
+        rows: Neighbourhoods,
+        positions: Array,
+        cells: Array,
+        volumes: Array,
+        stress: Array,
+        out: Array,
+    ) -> None:
+        """Forces (n, d) from stress (n, d, d), at the positions of the gradients before."""
+        K, own = self.corrections, self.own
+        self.scatter(rows, positions, cells, volumes, K, own, stress, out)
+
+
+@cache
+def _gather(dimension: int, correction: Any, of_differences: bool) -> Any:
+    """Loop (rows, positions, cells, u, corrections, own, gradients) -> whether all K are finite."""
+    row, numbers, one = ROW[dimension], NUMBERS[dimension], IDENTITY[dimension]
+    nothing = tuple(tuple(0.0 for _ in r) for r in one)
+    corrects = correction is not None
+
+    @njit(error_model="numpy")
+    def gather(rows, positions, cells, u, corrections, own, gradients):
+        unknown = 0.0
+        for p in range(len(positions)):
+            here, u_p = row(positions, p), row(u, p)
+            moment = along = nothing
+            total = times(0.0, here)  # not a number where the particle is nowhere
+            for m in range(rows.starts[p], rows.starts[p + 1]):
+                q = rows.columns[m]
+                offset = moved(row(positions, q), -1.0, here)
+                plain = times(-rows.slopes[m] * cells[q], offset)
+                change = row(u, q)
+                if of_differences:
+                    change = moved(change, -1.0, u_p)
+                along = with_outer(along, change, plain)
+                total = moved(total, 1.0, plain)
+                if corrects:
+                    moment = with_outer(moment, offset, plain)
+            K = one
+            if corrects:
+                K = numbers(correction(moment))
+            weight = with_product(nothing[0], K, total)
+            for i in range(dimension):
+                own[p, i] = -weight[i] if of_differences else 0.0 * weight[i]
+                slope = with_product(nothing[0], K, along[i])
+                for k in range(dimension):
+                    gradients[p, i, k] = slope[k]
+                    corrections[p, i, k] = K[i][k]
+                    unknown += 0.0 * K[i][k]
+        return unknown == 0.0
+
+    return gather
+
+
+@cache
+def _adjoint(dimension: int, corrects: bool) -> Any:
+    """Loop (rows, positions, cells, volumes, corrections, own, stress, forces): the transpose."""
+    row, matrix, zero = ROW[dimension], MATRIX[dimension], (0.0,) * dimension
+    times_matrix = registered(product)
+
+    @njit(error_model="numpy")
+    def force(rows, positions, cells, volumes, corrections, own, stress, forces):
+        # What K_q does to the slope of every pair (q, p) it does to the stress once.
+        acting = np.empty_like(stress)
+        for q in range(len(positions)):
+            T = matrix(stress, q)
+            if corrects:
+                T = times_matrix(T, matrix(corrections, q))
+            for i in range(dimension):
+                for k in range(dimension):
+                    acting[q, i, k] = volumes[q] * T[i][k]
+        for p in range(len(positions)):
+            f, here = zero, row(positions, p)
+            for m in range(rows.starts[p], rows.starts[p + 1]):
+                q = rows.columns[m]
+                slope = times(rows.slopes[m], moved(row(positions, q), -1.0, here))
+                f = with_product(f, matrix(acting, q), slope)
+            from_self = with_product(zero, matrix(stress, p), row(own, p))
+            for i in range(dimension):
+                forces[p, i] = -cells[p] * f[i] - volumes[p] * from_self[i]
+
+    return force
+
+
+def _pointwise(dimension: int, corrects: bool, divergence: Divergence) -> Any:
+    """Loop (rows, positions, cells, volumes, corrections, own, stress, forces) of any other."""
+    if not isinstance(divergence, PointwiseDivergence):
+        raise NotCompilableError(f"{divergence} has no pointwise form")
+    pair_weight = compiled_function(divergence.pair_weight, *[types.float64] * 4)
+    own_weight = compiled_function(divergence.own_weight, *[types.float64] * 2)
+    return _by_formula(dimension, corrects, pair_weight, own_weight)
+
+
+@cache
+def _by_formula(dimension: int, corrects: bool, pair_weight: Any, own_weight: Any) -> Any:
+    row, matrix, zero = ROW[dimension], MATRIX[dimension], (0.0,) * dimension
+
+    @njit(error_model="numpy")
+    def force(rows, positions, cells, volumes, corrections, own, stress, forces):
+        weights = np.zeros((1, dimension))
+        for p in range(len(positions)):
+            here, K_p = row(positions, p), matrix(corrections, p)
+            for k in range(dimension):
+                weights[0, k] = own_weight(own[p, k], volumes[p])
+            f = with_product(times(0.0, row(own, p)), matrix(stress, p), row(weights, 0))
+            for m in range(rows.starts[p], rows.starts[p + 1]):
+                if m == rows.own[p]:
+                    continue
+                q = rows.columns[m]
+                slope = times(-rows.slopes[m], moved(row(positions, q), -1.0, here))
+                there, back = times(cells[q], slope), times(-cells[p], slope)
+                if corrects:
+                    there = with_product(zero, K_p, there)
+                    back = with_product(zero, matrix(corrections, q), back)
+                for k in range(dimension):
+                    weights[0, k] = pair_weight(there[k], back[k], volumes[p], volumes[q])
+                f = with_product(f, matrix(stress, q), row(weights, 0))
+            for i in range(dimension):
+                forces[p, i] = f[i]
+
+    return force

@@ -1,0 +1,83 @@
+"""Sums over the neighbours of moving particles, with weights that their parts give as arrays."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, final
+
+import attrs
+from numba import njit
+
+from solidsph.arrays import Array
+from solidsph.engines.compiled.neighbourhoods import Neighbourhoods
+from solidsph.engines.compiled.vectors import MATRIX, ROW, with_outer, with_product
+from solidsph.interfaces.formulation import Formulation
+from solidsph.neighbours import Pairs
+
+
+@final
+@attrs.define(eq=False)
+class WeightedSums:
+    """Both sums of a body whose gradient or divergence is a function of all pairs at once."""
+
+    formulation: Formulation
+    pairs: Pairs | None = None
+    weights: Array | None = None  # (m, d) the gradient's [1/m]
+
+    def gradients(
+        self, rows: Neighbourhoods, positions: Array, cells: Array, u: Array, out: Array
+    ) -> None:
+        """As in `PointwiseSums`."""
+        self.pairs = pairs = rows.pairs(positions)
+        slopes = rows.slopes[: pairs.count, None]
+        self.weights = self.formulation.gradient.weights(pairs, -slopes * pairs.offsets, cells)
+        _gather(u.shape[1])(rows, self.weights, u, out)
+
+    def forces(
+        self,
+        rows: Neighbourhoods,
+        positions: Array,
+        cells: Array,
+        volumes: Array,
+        stress: Array,
+        out: Array,
+    ) -> None:
+        """As in `PointwiseSums`."""
+        assert self.pairs is not None, "gradients come first"
+        assert self.weights is not None, "gradients come first"
+        weights = self.formulation.divergence.weights(self.pairs, self.weights, volumes)
+        _force(positions.shape[1])(rows, weights, stress, out)
+
+
+@cache
+def _gather(dimension: int) -> Any:
+    row, zero = ROW[dimension], (0.0,) * dimension
+    nothing = (zero,) * dimension
+
+    @njit
+    def gather(rows, weights, u, gradients):
+        for p in range(len(u)):
+            H = nothing
+            for m in range(rows.starts[p], rows.starts[p + 1]):
+                H = with_outer(H, row(u, rows.columns[m]), row(weights, m))
+            for i in range(dimension):
+                for k in range(dimension):
+                    gradients[p, i, k] = H[i][k]
+
+    return gather
+
+
+@cache
+def _force(dimension: int) -> Any:
+    row, matrix, zero = ROW[dimension], MATRIX[dimension], (0.0,) * dimension
+
+    @njit
+    def force(rows, weights, stress, forces):
+        for p in range(len(forces)):
+            f = zero
+            for m in range(rows.starts[p], rows.starts[p + 1]):
+                f = with_product(f, matrix(stress, rows.columns[m]), row(weights, m))
+            for i in range(dimension):
+                forces[p, i] = f[i]
+
+    return force
