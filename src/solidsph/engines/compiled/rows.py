@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from solidsph.arrays import Array, Indices, Mask
+from solidsph.engines.compiled.growing import Growing
 from solidsph.neighbours import Pairs
 
 # Relative to the largest weight of a row: below the first a weight is rounding, and below the
@@ -69,13 +70,13 @@ class Rows(NamedTuple):
 class _Compressor:
     """Takes chunks of rows and keeps what is new in them."""
 
-    def __init__(self, dtype: str, shortest_run: int) -> None:
+    def __init__(self, dimension: int, dtype: str, shortest_run: int) -> None:
         self._dtype, self._shortest_run = dtype, shortest_run
-        self._blocks: list[Array] = []
         self._stencils: list[tuple[Indices, Array]] = []
-        self._lengths: list[Indices] = []
-        self._columns: list[NDArray[np.int32]] = []
-        self._weights: list[Array] = []
+        self._blocks = Growing(3, dtype=np.intp)
+        self._lengths = Growing(dtype=np.intp)
+        self._columns = Growing(dtype=np.int32)
+        self._weights = Growing(dimension, dtype=dtype)
         self._row_count = 0
 
     def add(self, first: int, counts: Indices, columns: Indices, weights: Array) -> None:
@@ -95,29 +96,29 @@ class _Compressor:
         single = np.repeat(~shared, length)
         self._add_rows(first, single)
         kept = np.repeat(single, counts)
-        self._lengths.append(counts[single])
-        self._columns.append(columns[kept].astype(np.int32))
-        self._weights.append(weights[kept].astype(self._dtype))
+        self._lengths.extend(counts[single])
+        self._columns.extend(columns[kept])
+        self._weights.extend(weights[kept])
         self._row_count += int(single.sum())
 
-    def rows(self, dimension: int) -> Rows:
+    def rows(self) -> Rows:
         """All that was added."""
-        blocks = np.concatenate([np.empty((0, 3), dtype=np.intp), *self._blocks])
+        blocks = self._blocks.array()
         offsets = [one[0] for one in self._stencils]
         members = _starts(np.array([len(one) for one in offsets], dtype=np.intp))
         bands = [_bands(one, start) for one, start in zip(offsets, members[:-1], strict=True)]
-        none = np.empty((0, dimension), dtype=self._dtype)
+        weights = self._weights.array()
         stencil_weights = [one[1].astype(self._dtype) for one in self._stencils]
         return Rows(
             blocks=np.ascontiguousarray(blocks[np.argsort(blocks[:, 0])]),
             members=members,
             stencils=_starts(np.array([len(one) for one in bands], dtype=np.intp)),
             offsets=np.concatenate([np.empty(0, dtype=np.intp), *offsets]),
-            stencil_weights=np.concatenate([none, *stencil_weights]),
+            stencil_weights=np.concatenate([weights[:0], *stencil_weights]),
             bands=np.concatenate([np.empty((0, 3), dtype=np.intp), *bands]),
-            starts=_starts(np.concatenate([np.empty(0, dtype=np.intp), *self._lengths])),
-            columns=np.concatenate([np.empty(0, dtype=np.int32), *self._columns]),
-            weights=np.concatenate([none, *self._weights]),
+            starts=_starts(self._lengths.array()),
+            columns=self._columns.array(),
+            weights=weights,
         )
 
     def _stencil(self, offsets: Indices, weights: Array) -> int:
@@ -128,7 +129,8 @@ class _Compressor:
                 close = _SAME * np.abs(values).max()
                 if np.abs(values - weights).max() <= close:
                     return len(self._stencils) - 1
-        self._stencils.append((offsets, weights))
+        # A copy: what comes in is a view of a whole chunk, which would live as long.
+        self._stencils.append((offsets, weights.copy()))
         return len(self._stencils) - 1
 
     def _add_rows(self, first: int, single: Mask) -> None:
@@ -140,7 +142,7 @@ class _Compressor:
         self._add_blocks(first + k[at], np.diff([*at, len(k)]), -1 - (self._row_count + at))
 
     def _add_blocks(self, first: Indices, count: Indices, where: Indices) -> None:
-        self._blocks.append(np.stack([first, count, where], axis=1).astype(np.intp))
+        self._blocks.extend(np.stack([first, count, where], axis=1))
 
 
 def compressed(
@@ -154,7 +156,7 @@ def compressed(
         dtype: number type in which the weights are kept.
         shortest_run: fewest particles for which a stencil pays.
     """
-    compressor = _Compressor(dtype, shortest_run)
+    compressor = _Compressor(dimension, dtype, shortest_run)
     for pairs, weights in chunks:
         size = np.abs(weights).max(axis=1)
         largest = np.maximum.reduceat(size, pairs.starts[:-1])
@@ -163,7 +165,7 @@ def compressed(
         matters[pairs.self_pairs] = True
         counts = np.add.reduceat(matters, pairs.starts[:-1], dtype=np.intp)
         compressor.add(int(pairs.rows[0]), counts, pairs.columns[matters], weights[matters])
-    return compressor.rows(dimension)
+    return compressor.rows()
 
 
 def in_chunks(pairs: Pairs, weights: Array, rows: int = 2048) -> Iterator[tuple[Pairs, Array]]:
