@@ -24,10 +24,18 @@ class Growing:
         """Put `values` (k, ...) behind those that are there."""
         end = self._count + len(values)
         if end > len(self._data):
-            # An eighth more than needed, so that what is copied adds up to some times the whole.
+            # An eighth more than needed: all that is ever copied is some times the whole.
             self._resize(end + end // 8)
         self._data[self._count : end] = values
         self._count = end
+
+    def so_far(self) -> NDArray[Any]:
+        """What is there, to be read or changed; let go of it before adding more."""
+        return self._data[: self._count]
+
+    def shorten(self, count: int) -> None:
+        """Keep the first `count` entries."""
+        self._count = count
 
     def array(self) -> NDArray[Any]:
         """All entries, (n, ...). Nothing can be added any more."""
@@ -35,5 +43,5 @@ class Growing:
         return self._data
 
     def _resize(self, count: int) -> None:
-        # No view of it is ever given away before it is complete.
+        # Whoever held a view while the array moves would read what is no longer there.
         self._data.resize((count, *self._data.shape[1:]), refcheck=False)
