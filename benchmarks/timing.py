@@ -16,7 +16,10 @@ def alternately(
     repeats: int,
     of: Callable[[Sequence[float]], float] = median,
 ) -> dict[Any, float]:
-    """Median time of each run [s]; they take turns, so that a slow moment meets all."""
+    """Time of each run [s]: the median of `repeats` samples, or what `of` says.
+
+    They take turns, so that a slow moment meets all.
+    """
     times: dict[Any, list[float]] = {key: [] for key in runs}
     calls = {key: max(1, int(_SHORTEST / _once(run))) for key, run in runs.items()}
     for _ in range(repeats):
