@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 EXAMPLE := plugins/examples/solidsph-wendland
 
-.PHONY: demo test validate bench lint format clean
+.PHONY: demo test validate bench bench-page lint format clean
 
 demo: $(STAMP)  ## the paper's headline experiment: table, record and picture
 	$(BIN)/solidsph run tensile-instability
@@ -16,10 +16,12 @@ test: $(STAMP) lint  ## lint, types and every test but the slow physics
 validate: $(STAMP)  ## the slow physics
 	$(BIN)/pytest -n 2 -m validation -rP
 
-bench: $(STAMP)  ## throughput against a plain C loop, by size up to a million particles, and the updated form
-	$(BIN)/python benchmarks/throughput.py
-	$(BIN)/python benchmarks/throughput.py --sizes
+bench: $(STAMP)  ## against a plain C loop, whole steps, memory, throughput along every axis, the updated form
+	$(BIN)/python benchmarks/bench.py
 	$(BIN)/python benchmarks/moving.py
+
+bench-page: $(STAMP)  ## the same, written to the documentation
+	$(BIN)/python benchmarks/bench.py --write docs/benchmarks.md
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -249,8 +249,9 @@ class Assembly:
         return conditions
 
     def _initial_state(self, particles: Particles) -> State:
-        displacements = np.zeros_like(particles.positions)
-        velocities = np.zeros_like(particles.positions)
+        # By shape and not `zeros_like`: pages of zeros that are never written take no memory.
+        displacements = np.zeros(particles.positions.shape)
+        velocities = np.zeros(particles.positions.shape)
         for entry in self._scene.initial:
             chosen = select(particles, entry.where)
             for table, values, what in (
@@ -269,7 +270,7 @@ class Assembly:
             step=0,
             positions=particles.positions + displacements,
             velocities=velocities,
-            accelerations=np.zeros_like(velocities),
+            accelerations=np.zeros(velocities.shape),
         )
 
     def _step_size(

@@ -6,10 +6,12 @@ is a file read and two runs never share a history.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from solidsph.arrays import Array, Indices, Mask
 from solidsph.errors import SceneError
@@ -83,12 +85,12 @@ class Particles:
                 moved = own_face.particles + slices[name].start
                 faces.setdefault(face, []).append(attrs.evolve(own_face, particles=moved))
         return cls(
-            positions=np.concatenate([part.positions for part in parts]),
-            volumes=np.concatenate([part.volumes for part in parts]),
-            spacings=np.concatenate([part.spacings for part in parts]),
-            area_vectors=np.concatenate([part.area_vectors for part in parts]),
-            ghosts=np.concatenate([part.ghosts for part in parts]),
-            images=np.concatenate([part.images for part in parts]),
+            positions=_joined([part.positions for part in parts]),
+            volumes=_joined([part.volumes for part in parts]),
+            spacings=_joined([part.spacings for part in parts]),
+            area_vectors=_joined([part.area_vectors for part in parts]),
+            ghosts=_joined([part.ghosts for part in parts]),
+            images=_joined([part.images for part in parts]),
             tags=tags,
             bodies=slices,
             faces={
@@ -99,7 +101,7 @@ class Particles:
                 )
                 for face, several in faces.items()
             },
-            cells=np.concatenate([part.cells for part in parts]),
+            cells=_joined([part.cells for part in parts]),
         )
 
     def tagged(self, name: str) -> Indices:
@@ -112,6 +114,11 @@ class Particles:
             known = ", ".join(sorted(self.tags)) or "none"
             raise SceneError(f"no tag {name!r} among the particles; known tags: {known}")
         return np.flatnonzero(self.tags[name])
+
+
+def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Arrays one behind the other; reference data are never written, so one alone is shared."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 @attrs.frozen(eq=False)

@@ -80,13 +80,14 @@ def lattice_particles(
     count = numbers.size + len(ghost_positions)
     own = faces(surface, owners)
     is_ghost = np.arange(count) >= numbers.size
+    everywhere = np.concatenate([positions, ghost_positions])
     return Particles(
-        positions=np.concatenate([positions, ghost_positions]),
+        positions=everywhere,
         volumes=np.concatenate([volumes, np.full(len(ghost_positions), grid.cell_volume)]),
         spacings=np.full(count, _spacing(grid, spacing)),
         area_vectors=area_vectors(own, count, shape.dimension),
         ghosts=is_ghost,
-        images=np.concatenate([positions, images]),
+        images=np.concatenate([positions, images]) if len(images) else everywhere,
         tags=tags(own, is_ghost, [surface.faces[sample] for sample in samples]),
         faces=own,
         # A ghost weighs in sums what the particle does whose image it is.

@@ -74,18 +74,21 @@ def block_loops(dimension: int, dtype: str) -> BlockLoops:
             put(scratch, at + 3 * W, plane, h3)
 
     @njit
-    def gather_rows(rows, count, row, u, scratch):
+    def gather_rows(rows, first, count, row, u, scratch):
         for slot in range(count):
-            m, end = rows.starts[row + slot], rows.starts[row + slot + 1]
+            m, end = rows.spans[row + slot]
             # Two sums side by side, because each addition waits for the one before it.
             h, other = zeros_1(), zeros_1()
             while m + 1 < end:
-                h = outer_1(h, load_1(u, rows.columns[m] * D), weight_1(rows.weights, m))
+                at = (first + slot + rows.row_offsets[m]) * D
+                h = outer_1(h, load_1(u, at), weight_1(rows.row_weights, m))
                 m += 1
-                other = outer_1(other, load_1(u, rows.columns[m] * D), weight_1(rows.weights, m))
+                at = (first + slot + rows.row_offsets[m]) * D
+                other = outer_1(other, load_1(u, at), weight_1(rows.row_weights, m))
                 m += 1
             if m < end:
-                h = outer_1(h, load_1(u, rows.columns[m] * D), weight_1(rows.weights, m))
+                at = (first + slot + rows.row_offsets[m]) * D
+                h = outer_1(h, load_1(u, at), weight_1(rows.row_weights, m))
             put_1(scratch, (margin + slot) * D, plane, total_1(h, other))
 
     @njit
@@ -94,7 +97,7 @@ def block_loops(dimension: int, dtype: str) -> BlockLoops:
         if where >= 0:
             gather_run(rows, first, count, where, u, scratch)
         else:
-            gather_rows(rows, count, -1 - where, u, scratch)
+            gather_rows(rows, first, count, -1 - where, u, scratch)
 
     @njit
     def scatter_run(rows, first, count, stencil, scratch, f, shift):
@@ -122,12 +125,13 @@ def block_loops(dimension: int, dtype: str) -> BlockLoops:
                 store(f, to + 3 * W, f3)
 
     @njit
-    def scatter_rows(rows, count, row, scratch, f, shift):
+    def scatter_rows(rows, first, count, row, scratch, f, shift):
         for slot in range(count):
             T = get_1(scratch, (margin + slot) * D, plane)
-            for m in range(rows.starts[row + slot], rows.starts[row + slot + 1]):
-                to = rows.columns[m] * D + shift
-                store_1(f, to, inner_1(load_1(f, to), T, weight_1(rows.weights, m)))
+            begin, end = rows.spans[row + slot]
+            for m in range(begin, end):
+                to = (first + slot + rows.row_offsets[m]) * D + shift
+                store_1(f, to, inner_1(load_1(f, to), T, weight_1(rows.row_weights, m)))
 
     @njit
     def scatter(rows, block, scratch, f, shift):
@@ -135,7 +139,7 @@ def block_loops(dimension: int, dtype: str) -> BlockLoops:
         if where >= 0:
             scatter_run(rows, first, count, where, scratch, f, shift)
         else:
-            scatter_rows(rows, count, -1 - where, scratch, f, shift)
+            scatter_rows(rows, first, count, -1 - where, scratch, f, shift)
 
     tensor_at = _tensor_at(d, plane)
 

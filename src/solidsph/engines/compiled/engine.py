@@ -36,6 +36,9 @@ from solidsph.neighbours import Pairs
 from solidsph.tensors import components_first, particles_first
 from solidsph.time_loop import TimeLoop
 
+# Particles whose stress is found at once for reports and records.
+_AT_ONCE = 4096
+
 
 @final
 @attrs.frozen
@@ -129,13 +132,9 @@ class CompiledBody:
         self._stress(self.passes, displacements, out)
         out[:, :, self.body.particles.ghosts] = 0.0
 
-    def gradient_of(self, displacements: Array) -> Array:
-        """Gradient H (d, d, n) of displacements (n, d); that of ghosts is 0."""
-        n, d = displacements.shape
-        H = np.zeros((d, d, n))
-        self._stress(self.gradients, displacements, H)
-        H[:, :, self.body.particles.ghosts] = 0.0
-        return H
+    def gradient_of(self, displacements: Array, out: Array) -> None:
+        """Gradient H (n, d, d) of displacements (n, d); that of ghosts is left as it is."""
+        self._stress(self.gradients, displacements, out.transpose(1, 2, 0))
 
     def _stress(self, passes: Passes, displacements: Array, out: Array) -> None:
         passes.stress(
@@ -258,16 +257,34 @@ class CompiledForces(InternalForces):
         n, d = displacements.shape
         fields = StressFields(np.empty((n, d, d)), np.zeros((n, d, d)), np.zeros(n))
         for part in self.parts:
-            body, extent = part.body, part.body.extent
-            count = body.particles.count
-            with np.errstate(all="ignore"):  # as in the matrix engine
-                H = part.gradient_of(displacements[extent])
-                F = particles_first(body.formulation.deformation_gradient(H), count)
-                F[body.particles.ghosts] = np.eye(d)
-                first = components_first(F)
-                P = body.material.first_piola(first, body.material.params)
-                energy = body.material.energy(first, body.material.params)
-            fields.deformation_gradients[extent] = F
-            fields.stresses[extent] = particles_first(P, count)
-            fields.energy_densities[extent] = energy
+            extent = part.body.extent
+            F, P = fields.deformation_gradients[extent], fields.stresses[extent]
+            energy = fields.energy_densities[extent]
+            part.gradient_of(displacements[extent], F)
+            for some in _portions(part.body.particles.count):
+                F[some] = _deformation(part.body, F[some])
+            F[part.body.particles.ghosts] = np.eye(d)
+            for some in _portions(part.body.particles.count):
+                P[some], energy[some] = _stress_and_energy(part.body, F[some])
         return fields
+
+
+def _portions(count: int) -> Iterator[slice]:
+    """Particles 0 to `count`, some at a time: what the law needs between stays in cache."""
+    return (slice(first, first + _AT_ONCE) for first in range(0, count, _AT_ONCE))
+
+
+def _deformation(body: Body, H: Array) -> Array:
+    """F (k, d, d) from H (k, d, d)."""
+    with np.errstate(all="ignore"):  # as in the matrix engine
+        F = body.formulation.deformation_gradient(components_first(H))
+    return particles_first(F, len(H))
+
+
+def _stress_and_energy(body: Body, F: Array) -> tuple[Array, Array]:
+    """P (k, d, d) and psi (k,) from F (k, d, d)."""
+    components = components_first(F)
+    with np.errstate(all="ignore"):  # as in the matrix engine
+        P = body.material.first_piola(components, body.material.params)
+        energy = body.material.energy(components, body.material.params)
+    return particles_first(P, len(F)), energy

@@ -88,11 +88,10 @@ class MovingBody:
             self.tensors[self.body.particles.ghosts] = 0.0
         self._spread(out)
 
-    def gradient_of(self, displacements: Array) -> Array:
-        """Gradient H (d, d, n) of displacements (n, d); that of ghosts is 0."""
+    def gradient_of(self, displacements: Array, out: Array) -> None:
+        """Gradient H (n, d, d) of displacements (n, d); that of ghosts is of no use."""
         self._gradients(displacements)
-        self.tensors[self.body.particles.ghosts] = 0.0
-        return np.moveaxis(self.tensors, 0, -1).copy()
+        out[...] = self.tensors
 
     def _stress(self, displacements: Array) -> None:
         self._gradients(displacements)

@@ -1,7 +1,8 @@
 """Rows of weights in little memory: particles with the same stencil share it.
 
 Particles made by a lattice stand in long runs p, p + 1, ... whose neighbours have the same index
-offsets and the same weights. A run keeps one stencil; only the rest keeps rows of its own.
+offsets and the same weights. A run keeps one stencil. The rest is treated row by row, but there too
+many have the row of another, as the first particles of all lines do: each row is kept once.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from solidsph.arrays import Array, Indices, Mask
+from solidsph.engines.compiled.growing import Growing
 from solidsph.neighbours import Pairs
 
 # Relative to the largest weight of a row: below the first a weight is rounding, and below the
@@ -21,6 +23,10 @@ from solidsph.neighbours import Pairs
 # size, so their differences to some 1e-14 of the spacing.
 _NOTHING = 1e-15
 _SAME = 1e-13
+
+# How many rows are remembered to be compared with those that come. A lattice has as many different
+# ones as there are places within reach of surfaces: some 6 along an axis, some hundreds in all.
+_KNOWN = 4096
 
 RUN = 128  # most particles of a run that are treated at once, so that their tensors stay in cache
 ROWS = 16  # the same for rows, which have weights of their own
@@ -39,10 +45,11 @@ class Rows(NamedTuple):
     offsets: Indices  # (k,) q - p of every member of a stencil, rising
     stencil_weights: Array  # (k, d) [1/m]
     bands: Indices  # (c, 3) members whose offsets follow each other: first member, offset, width
-    # (r + 1,), (m,), (m, d) rows of those that are in no run
-    starts: Indices
-    columns: NDArray[np.int32]
-    weights: Array
+    # (r, 2), (m,), (m, d) rows of those that are in no run: where the members of each begin and
+    # end, their q - p, rising, and their weights [1/m]; several may have the same members
+    spans: Indices
+    row_offsets: NDArray[np.int32]
+    row_weights: Array
 
     @property
     def run_particles(self) -> int:
@@ -61,21 +68,23 @@ class Rows(NamedTuple):
         run = where >= 0
         sizes = np.diff(self.members)
         costs[run] = 0.4 * count[run] * sizes[where[run]]
+        starts = _starts(self.spans[:, 1] - self.spans[:, 0])
         row = -1 - where[~run]
-        costs[~run] = self.starts[row + count[~run]] - self.starts[row]
+        costs[~run] = starts[row + count[~run]] - starts[row]
         return costs
 
 
 class _Compressor:
     """Takes chunks of rows and keeps what is new in them."""
 
-    def __init__(self, dtype: str, shortest_run: int) -> None:
+    def __init__(self, dimension: int, dtype: str, shortest_run: int) -> None:
         self._dtype, self._shortest_run = dtype, shortest_run
-        self._blocks: list[Array] = []
         self._stencils: list[tuple[Indices, Array]] = []
-        self._lengths: list[Indices] = []
-        self._columns: list[NDArray[np.int32]] = []
-        self._weights: list[Array] = []
+        self._blocks = Growing(3, dtype=np.intp)
+        self._spans = Growing(2, dtype=np.intp)
+        self._offsets = Growing(dtype=np.int32)
+        self._weights = Growing(dimension, dtype=dtype)
+        self._known = np.zeros((_KNOWN, 2), dtype=np.intp)
         self._row_count = 0
 
     def add(self, first: int, counts: Indices, columns: Indices, weights: Array) -> None:
@@ -95,29 +104,35 @@ class _Compressor:
         single = np.repeat(~shared, length)
         self._add_rows(first, single)
         kept = np.repeat(single, counts)
-        self._lengths.append(counts[single])
-        self._columns.append(columns[kept].astype(np.int32))
-        self._weights.append(weights[kept].astype(self._dtype))
-        self._row_count += int(single.sum())
+        before = len(self._offsets.so_far())
+        self._offsets.extend((columns - rows)[kept])
+        self._weights.extend(weights[kept])
+        spans, count = _each_once(
+            counts[single], before, self._offsets.so_far(), self._weights.so_far(), self._known
+        )
+        self._offsets.shorten(count)
+        self._weights.shorten(count)
+        self._spans.extend(spans)
+        self._row_count += len(spans)
 
-    def rows(self, dimension: int) -> Rows:
+    def rows(self) -> Rows:
         """All that was added."""
-        blocks = np.concatenate([np.empty((0, 3), dtype=np.intp), *self._blocks])
+        blocks = self._blocks.array()
         offsets = [one[0] for one in self._stencils]
         members = _starts(np.array([len(one) for one in offsets], dtype=np.intp))
         bands = [_bands(one, start) for one, start in zip(offsets, members[:-1], strict=True)]
-        none = np.empty((0, dimension), dtype=self._dtype)
+        weights = self._weights.array()
         stencil_weights = [one[1].astype(self._dtype) for one in self._stencils]
         return Rows(
             blocks=np.ascontiguousarray(blocks[np.argsort(blocks[:, 0])]),
             members=members,
             stencils=_starts(np.array([len(one) for one in bands], dtype=np.intp)),
             offsets=np.concatenate([np.empty(0, dtype=np.intp), *offsets]),
-            stencil_weights=np.concatenate([none, *stencil_weights]),
+            stencil_weights=np.concatenate([weights[:0], *stencil_weights]),
             bands=np.concatenate([np.empty((0, 3), dtype=np.intp), *bands]),
-            starts=_starts(np.concatenate([np.empty(0, dtype=np.intp), *self._lengths])),
-            columns=np.concatenate([np.empty(0, dtype=np.int32), *self._columns]),
-            weights=np.concatenate([none, *self._weights]),
+            spans=self._spans.array(),
+            row_offsets=self._offsets.array(),
+            row_weights=weights,
         )
 
     def _stencil(self, offsets: Indices, weights: Array) -> int:
@@ -128,7 +143,8 @@ class _Compressor:
                 close = _SAME * np.abs(values).max()
                 if np.abs(values - weights).max() <= close:
                     return len(self._stencils) - 1
-        self._stencils.append((offsets, weights))
+        # A copy: what comes in is a view of a whole chunk, which would live as long.
+        self._stencils.append((offsets, weights.copy()))
         return len(self._stencils) - 1
 
     def _add_rows(self, first: int, single: Mask) -> None:
@@ -140,7 +156,7 @@ class _Compressor:
         self._add_blocks(first + k[at], np.diff([*at, len(k)]), -1 - (self._row_count + at))
 
     def _add_blocks(self, first: Indices, count: Indices, where: Indices) -> None:
-        self._blocks.append(np.stack([first, count, where], axis=1).astype(np.intp))
+        self._blocks.extend(np.stack([first, count, where], axis=1))
 
 
 def compressed(
@@ -154,7 +170,7 @@ def compressed(
         dtype: number type in which the weights are kept.
         shortest_run: fewest particles for which a stencil pays.
     """
-    compressor = _Compressor(dtype, shortest_run)
+    compressor = _Compressor(dimension, dtype, shortest_run)
     for pairs, weights in chunks:
         size = np.abs(weights).max(axis=1)
         largest = np.maximum.reduceat(size, pairs.starts[:-1])
@@ -163,7 +179,7 @@ def compressed(
         matters[pairs.self_pairs] = True
         counts = np.add.reduceat(matters, pairs.starts[:-1], dtype=np.intp)
         compressor.add(int(pairs.rows[0]), counts, pairs.columns[matters], weights[matters])
-    return compressor.rows(dimension)
+    return compressor.rows()
 
 
 def in_chunks(pairs: Pairs, weights: Array, rows: int = 2048) -> Iterator[tuple[Pairs, Array]]:
@@ -211,6 +227,50 @@ def _run_heads(starts: Indices, offsets: Indices, weights: Array, tolerance: flo
                     largest = max(largest, abs(weights[m, k]))
         heads[p] = head
     return heads
+
+
+@njit
+def _each_once(
+    counts: Indices, first: int, offsets: Indices, weights: Array, known: Indices
+) -> tuple[Indices, int]:
+    """Where the members of each new row begin and end, (k, 2), and how many members are kept.
+
+    The new rows, of so many members each, stand in `offsets` and `weights` from `first` on. What
+    one of the `known` rows (h, 2) says already is dropped, and the others close up.
+    """
+    spans = np.empty((len(counts), 2), np.intp)
+    start = end = first  # where the next row stands, and where it is to go
+    for row in range(len(counts)):
+        n = counts[row]
+        place = np.intp(n)
+        for m in range(start, start + n):
+            place = (31 * place + offsets[m]) % len(known)
+        a = known[place, 0]
+        if known[place, 1] != n or not _same_members(offsets, weights, a, start, n):
+            a = end
+            for m in range(n):
+                offsets[end + m] = offsets[start + m]
+                weights[end + m] = weights[start + m]
+            known[place, 0], known[place, 1] = a, n
+            end += n
+        spans[row, 0], spans[row, 1] = a, a + n
+        start += n
+    return spans, end
+
+
+@njit
+def _same_members(offsets: Indices, weights: Array, a: int, b: int, count: int) -> bool:
+    largest = 0.0
+    for m in range(count):
+        if offsets[a + m] != offsets[b + m]:
+            return False
+        for k in range(weights.shape[1]):
+            largest = max(largest, abs(weights[a + m, k]))
+    for m in range(count):
+        for k in range(weights.shape[1]):
+            if not abs(weights[a + m, k] - weights[b + m, k]) <= _SAME * largest:
+                return False
+    return True
 
 
 @njit

@@ -87,11 +87,16 @@ def _reach(rows: Rows) -> tuple[Indices, Indices]:
     low[run] += rows.offsets[rows.members[stencil]]
     high[run] += rows.offsets[rows.members[stencil + 1] - 1]
     if not run.all():
-        row = -1 - where[~run]
-        columns, begins = rows.columns, rows.starts[row]  # blocks of rows stand in their order
-        low[~run] = np.minimum.reduceat(columns, begins)
-        high[~run] = np.maximum.reduceat(columns, begins) + 1
+        begins = -1 - where[~run]  # blocks of rows stand in their order
+        own = np.repeat(first[~run], count[~run]) + _place_in(count[~run])
+        low[~run] = np.minimum.reduceat(own + rows.row_offsets[rows.spans[:, 0]], begins)
+        high[~run] = np.maximum.reduceat(own + rows.row_offsets[rows.spans[:, 1] - 1], begins) + 1
     return low, high
+
+
+def _place_in(counts: Indices) -> Indices:
+    """0, 1, ... within each of several groups of so many, one behind the other."""
+    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 class Passes(NamedTuple):
