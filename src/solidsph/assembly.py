@@ -37,7 +37,7 @@ from solidsph.motion import VectorField
 from solidsph.particles import Particles, State
 from solidsph.parts import construct
 from solidsph.problems import Problems
-from solidsph.scene import BodyScene, ImposedScene, PartLike, Scene
+from solidsph.scene import DEFAULT_INTEGRATOR, BodyScene, ImposedScene, PartLike, Scene
 from solidsph.setting import Setting
 from solidsph.simulation import Simulation
 from solidsph.smoothing import smoothing_kernel
@@ -65,10 +65,11 @@ class Assembly:
         """
         scene, problems = self._scene, self._problems
         problems.add(compatibility.numbers(scene))
+        problems.add(compatibility.statics(scene))
         kernel: Kernel | None = self._make("kernels", scene.kernel)
         formulation: Formulation | None = self._make("formulations", scene.formulation)
-        integrator: Integrator | None = self._make("integrators", scene.integrator)
-        engine: Engine | None = problems.attempt(engine_named, scene.engine)
+        integrator = self._integrator()
+        engine: Engine | None = problems.attempt(engine_named, _engine_name(scene))
         handlers = self._labelled("boundaries", scene.boundaries)
         effects: dict[str, Effect] = self._labelled("effects", scene.effects)
         shapes, sets, materials = self._body_parts()
@@ -135,6 +136,15 @@ class Assembly:
         if part is not None:
             self._note(kind, part)
         return part
+
+    def _integrator(self) -> Integrator | None:
+        """The scene's, or the default, which is not noted where nothing will move by it."""
+        made: Integrator | None = (
+            self._make("integrators", self._scene.integrator or DEFAULT_INTEGRATOR)
+            if self._scene.statics is None
+            else self._problems.attempt(construct, "integrators", DEFAULT_INTEGRATOR)
+        )
+        return made
 
     def _note(self, kind: str, part: Any) -> None:
         """Remember which plugins a part, and the parts inside it, came from."""
@@ -301,6 +311,11 @@ class Assembly:
                 "modulus, density and spacing"
             )
         return step
+
+
+def _engine_name(scene: Scene) -> str:
+    """Equilibria are found with assembled matrices: there is nothing to compile."""
+    return "matrix" if scene.statics is not None and scene.engine == "auto" else scene.engine
 
 
 def _in_order(
