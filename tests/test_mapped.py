@@ -89,6 +89,6 @@ def test_as_a_word_of_a_scene() -> None:
 def test_what_it_refuses(arguments: dict, expected: str) -> None:
     unit = Box(lengths=(1.0, 1.0))
     good = {"of": ON_BOUNDARY, "before": unit, "to": {"x": "X"}}
-    with pytest.raises(SceneError, match="mapped|unknown name") as caught:
+    with pytest.raises(SceneError, match=r"mapped|unknown name") as caught:
         Mapped(**{**good, **arguments}).particles(unit, 0.1)
     assert expected in str(caught.value)
