@@ -31,7 +31,7 @@ def triangles(record: Record) -> Indices:
     short = edges.max(axis=1) < _LONGEST_EDGE * float(particles.spacings.max())
     # Between particles that all lie on a curved boundary there is none of the body.
     surface = particles.tags["surface"][found].all(axis=1)
-    flat = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    thin = flat < 0.1 * float(particles.spacings.min()) ** 2
+    doubled_areas = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+    thin = doubled_areas < 0.1 * float(particles.spacings.min()) ** 2
     kept: Indices = found[short & ~(surface & thin)]
     return kept
