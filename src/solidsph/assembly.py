@@ -29,6 +29,7 @@ from solidsph.interfaces.condition import (
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Formulation
+from solidsph.interfaces.gradient import Gradient
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.material import Material
@@ -218,7 +219,7 @@ class Assembly:
         formulation: Formulation,
     ) -> Body:
         radius = self._scene.cover * float(own.spacings.max())
-        return Body(
+        body = Body(
             name=name,
             extent=particles.bodies[name],
             particles=own,
@@ -226,6 +227,10 @@ class Assembly:
             material=material,
             formulation=formulation,
         )
+        gradient = formulation.gradient.of_body(body)
+        if gradient is formulation.gradient:
+            return body
+        return attrs.evolve(body, formulation=_with_gradient(formulation, gradient))
 
     def _tagged(self, particles: Particles) -> Particles:
         """Particles with the tags that the scene adds to its bodies."""
@@ -323,6 +328,12 @@ def _in_order(
 ) -> tuple[MotionCondition, ...]:
     """Motions of particles first, then those of ghosts, which follow particles."""
     return tuple(sorted(motions, key=lambda m: bool(m.held[particles.ghosts].any())))
+
+
+def _with_gradient(formulation: Formulation, gradient: Gradient) -> Formulation:
+    """The same formulation with another gradient, which is a field of every attrs class."""
+    changed: Formulation = attrs.evolve(formulation, gradient=gradient)  # type: ignore[misc]
+    return changed
 
 
 def _label(kind: str, part: object) -> str:
