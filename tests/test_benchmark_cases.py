@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +22,9 @@ from solidsph_builtin.cases.csm3 import Csm3, frequency_of
 from solidsph_builtin.cases.elastic_spin import ElasticSpin
 from solidsph_builtin.cases.sheet_with_hole import SheetWithHole, around_hole
 from tests.test_cli import solidsph
+
+# The scheme whose errors at the clamp are positive and of first order.
+QUADRATIC: dict[str, Any] = {"gradient": "quadratic", "cover": 2.2}
 
 
 def errors(outcome: CaseResult) -> Mapping[str, float]:
@@ -49,7 +53,8 @@ def test_csm1_approaches_the_reference_with_the_order_of_its_corners(
     clamp: str, tmp_path: Path
 ) -> None:
     coarse, fine = (
-        run_case(Csm1(clamp=clamp, across=across, tolerance=0.02), tmp_path) for across in (5, 9)
+        run_case(Csm1(clamp=clamp, across=across, tolerance=0.02, **QUADRATIC), tmp_path)
+        for across in (5, 9)
     )
     assert coarse.passed
     for quantity, error in errors(fine).items():
@@ -60,10 +65,20 @@ def test_csm1_approaches_the_reference_with_the_order_of_its_corners(
     check_pictures(fine)
 
 
+@pytest.mark.parametrize("clamp", CLAMPS)
+def test_csm1_with_the_consistent_gradient(clamp: str, tmp_path: Path) -> None:
+    outcome = run_case(Csm1(clamp=clamp), tmp_path)
+    # Without the push of irregular and surface particles it is a third of the quadratic's error,
+    # or less; the published digits and the clamp's corners are left.
+    assert outcome.passed
+    assert max(abs(error) for error in errors(outcome).values()) < 0.005
+
+
 def test_csm1_at_the_tip_between_two_particles(tmp_path: Path) -> None:
     """With an even number across, the tip is no particle; the error lies between the others."""
     found = [
-        errors(run_case(Csm1(across=n, tolerance=0.1), tmp_path))["tip: u_y"] for n in (5, 6, 7)
+        errors(run_case(Csm1(across=n, tolerance=0.1, **QUADRATIC), tmp_path))["tip: u_y"]
+        for n in (5, 6, 7)
     ]
     assert found[0] > found[1] > found[2]
 
@@ -76,16 +91,16 @@ def test_csm1_measures_what_a_softer_scheme_does_wrong(tmp_path: Path) -> None:
 
 
 def test_csm3_at_five_across(tmp_path: Path) -> None:
-    outcome = run_case(Csm3(across=5, duration=0.48, tolerance=0.015), tmp_path)
+    outcome = run_case(Csm3(duration=0.48), tmp_path)
     assert outcome.passed
-    # Twice the static error where the beam hangs, less what the mass does: below that of CSM1.
-    assert 0.0 < errors(outcome)["first minimum of u_y"] < 0.01
+    # What hangs at rest with 0.2 % swings with about as much.
+    assert abs(errors(outcome)["first minimum of u_y"]) < 0.003
     check_pictures(outcome)
 
 
 def test_a_case_that_diverges_has_not_passed(tmp_path: Path) -> None:
-    # The step's margin is 1.4 at half of the CFL step.
-    outcome = run_case(Csm3(across=5, duration=0.05, time_step_factor=0.9), tmp_path)
+    # The step's margin is 1.6 at half of the CFL step.
+    outcome = run_case(Csm3(across=5, duration=0.05, time_step_factor=1.0), tmp_path)
     assert outcome.runs[0].outcome.startswith("diverged")
     assert not any(m.passed for m in outcome.measurements)
     assert outcome.measurements[0].verdict.startswith("diverged")
@@ -250,7 +265,9 @@ def test_a_case_from_the_command_line(tmp_path: Path) -> None:
     assert facts["passed"]
     assert facts["runs"][0]["outcome"] == "finished"
     assert all((tmp_path / picture).exists() for picture in facts["pictures"])
-    assert solidsph("run", "csm1", "--set", "across=5", cwd=tmp_path).returncode == 1
+    softer = solidsph("run", "csm1", "--set", "gradient=corrected", cwd=tmp_path)
+    assert softer.returncode == 1
+    assert "NOT as predicted" in softer.stdout
 
 
 # --- The full bars -------------------------------------------------------------------------------
@@ -262,7 +279,7 @@ def test_csm1_falls_at_every_refinement(clamp: str, tmp_path: Path) -> None:
     across = np.array([5, 9, 17, 25, 33])
     found = []
     for n in across.tolist():
-        outcome = run_case(Csm1(clamp=clamp, across=n), tmp_path)
+        outcome = run_case(Csm1(clamp=clamp, across=n, **QUADRATIC), tmp_path)
         told(f"csm1 {clamp} {n} across", outcome)
         found.append([abs(error) for error in errors(outcome).values()])
     falling = np.array(found)
@@ -277,7 +294,8 @@ def test_csm1_falls_at_every_refinement(clamp: str, tmp_path: Path) -> None:
 def test_csm3_falls_at_every_refinement(tmp_path: Path) -> None:
     found = {}
     for n in (5, 9, 17, 33):
-        outcome = run_case(Csm3(across=n, duration=0.48), tmp_path)
+        case = Csm3(across=n, duration=0.48, time_step_factor=0.6, **QUADRATIC)
+        outcome = run_case(case, tmp_path)
         told(f"csm3 {n} across", outcome)
         found[n] = errors(outcome)
     minimum = np.array([abs(one["first minimum of u_y"]) for one in found.values()])
@@ -289,7 +307,7 @@ def test_csm3_falls_at_every_refinement(tmp_path: Path) -> None:
 
 @pytest.mark.validation
 def test_csm3_oscillates_as_published(tmp_path: Path) -> None:
-    outcome = run_case(Csm3(across=7, duration=3.0), tmp_path)
+    outcome = run_case(Csm3(duration=3.0), tmp_path)
     told("csm3 over three periods", outcome)
     assert len(outcome.measurements) == 7
     assert outcome.passed

@@ -30,10 +30,10 @@ class Csm1(Case):
     source: ClassVar[str] = "Turek & Hron (2006)"
 
     clamp: str = "arc"  # or "straight", whose reference is our own
-    across: int = 17  # particles across the beam
+    across: int = 9  # particles across the beam
     kernel: str = "cubic-spline"
-    cover: float = number(default=2.2)  # [spacings]
-    gradient: str = "quadratic"
+    cover: float = number(default=2.6)  # [spacings]
+    gradient: str = "consistent"
     hourglass: float = number(default=0.0)  # strength [-]; 0 names none
     engine: str = "auto"
     load_steps: int = 1

@@ -43,15 +43,15 @@ class Csm3(Case):
     source: ClassVar[str] = "Turek & Hron (2006)"
 
     clamp: str = "arc"  # or "straight", whose reference is our own
-    across: int = 9  # particles across the beam
+    across: int = 5  # particles across the beam
     duration: float = number(default=0.5)  # [s]; from 1.9 on the oscillation is measured too
     kernel: str = "cubic-spline"
-    cover: float = number(default=2.2)  # [spacings]
-    gradient: str = "quadratic"
+    cover: float = number(default=2.6)  # [spacings]
+    gradient: str = "consistent"
     hourglass: float = number(default=0.0)  # strength [-]; 0 names none
     engine: str = "auto"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.6)  # of the CFL step
+    time_step_factor: float = number(default=0.7)  # of the CFL step
     tolerance: float = number(default=0.01)  # largest error that passes [-]
 
     def __attrs_post_init__(self) -> None:
