@@ -58,3 +58,7 @@ traction = {x = "1e3*min(t/0.005, 1)"}
 [integrator]
 type = "central-difference"
 """
+
+# Gradients that know the surface of a body in its reference configuration, and are refused in
+# another.
+REFERENCE_ONLY = ("consistent",)

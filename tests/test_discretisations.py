@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
 from solidsph.particles import Particles
+from solidsph_builtin.discretisations.conforming_lattice import ConformingLattice
 from solidsph_builtin.discretisations.jittered_lattice import JitteredLattice
 from solidsph_builtin.discretisations.lattice import Lattice
 from solidsph_builtin.discretisations.points import Points
@@ -50,6 +52,7 @@ ARRANGEMENTS: list[Discretisation] = [
     Lattice(ghosts=2),
     Lattice(on_boundary=True, ghosts=2),
     JitteredLattice(amplitude=0.3, seed=5, ghosts=1),
+    ConformingLattice(),
 ]
 
 
@@ -134,7 +137,9 @@ def test_same_input_gives_the_same_bits(shape: Shape, arrangement: Discretisatio
     assert list(one.tags) == list(other.tags)
 
 
-@pytest.mark.parametrize("arrangement", [Lattice(), Lattice(True), JitteredLattice(0.4, 1)])
+@pytest.mark.parametrize(
+    "arrangement", [Lattice(), Lattice(True), JitteredLattice(0.4, 1), ConformingLattice()]
+)
 @pytest.mark.parametrize("shape", SHAPES, ids=name_of)
 @pytest.mark.parametrize("spacing", [0.1, 0.037])
 def test_volumes_add_up_exactly_where_the_shape_knows(
@@ -157,12 +162,12 @@ def test_volumes_add_up_exactly_where_the_shape_knows(
     ],
     ids=name_of,
 )
-@pytest.mark.parametrize("on_boundary", [False, True])
+@pytest.mark.parametrize("arrangement", [Lattice(), Lattice(True), ConformingLattice()])
 def test_volumes_of_composites_are_found_by_halving_cells(
-    shape: Shape, volume: float, on_boundary: bool
+    shape: Shape, volume: float, arrangement: Discretisation
 ) -> None:
     spacing = 0.1
-    total = Lattice(on_boundary).particles(shape, spacing).volumes.sum()
+    total = arrangement.particles(shape, spacing).volumes.sum()
     # The last pieces of a cut cell are 1/16 (in space 1/8) of it wide, w. A boundary with radius
     # R bends over one by w^2 / 8 R, and what a plane leaves is right on average over its tilts
     # only: together about 1e-3 of the cells cut, which make up less than a third of the body.
@@ -180,13 +185,13 @@ def test_volumes_of_composites_are_found_by_halving_cells(
     ],
     ids=name_of,
 )
-@pytest.mark.parametrize("on_boundary", [False, True])
+@pytest.mark.parametrize("arrangement", [Lattice(), Lattice(True), ConformingLattice()])
 def test_boxes_put_together_have_the_exact_volume(
-    shape: Shape, volume: float, on_boundary: bool
+    shape: Shape, volume: float, arrangement: Discretisation
 ) -> None:
     # Planes across the axes are what the last step of the halving gets right in full, and a seam
     # between two parts must not cost anything wherever it runs through the cells.
-    particles = Lattice(on_boundary).particles(shape, 0.1)
+    particles = arrangement.particles(shape, 0.1)
     assert particles.volumes.sum() == pytest.approx(volume, rel=1e-10)
 
 
@@ -480,6 +485,110 @@ def test_jitter_keeps_particles_in_curved_shapes(seed: int) -> None:
         particles.positions[~real],
         Lattice(ghosts=1).particles(shape, 0.06).positions[~real],
     )
+
+
+# Conforming lattice ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "shape", [Interval(2.0, 0.5), Box([1.0, 0.63], [-3.0, 2.0]), Box([1.0, 0.5, 0.4])], ids=name_of
+)
+def test_an_aligned_box_has_the_particles_of_the_lattice(shape: Shape) -> None:
+    conforming = ConformingLattice().particles(shape, 0.07)
+    lattice = Lattice(on_boundary=True).particles(shape, 0.07)
+    for field in ("positions", "volumes", "spacings"):
+        np.testing.assert_array_equal(getattr(conforming, field), getattr(lattice, field))
+    # The samples of a face are added up in another order.
+    np.testing.assert_allclose(conforming.area_vectors, lattice.area_vectors, rtol=1e-13)
+    assert list(conforming.tags) == list(lattice.tags)
+    for name, tag in conforming.tags.items():
+        np.testing.assert_array_equal(tag, lattice.tags[name])
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=name_of)
+@pytest.mark.parametrize("spacing", [0.09, 0.053])
+def test_surface_particles_lie_on_the_surface_and_none_beside_another(
+    shape: Shape, spacing: float
+) -> None:
+    particles = ConformingLattice().particles(shape, spacing)
+    X, outermost = particles.positions, particles.tags["surface"]
+    # Rounding of a distance of about 1.
+    assert np.abs(shape.signed_distance(X[outermost])).max() < 1e-14
+    # An interior particle's cell is clear of the boundary: half the smallest step of the lattice,
+    # which is up to a tenth less than the spacing where this does not divide a side.
+    boundary = cKDTree(shape.surface(0.5 * spacing).points)
+    assert (boundary.query(X[~outermost])[0] > 0.45 * spacing).all()
+    assert cKDTree(X).query(X, k=[2])[0].min() > 0.45 * spacing
+
+
+@pytest.mark.parametrize("spacing", [0.09, 0.053])
+@pytest.mark.parametrize(
+    ("shape", "corners"),
+    [
+        (SHAPES[7], [(0.0, 0.0), (2.0, -1.0), (1.2, 0.0), (2.0, 1.0)]),
+        (SHAPES[8], [(1.0, 0.25), (1.0, 0.75), (2.0, 0.25), (0.0, 1.0)]),
+        (SHAPES[9], [(0.3, 0.0), (0.0, 0.3), (1.0, 1.0)]),
+        # Where a line meets an arc, at (sqrt(0.5^2 - 0.2^2), +-0.2).
+        (
+            Difference(Box([2.0, 0.4], [0.0, -0.2]), Disc(0.5)),
+            [(math.sqrt(0.21), 0.2), (math.sqrt(0.21), -0.2), (2.0, 0.2)],
+        ),
+        # Two circles cross at x = 0.3, re-entrant: y = +-0.4.
+        (Union([Disc(0.5), Disc(0.5, [0.6, 0.0])]), [(0.3, 0.4), (0.3, -0.4)]),
+        (
+            Difference(Box([1.0, 0.5, 0.4]), Box([0.37, 1.0, 0.21])),
+            [(0.37, 0.0, 0.21), (0.0, 0.5, 0.21), (0.37, 0.5, 0.0), (1.0, 0.5, 0.4)],
+        ),
+    ],
+    ids=name_of,
+)
+def test_every_corner_has_a_particle(
+    shape: Shape, corners: list[tuple[float, ...]], spacing: float
+) -> None:
+    X = ConformingLattice().particles(shape, spacing).positions
+    for corner in corners:
+        # Samples 1/64 of a spacing apart on an arc of about 5 spacings: tangents there cross
+        # (1/128)^2 / 10 spacings beside the corner.
+        assert np.linalg.norm(X - corner, axis=1).min() < 1e-5 * spacing
+
+
+def test_edges_in_space_have_particles() -> None:
+    """On the rim where an end of a cylinder meets its side."""
+    particles = ConformingLattice().particles(Cylinder(0.5, 1.0, axis="y"), 0.1)
+    X = particles.positions
+    radius = np.hypot(X[:, 0], X[:, 2])
+    for end in (0.0, 1.0):
+        # Points of the rim are found some 1/8 of a spacing apart; between two of them a tangent
+        # of half that length leaves the rim by (1/16)^2 / 10 spacings.
+        on_rim = (np.abs(X[:, 1] - end) < 4e-5) & (np.abs(radius - 0.5) < 4e-5)
+        # One for each cell that the circle crosses: between its length and sqrt(2) times it.
+        assert 31 <= on_rim.sum() <= 45
+        angles = np.sort(np.arctan2(X[on_rim, 2], X[on_rim, 0]))
+        assert np.diff(angles, append=angles[0] + 2.0 * np.pi).max() * 0.5 < 0.15
+
+
+def test_conforming_volumes_are_what_is_nearest() -> None:
+    """Against counting on a fine grid, as `points` does it."""
+    shape = SHAPES[9]
+    particles = ConformingLattice().particles(shape, 0.1)
+    fine = 800
+    grid_points = (np.indices((fine, fine)).reshape(2, -1).T + 0.5) / fine
+    grid_points = grid_points[shape.signed_distance(grid_points) < 0.0]
+    owner = ((grid_points[:, None] - particles.positions) ** 2).sum(axis=2).argmin(axis=1)
+    counted = np.bincount(owner, minlength=particles.count) / fine**2
+    # The last pieces are 1/16 of a cell wide; some 16 of them lie across each border.
+    assert np.abs(particles.volumes - counted).max() < 0.02 * 0.1**2
+
+
+def test_a_circle_of_surface_particles_encloses_its_area() -> None:
+    """Surface particles on the surface: their area vectors enclose the body to second order."""
+    shape, errors = Disc(0.8, [1.0, 1.0]), []
+    for spacing in (0.1, 0.05):
+        particles = ConformingLattice().particles(shape, spacing)
+        errors.append(abs(enclosed(particles) / shape.volume() - 1.0))
+    # A chord of up to 1.5 spacings stays (1.5 s)^2 / 8 R inside of its arc.
+    assert errors[0] < 1.5**2 * 0.1**2 / (8.0 * 0.8**2)
+    assert errors[1] < 0.5 * errors[0]
 
 
 # Points ------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
-from solidsph import Scene, Simulation, registry
+from solidsph import Scene, Simulation, carry_out, registry
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "plugins/examples/solidsph-wendland"
@@ -26,10 +26,10 @@ def test_first_kernel_shows_the_example_plugin() -> None:
     assert shown["project"]["entry-points"] == real["project"]["entry-points"]
 
 
-def test_the_scene_shown_can_be_built() -> None:
-    (scene,) = blocks("docs/scenes.md", "toml")
-    simulation = Simulation.builder(Scene.from_toml(scene)).build()
-    assert simulation.steps > 0
+def test_the_scenes_shown_can_be_built_and_the_static_one_run() -> None:
+    moving, static = (Scene.from_toml(text) for text in blocks("docs/scenes.md", "toml"))
+    assert Simulation.builder(moving).build().steps > 0
+    assert carry_out(Simulation.builder(static).build()).effort["residual [-]"] < 1e-9
 
 
 def test_every_builtin_part_is_listed() -> None:
@@ -37,7 +37,6 @@ def test_every_builtin_part_is_listed() -> None:
     missing = [
         entry.name
         for kind in registry.INTERFACES
-        if kind != "cases"
         for entry in registry.available(kind)
         if entry.distribution == "solidsph" and f"`{entry.name}`" not in text
     ]

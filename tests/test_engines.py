@@ -22,7 +22,7 @@ from solidsph.engines.select import AutomaticEngine, engine_named
 from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.material import Material
 from solidsph.testing import example_part
-from tests.scenes import SOFT
+from tests.scenes import REFERENCE_ONLY, SOFT
 
 SPACING = 0.1
 LENGTHS = {1: [4.0], 2: [1.6, 3.9], 3: [0.5, 0.4, 1.3]}
@@ -129,8 +129,15 @@ def test_compiled_agrees_for_every_material(d: int, material: str) -> None:
     assert_same(compiled(simulation), reference, random_displacements(simulation))
 
 
-@pytest.mark.parametrize("formulation", registry.names("formulations"))
-@pytest.mark.parametrize("gradient", registry.names("gradients"))
+@pytest.mark.parametrize(
+    ("formulation", "gradient"),
+    [
+        (formulation, gradient)
+        for formulation in registry.names("formulations")
+        for gradient in registry.names("gradients")
+        if not (formulation == "updated-lagrangian" and gradient in REFERENCE_ONLY)
+    ],
+)
 @pytest.mark.parametrize("divergence", registry.names("divergences"))
 def test_every_formulation_agrees(formulation: str, gradient: str, divergence: str) -> None:
     part = {"type": formulation, "gradient": gradient, "divergence": divergence}

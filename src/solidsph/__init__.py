@@ -1,5 +1,6 @@
 """Smoothed Particle Hydrodynamics for nonlinear solid mechanics."""
 
+from solidsph.carry_out import carry_out
 from solidsph.errors import (
     BuildError,
     ConvergenceError,
@@ -51,4 +52,5 @@ __all__ = [
     "Simulation",
     "SolidsphError",
     "State",
+    "carry_out",
 ]

@@ -29,6 +29,7 @@ from solidsph.interfaces.condition import (
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Formulation
+from solidsph.interfaces.gradient import Gradient
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.material import Material
@@ -37,7 +38,7 @@ from solidsph.motion import VectorField
 from solidsph.particles import Particles, State
 from solidsph.parts import construct
 from solidsph.problems import Problems
-from solidsph.scene import BodyScene, ImposedScene, PartLike, Scene
+from solidsph.scene import DEFAULT_INTEGRATOR, BodyScene, ImposedScene, PartLike, Scene
 from solidsph.setting import Setting
 from solidsph.simulation import Simulation
 from solidsph.smoothing import smoothing_kernel
@@ -65,10 +66,11 @@ class Assembly:
         """
         scene, problems = self._scene, self._problems
         problems.add(compatibility.numbers(scene))
+        problems.add(compatibility.statics(scene))
         kernel: Kernel | None = self._make("kernels", scene.kernel)
         formulation: Formulation | None = self._make("formulations", scene.formulation)
-        integrator: Integrator | None = self._make("integrators", scene.integrator)
-        engine: Engine | None = problems.attempt(engine_named, scene.engine)
+        integrator = self._integrator()
+        engine: Engine | None = problems.attempt(engine_named, _engine_name(scene))
         handlers = self._labelled("boundaries", scene.boundaries)
         effects: dict[str, Effect] = self._labelled("effects", scene.effects)
         shapes, sets, materials = self._body_parts()
@@ -135,6 +137,15 @@ class Assembly:
         if part is not None:
             self._note(kind, part)
         return part
+
+    def _integrator(self) -> Integrator | None:
+        """The scene's, or the default, which is not noted where nothing will move by it."""
+        made: Integrator | None = (
+            self._make("integrators", self._scene.integrator or DEFAULT_INTEGRATOR)
+            if self._scene.statics is None
+            else self._problems.attempt(construct, "integrators", DEFAULT_INTEGRATOR)
+        )
+        return made
 
     def _note(self, kind: str, part: Any) -> None:
         """Remember which plugins a part, and the parts inside it, came from."""
@@ -208,7 +219,7 @@ class Assembly:
         formulation: Formulation,
     ) -> Body:
         radius = self._scene.cover * float(own.spacings.max())
-        return Body(
+        body = Body(
             name=name,
             extent=particles.bodies[name],
             particles=own,
@@ -216,6 +227,10 @@ class Assembly:
             material=material,
             formulation=formulation,
         )
+        gradient = formulation.gradient.of_body(body)
+        if gradient is formulation.gradient:
+            return body
+        return attrs.evolve(body, formulation=_with_gradient(formulation, gradient))
 
     def _tagged(self, particles: Particles) -> Particles:
         """Particles with the tags that the scene adds to its bodies."""
@@ -304,11 +319,22 @@ class Assembly:
         return step
 
 
+def _engine_name(scene: Scene) -> str:
+    """Equilibria are found with assembled matrices: there is nothing to compile."""
+    return "matrix" if scene.statics is not None and scene.engine == "auto" else scene.engine
+
+
 def _in_order(
     motions: Sequence[MotionCondition], particles: Particles
 ) -> tuple[MotionCondition, ...]:
     """Motions of particles first, then those of ghosts, which follow particles."""
     return tuple(sorted(motions, key=lambda m: bool(m.held[particles.ghosts].any())))
+
+
+def _with_gradient(formulation: Formulation, gradient: Gradient) -> Formulation:
+    """The same formulation with another gradient, which is a field of every attrs class."""
+    changed: Formulation = attrs.evolve(formulation, gradient=gradient)  # type: ignore[misc]
+    return changed
 
 
 def _label(kind: str, part: object) -> str:

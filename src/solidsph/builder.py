@@ -14,7 +14,7 @@ from solidsph.assembly import Assembly
 from solidsph.errors import BuildError, SceneError
 from solidsph.hooks import listeners
 from solidsph.motion import Component
-from solidsph.scene import BodyScene, ImposedScene, InitialScene, PartLike, Scene
+from solidsph.scene import BodyScene, ImposedScene, InitialScene, PartLike, Scene, StaticsScene
 from solidsph.simulation import Simulation
 from solidsph.where import EVERYWHERE, Where
 
@@ -110,6 +110,13 @@ class Builder:
             self._values["time_step_factor"] = time_step_factor
         if time_step is not None:
             self._values["time_step"] = time_step
+        return self
+
+    def statics(
+        self, *, load_steps: int = 1, tolerance: float = 1e-9, max_iterations: int = 25
+    ) -> Builder:
+        """Find the equilibrium under the loads at the end of the duration, instead of a motion."""
+        self._values["statics"] = StaticsScene(load_steps, tolerance, max_iterations)
         return self
 
     def duration(self, duration: float) -> Builder:

@@ -10,7 +10,7 @@ from importlib.metadata import version
 
 import click
 
-from solidsph.errors import DivergedError, SolidsphError
+from solidsph.errors import ConvergenceError, DivergedError, SolidsphError
 
 VERBS = ("run", "explain", "cases", "plugins", "check", "plot")
 
@@ -57,7 +57,7 @@ def main() -> None:
         sys.exit(INTERRUPTED)
     except SolidsphError as cause:
         print(f"error: {cause}", file=sys.stderr)
-        sys.exit(FAILED if isinstance(cause, DivergedError) else WRONG_INPUT)
+        sys.exit(FAILED if isinstance(cause, (ConvergenceError, DivergedError)) else WRONG_INPUT)
     except OSError as cause:
         print(f"error: {cause}; check the path, its permissions and the disk", file=sys.stderr)
         sys.exit(WRONG_INPUT)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from math import ceil, isfinite, sqrt
 
+import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -40,6 +41,32 @@ def numbers(scene: Scene) -> Iterator[str]:
         yield f"time_step_factor must not exceed 1, got {scene.time_step_factor}; 0.5 is usual"
     if scene.outputs < 1:
         yield f"outputs must be at least 1, got {scene.outputs}; the last state is always recorded"
+
+
+def statics(scene: Scene) -> Iterator[str]:
+    """Numbers of the static run, and no word beside it that means a motion."""
+    wanted = scene.statics
+    if wanted is None:
+        return
+    for name, value in (
+        ("load_steps", wanted.load_steps),
+        ("max_iterations", wanted.max_iterations),
+    ):
+        if value < 1:
+            yield f"statics: {name} must be at least 1, got {value}"
+    if not 0.0 < wanted.tolerance < 1.0:
+        yield f"statics: tolerance must lie between 0 and 1, got {wanted.tolerance}; 1e-9 is usual"
+    default = attrs.fields(Scene).time_step_factor.default
+    for name, given in (
+        ("an integrator", scene.integrator is not None),
+        ("a time step", scene.time_step is not None or scene.time_step_factor != default),
+        ("an initial state", bool(scene.initial)),
+    ):
+        if given:
+            yield (
+                f"statics: {name} is named, but an equilibrium is found without moving in time; "
+                "leave it out, or leave out [statics]"
+            )
 
 
 def names(bodies: Mapping[str, Particles]) -> Iterator[str]:

@@ -53,6 +53,18 @@ class InitialScene:
 
 
 @attrs.frozen
+class StaticsScene:
+    """That the scene is to be found in equilibrium instead of moving; see `statics.equilibrium`."""
+
+    load_steps: int = 1  # to begin with
+    tolerance: float = 1e-9  # imbalance over loads and reactions [-]
+    max_iterations: int = 25  # of Newton's method in a load step
+
+
+DEFAULT_INTEGRATOR = "velocity-verlet"
+
+
+@attrs.frozen
 class Scene:
     """Everything that a run depends on."""
 
@@ -66,7 +78,8 @@ class Scene:
     boundaries: Sequence[ImposedScene] = ()
     effects: Sequence[ImposedScene] = ()
     initial: Sequence[InitialScene] = ()
-    integrator: PartLike = "velocity-verlet"
+    integrator: PartLike | None = None  # None names none: then it is the default
+    statics: StaticsScene | None = None  # equilibrium at the end of the duration, not motion
     time_step_factor: float = 0.5  # of the CFL step
     time_step: float | None = None  # [s]; overrides the factor
     outputs: int = 200  # recorded states after the first
@@ -115,6 +128,7 @@ _SECTIONS = {
     "effect": "[[effect]]",
     "initial": "[[initial]]",
     "integrator": "[integrator]",
+    "statics": "[statics]",
 }
 _SCALARS = ("title", "duration", "outputs", "engine")
 
@@ -141,6 +155,8 @@ def _scene(table: Mapping[str, Any]) -> Scene:
     for key in ("material", "formulation"):
         if key in table:
             values[key] = table[key]
+    if "statics" in table:
+        values["statics"] = _statics(table["statics"])
     for key, extra in (("kernel", ("cover",)), ("integrator", ("time_step_factor", "time_step"))):
         if key in table:
             part = table[key]
@@ -183,6 +199,17 @@ def _initial(entry: Any) -> InitialScene:
     entry = _mapping(entry, "initial")
     _check_keys(entry, [field.name for field in attrs.fields(InitialScene)], "initial")
     return InitialScene(**entry)
+
+
+def _statics(entry: Any) -> StaticsScene:
+    entry = dict(_mapping(entry, "statics"))
+    _check_keys(entry, [field.name for field in attrs.fields(StaticsScene)], "statics")
+    for key in ("load_steps", "max_iterations"):
+        if key in entry:
+            _count(entry[key], f"statics.{key}")
+    if "tolerance" in entry:
+        entry["tolerance"] = number(entry["tolerance"], "statics.tolerance")
+    return StaticsScene(**entry)
 
 
 def number(value: Any, what: str) -> float:
@@ -242,12 +269,16 @@ def _table(scene: Scene) -> dict[str, Any]:
     if scene.material is not None:
         table["material"] = _part(scene.material, "materials")
     table["formulation"] = _part(scene.formulation, "formulations")
-    step = (
-        {"time_step_factor": scene.time_step_factor}
-        if scene.time_step is None
-        else {"time_step": scene.time_step}
-    )
-    table["integrator"] = {**_part(scene.integrator, "integrators"), **step}
+    if scene.statics is None:
+        step = (
+            {"time_step_factor": scene.time_step_factor}
+            if scene.time_step is None
+            else {"time_step": scene.time_step}
+        )
+        integrator = _part(scene.integrator or DEFAULT_INTEGRATOR, "integrators")
+        table["integrator"] = {**integrator, **step}
+    else:
+        table["statics"] = attrs.asdict(scene.statics)
     for key, kind, entries in (
         ("boundary", "boundaries", scene.boundaries),
         ("effect", "effects", scene.effects),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -13,13 +13,14 @@ import pluggy
 
 from solidsph.dynamics import Dynamics
 from solidsph.engines.engine import Engine
-from solidsph.errors import DivergedError
+from solidsph.errors import BuildError, DivergedError
 from solidsph.interfaces.condition import Condition, Observation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.integrator import Integrator
 from solidsph.particles import Particles, State
 from solidsph.registry import Entry
 from solidsph.scene import Scene
+from solidsph.session import session
 from solidsph.setting import Setting
 from solidsph.time_loop import StepError, TimeLoop
 
@@ -34,6 +35,7 @@ class Result:
     state: State  # the last one
     record: Path | None  # the file written, if one was asked for
     seconds: float  # wall time of the loop [s]
+    effort: Mapping[str, Any]  # what it took besides: "quantity [unit]" -> a number, or yes or no
 
 
 @attrs.frozen(eq=False)
@@ -79,6 +81,8 @@ class Simulation:
     def run(self, *, record: Path | str | None = None, observers: Sequence[object] = ()) -> Result:
         """Advance from the start to the end of the duration.
 
+        This is the motion, also of a scene with [statics]: `solidsph.carry_out` heeds those.
+
         Args:
             record: HDF5 file to write; the folder is made if it is missing.
             observers: objects with methods of `solidsph.hooks.Moments`, heard in this run only.
@@ -87,18 +91,9 @@ class Simulation:
             DivergedError: the run went wrong; what was recorded before stays readable.
         """
         path = None if record is None else Path(record)
-        heard = list(observers)
-        if path is not None:
-            from solidsph.results.recorder import Recorder  # brings the file library with it
-
-            heard.append(Recorder(path))
-        for listener in heard:
-            self.manager.register(listener)
         hook = self.manager.hook
-        outcome = "stopped"
         begun = clock.perf_counter()
-        try:
-            hook.solidsph_setup(simulation=self)
+        with session(self, path, observers):
             loop = self.time_loop()
             state = self.start()
             hook.solidsph_step_end(simulation=self, observation=self._observe(state))
@@ -108,16 +103,12 @@ class Simulation:
                 except StepError as failed:
                     raise self._diverged(failed.state, failed.cause) from failed
                 hook.solidsph_step_end(simulation=self, observation=self._observe(state))
-            outcome = "finished"
-        except BaseException as cause:
-            kind = "diverged" if isinstance(cause, DivergedError) else type(cause).__name__
-            outcome = f"{kind}: {cause}"
-            raise
-        finally:
-            hook.solidsph_finish(simulation=self, outcome=outcome)
-            for listener in heard:
-                self.manager.unregister(listener)
-        return Result(state=state, record=path, seconds=clock.perf_counter() - begun)
+        return Result(
+            state=state,
+            record=path,
+            seconds=clock.perf_counter() - begun,
+            effort={"steps": self.steps, "step size [s]": self.step_size},
+        )
 
     def output_steps(self) -> tuple[int, ...]:
         """Steps after which the state is observed, evenly spread, the last one among them."""
@@ -135,9 +126,11 @@ class Simulation:
         return observation
 
     def _diverged(self, state: State, cause: str) -> DivergedError:
-        with np.errstate(all="ignore"):
-            F = self.dynamics.observe(state).deformation_gradients
-            J = np.linalg.det(F)
+        try:
+            with np.errstate(all="ignore"):
+                J = np.linalg.det(self.dynamics.observe(state).deformation_gradients)
+        except (BuildError, ValueError):  # positions may be such that nothing has neighbours
+            J = np.full(self.particles.count, np.nan)
         real = np.flatnonzero(~self.particles.ghosts)
         finite = np.isfinite(J[real])
         # The first particle whose volume ratio is no number, or else the most compressed one.

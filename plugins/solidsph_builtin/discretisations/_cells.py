@@ -61,7 +61,7 @@ def lattice_particles(
     volumes = grid.cell_volume * shares[numbers]
     orphans = np.flatnonzero(~real & (np.abs(distance) < grid.half_diagonal))
     volumes += _adopted(shape, grid, orphans, tree)
-    volumes = _fitted(volumes, grid.cell_volume, shape.volume())
+    volumes = fitted(volumes, grid.cell_volume, shape.volume())
 
     surface = sampled(discretisation, shape, spacing)
     owners = _owners(grid, real, tree, surface.points)
@@ -84,7 +84,7 @@ def lattice_particles(
     return Particles(
         positions=everywhere,
         volumes=np.concatenate([volumes, np.full(len(ghost_positions), grid.cell_volume)]),
-        spacings=np.full(count, _spacing(grid, spacing)),
+        spacings=np.full(count, mean_spacing(grid, spacing)),
         area_vectors=area_vectors(own, count, shape.dimension),
         ghosts=is_ghost,
         images=np.concatenate([positions, images]) if len(images) else everywhere,
@@ -95,7 +95,7 @@ def lattice_particles(
     )
 
 
-def _spacing(grid: Grid, wanted: float) -> float:
+def mean_spacing(grid: Grid, wanted: float) -> float:
     """Spacing whose power d is the volume of a cell [m]; just what was `wanted` where it fits."""
     mean = float(grid.cell_volume ** (1.0 / len(grid.cells)))
     return wanted if np.allclose(grid.steps, wanted, rtol=1e-9, atol=0.0) else mean
@@ -108,14 +108,25 @@ def _shares(shape: Shape, grid: Grid, distance: Array, tolerance: float) -> tupl
     up, as on the face of a box of which a box with the same face has been taken away.
     """
     inside = distance <= tolerance
-    shares = inside.astype(np.float64)
-    # A cell that the boundary does not reach is whole or empty; only the others are looked into.
-    cut = np.flatnonzero(inside & (distance > -grid.half_diagonal))
+    shares = np.zeros(grid.size)
+    numbers = np.flatnonzero(inside)
+    shares[numbers] = cell_shares(shape, grid, numbers, distance)
+    return shares, inside & (shares > _ON_BOUNDARY)
+
+
+def cell_shares(shape: Shape, grid: Grid, numbers: Indices, distance: Array) -> Array:
+    """What part of the cell of each of these `numbers` (n,) lies in the shape, (n,) [-].
+
+    `distance` (size,) [m] is that of all lattice points.
+    """
+    shares = np.ones(numbers.size)
+    # A cell that the boundary does not reach is whole; only the others are looked into.
+    cut = np.flatnonzero(distance[numbers] > -grid.half_diagonal)
     for start in range(0, cut.size, _CELLS_AT_ONCE):
         some = cut[start : start + _CELLS_AT_ONCE]
-        found = pieces(shape, grid.positions(some), grid.steps)
+        found = pieces(shape, grid.positions(numbers[some]), grid.steps)
         shares[some] = np.bincount(found.cells, weights=found.shares, minlength=some.size)
-    return shares, inside & (shares > _ON_BOUNDARY)
+    return shares
 
 
 def _adopted(shape: Shape, grid: Grid, orphans: Indices, tree: cKDTree) -> Array:
@@ -129,7 +140,7 @@ def _adopted(shape: Shape, grid: Grid, orphans: Indices, tree: cKDTree) -> Array
     return result
 
 
-def _fitted(volumes: Array, cell: float, total: float | None) -> Array:
+def fitted(volumes: Array, cell: float, total: float | None) -> Array:
     """The same volumes with the exact total, if that is known; whole cells stay what they are."""
     if total is None:
         return volumes

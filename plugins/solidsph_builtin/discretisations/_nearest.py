@@ -1,4 +1,4 @@
-"""Which particle is nearest to each of many points; those equally near share the point."""
+"""Points near each other: which particle each is nearest to, and which stay when they crowd."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices
+from solidsph.arrays import Array, Indices, Mask
 
 # At a point on a diagonal of a lattice, a particle on each axis may be as near.
 _MOST_EQUAL = 4
@@ -41,3 +41,17 @@ def nearest(tree: cKDTree, points: Array) -> Assignment:
         points=at,
         shares=1.0 / equal.sum(axis=1)[at],
     )
+
+
+def thinned(points: Array, order: Indices, distance: float) -> Mask:
+    """Which of `points` (m, d) stay when, taken in this `order`, each drops all that are less than
+    `distance` away and have not been kept before, (m,)."""
+    stays = np.ones(len(points), dtype=np.bool_)
+    kept = np.zeros(len(points), dtype=np.bool_)
+    close = cKDTree(points).query_ball_point(points, distance)
+    for one in order.tolist():
+        if stays[one]:
+            kept[one] = True
+            others = np.array(close[one])
+            stays[others[~kept[others]]] = False
+    return stays

@@ -49,6 +49,21 @@ def pieces(shape: Shape, centres: Array, steps: Array) -> Pieces:
     return Pieces(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
+def finest_pieces(shape: Shape, centres: Array, steps: Array) -> Pieces:
+    """The same, all of the last size, to tell which particle each is nearest to."""
+    dimension = len(steps)
+    corners = np.array(list(itertools.product((-0.5, 0.5), repeat=dimension)))
+    cells = np.arange(len(centres))
+    for _ in range(_HALVINGS[dimension]):
+        steps = 0.5 * steps
+        centres = (centres[:, np.newaxis, :] + corners * steps).reshape(-1, dimension)
+        cells = np.repeat(cells, len(corners))
+    shares = _tiny(shape, centres, steps, corners, shape.signed_distance(centres))
+    kept = shares > 0.0
+    size = float(len(corners)) ** -_HALVINGS[dimension]
+    return Pieces(cells[kept], centres[kept], size * shares[kept])
+
+
 def _tiny(shape: Shape, centres: Array, steps: Array, corners: Array, distance: Array) -> Array:
     """What part of each piece is inside, (m,) [-], where the boundary is as good as a plane.
 

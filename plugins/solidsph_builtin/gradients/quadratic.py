@@ -88,9 +88,9 @@ def _fitted(
     scaled = offsets / np.where(reach > 0.0, reach, 1.0)
     upper = np.triu_indices(d)
     basis = np.hstack([scaled, scaled[:, upper[0]] * scaled[:, upper[1]]])
-    closeness = _closeness(kernel_gradients, distances) * volumes[pairs.columns[own]]
+    w = closeness(kernel_gradients, distances) * volumes[pairs.columns[own]]
     moments = np.add.reduceat(
-        (closeness[:, None, None] * basis[:, :, None]) * basis[:, None, :], starts, axis=0
+        (w[:, None, None] * basis[:, :, None]) * basis[:, None, :], starts, axis=0
     )
     poor = ~(np.linalg.cond(moments) < _WORST_CONDITION)
     moments[poor] = np.eye(basis.shape[1])  # any regular matrix: these rows are replaced
@@ -98,12 +98,12 @@ def _fitted(
     # One step of refinement: what the inverse lacks would show as stress in a rigid rotation.
     missing = np.eye(basis.shape[1])[:d] - inverse[:, :d] @ moments
     slopes = inverse[:, :d] + missing @ inverse
-    weights = np.einsum("mij,mj->mi", slopes[row], closeness[:, None] * basis)
+    weights = np.einsum("mij,mj->mi", slopes[row], w[:, None] * basis)
     poor |= np.add.reduceat(np.linalg.norm(weights, axis=1), starts) > _WORST_AMPLIFICATION
     return weights / np.where(reach > 0.0, reach, 1.0), poor
 
 
-def _closeness(kernel_gradients: Array, distances: Array) -> Array:
+def closeness(kernel_gradients: Array, distances: Array) -> Array:
     """-W'(r) / r of every pair, (k,); a particle's own offset is zero and needs no weight."""
     safe = np.where(distances > 0.0, distances, 1.0)
     return np.where(distances > 0.0, np.linalg.norm(kernel_gradients, axis=1) / safe, 0.0)

@@ -61,13 +61,17 @@ def progress(shown: bool) -> Iterator[Progress | None]:
 class ProgressObserver:
     """Moves a progress bar on at every output of a run."""
 
-    def __init__(self, display: Progress, description: str, steps: int) -> None:
+    def __init__(self, display: Progress, description: str, simulation: Simulation) -> None:
         self._display = display
-        self._task = display.add_task(description, total=steps)
+        statics = simulation.scene.statics
+        self._steps = simulation.steps if statics is None else statics.load_steps
+        self._task = display.add_task(description, total=self._steps)
 
     @implementation
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
-        self._display.update(self._task, completed=observation.state.step)
+        # By time, and not by counting: load steps are halved and doubled on the way.
+        part = observation.state.time / simulation.scene.duration
+        self._display.update(self._task, completed=round(part * self._steps))
 
 
 def _is_number(cell: Any) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 
 import attrs
 import click
+import numpy as np
 
 from solidsph import registry
 from solidsph.commands.console import say, show_json, show_table
@@ -14,7 +15,10 @@ from solidsph.commands.target import resolve
 from solidsph.interfaces.case import Case
 from solidsph.scene import BodyScene, Scene
 from solidsph.simulation import Simulation
-from solidsph.statics import critical_step
+from solidsph.statics import critical_step, tangent
+from solidsph.statics.factors import SingularError, factorised
+from solidsph.statics.freedoms import Freedoms, freedoms
+from solidsph.statics.tangent import is_symmetric
 
 _TIMED_STEPS = 5
 
@@ -91,17 +95,25 @@ def _numbers(simulation: Simulation) -> list[dict[str, Any]]:
     pairs = simulation.dynamics.internal.pair_count
     neighbours = pairs / particles.count - 1.0
     speed = max(body.material.wave_speed for body in setting.bodies)
-    per_step = _seconds_per_step(simulation)
-    stated = scene.time_step is not None
-    outputs = len(simulation.output_steps()) + 1
     d = particles.dimension
-    margin = critical_step(simulation).margin
     rows = [
         ("dimensions", d, "1 is uniaxial strain, 2 is plane strain"),
         ("particles", int((~particles.ghosts).sum()), "from shapes and spacings"),
         ("ghosts", int(particles.ghosts.sum()), "complete the support of those near a surface"),
         ("neighbours", neighbours, f"a particle's, on average, within {scene.cover:g} spacings"),
         ("confined wave speed [m/s]", speed, "sqrt((lambda + 2 mu) / rho), the fastest body's"),
+        ("engine", type(simulation.dynamics.internal).__name__, f'engine = "{scene.engine}"'),
+        *(_of_motion(simulation) if scene.statics is None else _of_statics(simulation)),
+    ]
+    return [{"quantity": name, "value": value, "why": why} for name, value, why in rows]
+
+
+def _of_motion(simulation: Simulation) -> list[tuple[str, Any, str]]:
+    scene = simulation.scene
+    stated = scene.time_step is not None
+    margin = critical_step(simulation).margin
+    outputs = len(simulation.output_steps()) + 1
+    return [
         (
             "time step [s]",
             simulation.step_size,
@@ -118,22 +130,38 @@ def _numbers(simulation: Simulation) -> list[dict[str, Any]]:
         ),
         ("steps", simulation.steps, f"for {scene.duration:g} s"),
         (
-            "engine",
-            type(simulation.dynamics.internal).__name__,
-            f'engine = "{scene.engine}"',
-        ),
-        (
             "predicted wall time [s]",
-            per_step * simulation.steps,
+            _seconds_per_step(simulation) * simulation.steps,
             f"{_TIMED_STEPS} steps timed here and now, without outputs and compiling",
         ),
-        (
-            "record [MiB]",
-            outputs * particles.count * 8 * (7 + d + d * d) / 2**20,
-            f"{outputs} outputs of position, velocity, stress and volume ratio, about",
-        ),
+        _record_size(simulation, outputs),
     ]
-    return [{"quantity": name, "value": value, "why": why} for name, value, why in rows]
+
+
+def _of_statics(simulation: Simulation) -> list[tuple[str, Any, str]]:
+    wanted = simulation.scene.statics
+    assert wanted is not None
+    own = freedoms(simulation.dynamics)
+    return [
+        ("free displacements", own.count, "unknowns of Newton's method"),
+        ("load steps", wanted.load_steps, "to begin with: halved on failure, doubled on success"),
+        ("tolerance", wanted.tolerance, "imbalance of forces over loads and reactions"),
+        (
+            "predicted time of an iteration [s]",
+            _seconds_per_iteration(simulation, own),
+            "one tangent built and factorised here and now; some five a load step",
+        ),
+        _record_size(simulation, wanted.load_steps + 1),
+    ]
+
+
+def _record_size(simulation: Simulation, outputs: int) -> tuple[str, Any, str]:
+    d, count = simulation.particles.dimension, simulation.particles.count
+    return (
+        "record [MiB]",
+        outputs * count * 8 * (7 + d + d * d) / 2**20,
+        f"{outputs} outputs of position, velocity, stress and volume ratio, about",
+    )
 
 
 def _seconds_per_step(simulation: Simulation) -> float:
@@ -142,6 +170,16 @@ def _seconds_per_step(simulation: Simulation) -> float:
     begun = clock.perf_counter()
     loop.advance(state, 1 + _TIMED_STEPS)
     return (clock.perf_counter() - begun) / _TIMED_STEPS
+
+
+def _seconds_per_iteration(simulation: Simulation, own: Freedoms) -> float:
+    begun = clock.perf_counter()
+    K = tangent(simulation, np.zeros_like(simulation.particles.positions))
+    try:
+        factorised(own.reduced(K), symmetric=own.adjoint and is_symmetric(simulation))
+    except SingularError:
+        return float("nan")  # nothing holds the body: the run will say so
+    return clock.perf_counter() - begun
 
 
 def _effects(simulation: Simulation) -> list[dict[str, Any]]:

@@ -61,23 +61,21 @@ def _write(wanted: Scene | Case, path: Path) -> None:
 
 def _run_scene(target: str, scene: Scene, folder: Path, *, shown: bool, as_json: bool) -> None:
     from solidsph.builder import Builder
+    from solidsph.carry_out import carry_out
     from solidsph.results.record import Record
     from solidsph.studies.case_run import peak_memory
 
     simulation = Builder(scene).build()
     path = folder / "record.h5"
     with progress(shown) as display:
-        observers = (
-            [ProgressObserver(display, Path(target).stem, simulation.steps)] if display else []
-        )
-        result = simulation.run(record=path, observers=observers)
+        observers = [ProgressObserver(display, Path(target).stem, simulation)] if display else []
+        result = carry_out(simulation, record=path, observers=observers)
     with Record(path) as record:
         history = {name: float(values[-1]) for name, values in record.history.items()}
     facts: dict[str, Any] = {
         "particles": simulation.particles.count,
         "pairs": simulation.dynamics.internal.pair_count,
-        "steps": simulation.steps,
-        "step size [s]": simulation.step_size,
+        **result.effort,
         "wall time [s]": result.seconds,
         "peak memory [MiB]": peak_memory() / 2**20,
     }
@@ -95,7 +93,7 @@ def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bo
     with progress(shown) as display:
 
         def begin(name: str, simulation: Any) -> Sequence[object]:
-            return [ProgressObserver(display, name, simulation.steps)] if display else []
+            return [ProgressObserver(display, name, simulation)] if display else []
 
         result = run_case(case, folder, begin=begin)
     if as_json:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, final
+from typing import TYPE_CHECKING, ClassVar, final
 
 import numpy as np
 
@@ -12,13 +12,18 @@ from solidsph.errors import BuildError
 from solidsph.neighbours import Pairs
 from solidsph.tensors import components_first, particles_first
 
+if TYPE_CHECKING:
+    from solidsph.body import Body
+
 
 class Gradient(ABC):
     """Weights g_pq of the discrete gradient, grad f at p = sum over q of f_q g_pq."""
 
-    exact_degree: ClassVar[int]
-    """Highest degree of a polynomial whose gradient is exact at every particle, on any
-    arrangement and at free surfaces; -1 if not even a constant has gradient zero."""
+    @property
+    @abstractmethod
+    def exact_degree(self) -> int:
+        """Highest degree of a polynomial whose gradient is exact at every particle, on any
+        arrangement and at free surfaces; -1 if not even a constant has gradient zero."""
 
     @abstractmethod
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
@@ -32,6 +37,14 @@ class Gradient(ABC):
         Raises:
             BuildError: the neighbours of a particle do not determine a gradient.
         """
+
+    def of_body(self, body: Body) -> Gradient:
+        """The gradient as `body` uses it: itself, unless it depends on the body as a whole.
+
+        Raises:
+            BuildError: it does, and cannot be formed on this body.
+        """
+        return self
 
 
 class PointwiseGradient(Gradient):

@@ -2,6 +2,7 @@
 
 from solidsph.statics.equilibrium import EquilibriumResult, LoadStep, equilibrium
 from solidsph.statics.modes import Modes, frequencies
+from solidsph.statics.run import run_statics
 from solidsph.statics.stable_step import StableStep, critical_step, highest_frequency
 from solidsph.statics.stiff import Stiff
 from solidsph.statics.tangent import tangent
@@ -16,5 +17,6 @@ __all__ = [
     "equilibrium",
     "frequencies",
     "highest_frequency",
+    "run_statics",
     "tangent",
 ]

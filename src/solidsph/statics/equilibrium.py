@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Callable
 
 import attrs
 import numpy as np
@@ -77,6 +78,7 @@ def equilibrium(
     load_steps: int = 1,
     tolerance: float = 1e-9,
     max_iterations: int = 25,
+    observer: Callable[[State], None] = lambda state: None,
 ) -> EquilibriumResult:
     """Displacements at which all forces on free particles balance.
 
@@ -99,6 +101,7 @@ def equilibrium(
         load_steps: equal steps to begin with.
         tolerance: imbalance over the norm of loads and reactions [-].
         max_iterations: of Newton's method in a load step.
+        observer: told the state without loads, and then that of every load step.
 
     Raises:
         ConvergenceError: no equilibrium was found at some load factor: where, and what to do.
@@ -113,6 +116,7 @@ def equilibrium(
     begun = clock.perf_counter()
     newton = _Newton.of(simulation, tolerance, max_iterations)
     state = newton.state(None, np.zeros_like(simulation.particles.positions), 0.0)
+    observer(state)
     displacements = np.zeros_like(state.positions)
     steps: list[LoadStep] = []
     factor, step = 0.0, 1.0 / load_steps
@@ -129,6 +133,7 @@ def equilibrium(
             continue
         steps.append(LoadStep(target, residuals))
         state = newton.state(state, displacements, target)
+        observer(state)
         factor = target
         if len(residuals) <= _QUICK + 1:
             step *= 2.0

@@ -11,7 +11,8 @@ from pathlib import Path
 import attrs
 
 from solidsph.builder import Builder
-from solidsph.errors import DivergedError
+from solidsph.carry_out import carry_out
+from solidsph.errors import ConvergenceError, DivergedError
 from solidsph.interfaces.case import Case, Measurement
 from solidsph.results.record import Record
 from solidsph.simulation import Simulation
@@ -24,7 +25,7 @@ class SceneRun:
     name: str
     record: Path
     seconds: float
-    steps: int
+    steps: int  # recorded steps in time, or load steps
     particles: int
     pairs: int
     outcome: str
@@ -53,8 +54,8 @@ def run_case(
 ) -> CaseResult:
     """Run every scene of `case`, record it in `folder`, measure and draw.
 
-    A scene that diverges does not end the case: what it recorded is measured, because for some
-    combinations of parts to diverge is the result.
+    A scene that diverges, or finds no equilibrium, does not end the case: what it recorded is
+    measured, because for some combinations of parts to diverge is the result.
 
     Args:
         begin: called before each scene; returns observers of its run.
@@ -65,15 +66,20 @@ def run_case(
         path = folder / f"{name}.h5"
         outcome, begun = "finished", clock.perf_counter()
         try:
-            simulation.run(record=path, observers=begin(name, simulation))
+            carry_out(simulation, record=path, observers=begin(name, simulation))
         except DivergedError as cause:
             outcome = f"diverged at step {cause.step}: {cause.cause}"
+        except ConvergenceError as cause:
+            outcome = f"no equilibrium beyond load factor {cause.load_factor:g}: {cause.cause}"
+        seconds = clock.perf_counter() - begun
+        with Record(path) as record:
+            steps = int(record.steps[-1])
         runs.append(
             SceneRun(
                 name=name,
                 record=path,
-                seconds=clock.perf_counter() - begun,
-                steps=simulation.steps,
+                seconds=seconds,
+                steps=steps,
                 particles=simulation.particles.count,
                 pairs=simulation.dynamics.internal.pair_count,
                 outcome=outcome,

@@ -1,0 +1,45 @@
+"""A measured number beside its reference, as every benchmark states it."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from solidsph.interfaces.case import Measurement
+from solidsph.results.record import Record
+
+FINISHED = "finished"
+
+
+def compared(
+    record: Record,
+    quantity: str,
+    value: float,
+    unit: str,
+    reference: float | None,
+    source: str,
+    tolerance: float,
+) -> Measurement:
+    """`value` against `reference`; None stands alone. Only a run that finished can pass.
+
+    Args:
+        tolerance: largest relative error that passes [-].
+    """
+    value = float(value)
+    complete = record.outcome == FINISHED and isfinite(value)
+    if reference is None:
+        return Measurement(
+            quantity, value, unit, verdict="" if complete else record.outcome, passed=complete
+        )
+    error = abs(value / reference - 1.0)
+    within = error <= tolerance
+    verdict = f"{'within' if within else 'NOT within'} {100.0 * tolerance:g} %"
+    return Measurement(
+        quantity=quantity,
+        value=value,
+        unit=unit,
+        reference=reference,
+        source=source,
+        error=error,
+        verdict=verdict if complete else record.outcome,
+        passed=within and complete,
+    )

@@ -1,0 +1,83 @@
+"""Where the smooth parts of a boundary meet: its edges and corners, found from samples of it."""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solidsph.arrays import Array
+from solidsph.interfaces.shape import Surface
+from solidsph_builtin.discretisations._nearest import thinned
+
+# Tangent planes that cross at more than this angle make an edge; less is a bend.
+_SHARPEST_BEND = np.cos(np.radians(30.0))
+# Normals that differ by less are not even looked at.
+_SMOOTH = 0.2
+# Singular values of the normals that are smaller than this part of the largest are rounding.
+_DEPENDENT = 1e-6
+# Samples farther from each other than so many gaps between samples are no neighbours.
+_NEIGHBOURS = 2.0
+
+
+@attrs.frozen(eq=False)
+class Features:
+    """Points that lie on several tangent planes of the boundary at once."""
+
+    points: Array  # (m, d) [m]
+    normals: Array  # (m, k, d) of the planes through each point, not all independent [-]
+
+    def along(self, offsets: Array) -> Array:
+        """That part of `offsets` (m, d), one from each point, that leaves no plane, (m, d)."""
+        inverse = np.linalg.pinv(self.normals, rcond=_DEPENDENT)
+        part: Array = offsets - np.einsum("mik,mkj,mj->mi", inverse, self.normals, offsets)
+        return part
+
+
+def gap(surface: Surface) -> float:
+    """Largest distance between neighbouring samples [m]."""
+    sizes = np.linalg.norm(surface.area_vectors, axis=1)
+    return float(sizes.max() ** (1.0 / max(surface.points.shape[1] - 1, 1)))
+
+
+def smooth(surface: Surface) -> Features:
+    """The samples themselves, with one tangent plane each."""
+    normals = surface.area_vectors / np.linalg.norm(surface.area_vectors, axis=1, keepdims=True)
+    return Features(surface.points, normals[:, None, :])
+
+
+def meetings(of: Features, reach: float) -> Features:
+    """Where the planes of neighbours `of` the same kind cross: edges of faces, corners of edges.
+
+    Each point is the one on all planes of two neighbours that is nearest to the middle between
+    them; `reach` [m] is how far neighbours are apart. Of many at the same place, the one stays
+    whose neighbours are closest to each other.
+    """
+    d = of.points.shape[1]
+    pairs = cKDTree(of.points).query_pairs(_NEIGHBOURS * reach, output_type="ndarray")
+    # Nearly all neighbours lie on the same smooth part.
+    bent = np.abs(of.normals[pairs[:, 1]] - of.normals[pairs[:, 0]]).max(axis=(1, 2), initial=0.0)
+    pairs = np.sort(pairs[bent > _SMOOTH], axis=1)
+    normals = of.normals[pairs].reshape(len(pairs), 2 * of.normals.shape[1], d)
+    crossing = _rank(normals) > _rank(of.normals)[pairs].max(axis=1, initial=0)
+    pairs, normals = pairs[crossing], normals[crossing]
+    ends = of.points[pairs]
+    middle = ends.mean(axis=1)
+    heights = np.einsum("mskj,msj->msk", of.normals[pairs], ends - middle[:, None])
+    inverse = np.linalg.pinv(normals, rcond=_DEPENDENT)
+    way = np.einsum("mik,mk->mi", inverse, heights.reshape(normals.shape[:2]))
+    apart = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    order = np.lexsort((pairs[:, 1], pairs[:, 0], np.round(apart / reach, 6)))
+    order = order[np.linalg.norm(way[order], axis=1) <= _NEIGHBOURS * reach]
+    points = (middle + way)[order]
+    if not len(points):
+        return Features(points, normals[order])
+    stays = thinned(points, np.arange(len(points)), 0.5 * reach)
+    return Features(points[stays], normals[order][stays])
+
+
+def _rank(normals: Array) -> Array:
+    """How many of the planes with these `normals` (m, k, d) cross sharply, (m,)."""
+    # The singular values of two unit normals at an angle a are sqrt(1 +- cos a).
+    sharp = np.sqrt(1.0 - _SHARPEST_BEND)
+    return np.asarray(np.sum(np.linalg.svd(normals, compute_uv=False) > sharp, axis=1))

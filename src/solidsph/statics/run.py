@@ -1,0 +1,53 @@
+"""The static run: an equilibrium, heard and recorded as a motion is."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Sequence
+from pathlib import Path
+
+import attrs
+
+from solidsph.particles import State
+from solidsph.scene import StaticsScene
+from solidsph.session import session
+from solidsph.simulation import Result, Simulation
+from solidsph.statics.equilibrium import equilibrium
+
+
+def run_statics(
+    simulation: Simulation,
+    wanted: StaticsScene,
+    *,
+    record: Path | str | None = None,
+    observers: Sequence[object] = (),
+) -> Result:
+    """Find the equilibrium; the unloaded body and every load step are outputs.
+
+    The time of an output is its load factor times the duration, its step the number of load
+    steps. Work is the trapezoidal rule over load steps: the energy residual is that of a path
+    followed in so few.
+
+    Raises:
+        ConvergenceError: none was found; the load steps up to there stay readable.
+    """
+    path = None if record is None else Path(record)
+    begun = clock.perf_counter()
+
+    def observe(state: State) -> None:
+        observation = simulation.dynamics.observe(state)
+        simulation.manager.hook.solidsph_step_end(simulation=simulation, observation=observation)
+
+    with session(simulation, path, observers):
+        found = equilibrium(simulation, **attrs.asdict(wanted), observer=observe)
+    return Result(
+        state=found.state,
+        record=path,
+        seconds=clock.perf_counter() - begun,
+        effort={
+            "load steps": len(found.steps),
+            "iterations": found.iterations,
+            "residual [-]": found.residual,
+            "stable": found.stable,
+        },
+    )
