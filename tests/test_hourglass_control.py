@@ -101,7 +101,8 @@ def test_a_checkerboard_is_no_longer_free(d: int) -> None:
         signs = np.where(np.rint(X / spacing - 0.5).sum(axis=1) % 2, -1.0, 1.0)
         u = 1e-6 * spacing * signs[:, None] * np.ones(d)
         response = simulation.dynamics.respond(0.0, X + u, np.zeros_like(X))
-        speed = simulation.setting.bodies[0].material.wave_speed
+        material = simulation.setting.bodies[0].material
+        speed = np.sqrt(material.lame_parameters[1] / material.density)
         # Two supports inside, no sum reaches a particle whose own sums reach the surface.
         inside = np.minimum(X, 1.0 - X).min(axis=1) > 6.0 * spacing
         assert inside.any()
@@ -111,11 +112,12 @@ def test_a_checkerboard_is_no_longer_free(d: int) -> None:
 
     cells = {1: 24, 2: 16, 3: 13}[d]
     free = box(d, cells).kernel("modified-mollifier", cover=3.0)
-    # The true wave of two spacings has a frequency of pi c / spacing.
+    # In units of shear speed over spacing. The true wave of two spacings has pi; a soft penalty
+    # gives motions that the gradient does not see about the root of its strength, here 0.32.
     before = frequency(free)
     after = frequency(free.effect("hourglass-control", strength=0.1))
     assert before < 1e-4
-    assert after > 0.2
+    assert 0.25 < after < 1.0
 
 
 def test_it_needs_the_reference_configuration() -> None:
@@ -126,6 +128,6 @@ def test_it_needs_the_reference_configuration() -> None:
 
 def test_it_shortens_the_step_as_it_stiffens() -> None:
     soft, stiff = (
-        box(2).effect("hourglass-control", strength=s).build().step_size for s in (0.1, 3.0)
+        box(2).effect("hourglass-control", strength=s).build().step_size for s in (0.1, 30.0)
     )
     assert stiff < 0.8 * soft

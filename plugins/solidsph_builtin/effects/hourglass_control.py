@@ -3,21 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from math import sqrt
 from typing import final
+from weakref import WeakKeyDictionary
 
 import attrs
 import numpy as np
-from scipy.sparse import block_diag, csr_array, diags_array, kron
+from scipy.sparse import block_diag, csr_array, kron
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from solidsph.arrays import Array, Indices
 from solidsph.body import Body
 from solidsph.errors import SceneError
-from solidsph.interfaces.condition import ForceCondition, Observation
+from solidsph.interfaces.condition import FieldCondition, ForceCondition, Observation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Configuration
 from solidsph.parameters import check_positive, number
 from solidsph.setting import Setting
+from solidsph.smoothing import UNIT_SPHERE
+from solidsph_builtin.effects._penalty import Penalty, PenaltyProducts
+
+# Compiling the sweeps takes about 10 s once a process, and products some 30 ns a pair more than they
+# do: from here on it pays within about a thousand steps.
+_MANY_PAIRS = 300_000
+
+# Of the largest energy of any particle: what holds less is at rest, and its share is rounding.
+_AT_REST = 1e-12
+
+# Of the penalty's largest eigenvalue, the square of a frequency.
+_TOLERANCE = 0.02
+
+# Up to this size a dense matrix is as cheap.
+_SMALL = 40
 
 
 @final
@@ -27,17 +45,20 @@ class HourglassControl(Effect):
 
     With e_ab = (F_a + F_b)/2 X_ab - x_ab, Ganzenmueller (2015), the energy
 
-        1/4 sum over a, b of strength M V_a V_b W(X_ab) |e_ab|^2 / |X_ab|^2,   M = lambda + 2 mu,
+        1/4 sum over a, b of strength mu V_a V_b W(X_ab) |e_ab|^2 / |X_ab|^2
 
-    vanishes for every linear motion, rigid ones included, and its exact derivative is the force.
+    over the nearest neighbours vanishes for every linear motion, rigid ones included, and, where
+    the gradient is exact for them, for every quadratic one; its exact derivative is the force.
     The usual form projects e_ab on the current direction of the pair, and has no energy. Since F
     is linear in the displacements so is e_ab, and the force is a constant matrix times them.
+
+    Each particle's share is recorded as a field, and as a number for the whole body.
     """
 
-    strength: float = number(default=0.1)  # [-]
+    strength: float = number(default=0.3)  # [-] times the shear modulus
 
     def __attrs_post_init__(self) -> None:
-        check_positive("hourglass-control", "strength", self.strength, "times a modulus, near 0.1")
+        check_positive("hourglass-control", "strength", self.strength, "times mu, near 0.3")
 
     def bind(self, setting: Setting, label: str) -> ForceCondition:
         for body in setting.bodies:
@@ -46,82 +67,114 @@ class HourglassControl(Effect):
                     "hourglass-control: it is written in the reference configuration, but the "
                     f"formulation of body {body.name!r} follows the motion; use 'total-lagrangian'"
                 )
-        blocks = [self.strength * _penalty(body) for body in setting.bodies]
-        return _Penalty(
+        return _Control(
             label=label,
             particles=np.arange(setting.particles.count),
             reference=setting.particles.positions,
-            matrix=csr_array(block_diag(blocks, format="csr")),
+            parts=[(body.extent, _penalty(body, self.strength)) for body in setting.bodies],
         )
 
     def arrays(self, setting: Setting) -> Mapping[str, int]:
-        # Neighbours of neighbours: about 2^d times a particle's pairs, 12 bytes each.
-        pairs = sum(body.pairs().count for body in setting.bodies)
-        return {"stiffness": 12 * 2**setting.particles.dimension * pairs}
+        return {
+            f"penalty of {body.name}": _penalty(body, self.strength).bytes
+            for body in setting.bodies
+        }
 
     def damping_rate(self) -> float:
         return 0.0
 
     def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        # Two neighbours in opposite motion: 4 strength c^2 sum of V_b W / r^2.
-        rates = []
-        for body in bodies:
-            pairs = body.pairs()
-            apart = pairs.distances > 0.0
-            terms = np.zeros(pairs.count)
-            r = pairs.distances[apart]
-            V = body.particles.volumes[pairs.columns[apart]]
-            terms[apart] = V * body.smoothing.value(r) / r**2
-            worst = float(pairs.row_sums(terms).max())
-            rates.append(2.0 * body.material.wave_speed * sqrt(self.strength * worst))
-        return max(rates)
+        return max(
+            _highest_frequency(_penalty(body, self.strength), body.masses, body.smoothing.dimension)
+            for body in bodies
+        )
 
 
-def _penalty(body: Body) -> csr_array:
-    """Matrix K (n, n) of the energy u K u / 2 of each component, for strength 1 [N/m]."""
-    pairs, particles = body.pairs(), body.particles
-    kernel_gradients = body.smoothing.gradient(pairs.offsets, pairs.distances)
-    gradient = body.formulation.gradient.weights(pairs, kernel_gradients, particles.cells)
-    real = ~particles.ghosts
-    chosen = np.flatnonzero((pairs.distances > 0.0) & real[pairs.rows] & real[pairs.columns])
-    a, b, X = pairs.rows[chosen], pairs.columns[chosen], pairs.offsets[chosen]
-    count, n = len(chosen), pairs.row_count
-    number_of = np.arange(count)
-    ones = np.ones(count)
-    take_a = csr_array((ones, (number_of, a)), shape=(count, n))
-    take_b = csr_array((ones, (number_of, b)), shape=(count, n))
-    # e_ab is linear in the displacements: the mean of both gradients along the offset, less the
-    # difference; the identity in F cancels the reference offset.
-    errors = take_a - take_b
-    for axis in range(X.shape[1]):
-        along = pairs.matrix(gradient[:, axis])
-        errors = errors + diags_array(0.5 * X[:, axis]) @ ((take_a + take_b) @ along)
-    lam, mu = body.material.lame_parameters
-    V, r = particles.volumes, pairs.distances[chosen]
-    weights = 0.5 * (lam + 2.0 * mu) * V[a] * V[b] * body.smoothing.value(r) / r**2
-    return csr_array(errors.T @ diags_array(weights) @ errors)
+# The step is chosen before the term is bound: what is made for one serves the other.
+_MADE: WeakKeyDictionary[Body, dict[float, Penalty]] = WeakKeyDictionary()
+
+
+def _penalty(body: Body, strength: float) -> Penalty:
+    made = _MADE.setdefault(body, {})
+    if strength not in made:
+        made[strength] = _new_penalty(body, strength)
+    return made[strength]
+
+
+def _new_penalty(body: Body, strength: float) -> Penalty:
+    # Pairs that there would be if every support were complete.
+    d = body.smoothing.dimension
+    ball = UNIT_SPHERE[d] / d * body.smoothing.support_radius**d
+    if body.particles.count * ball / np.mean(body.particles.volumes) < _MANY_PAIRS:
+        return PenaltyProducts.of(body, strength)
+    from solidsph_builtin.effects._penalty_sweeps import PenaltySweeps  # brings the compiler
+
+    return PenaltySweeps.of(body, strength)
+
+
+def _highest_frequency(penalty: Penalty, masses: Array, dimension: int) -> float:
+    """At most by `_TOLERANCE` above the largest angular frequency of the penalty alone [rad/s].
+
+    By Lanczos' iteration. A bound from sums of weights alone would miss gradients that lean on
+    small differences of large weights, as a quadratic fit to few neighbours may.
+    """
+    moving = np.flatnonzero(masses > 0.0)
+    scaling = 1.0 / np.sqrt(masses[moving])[:, None]
+    u = np.zeros((len(masses), dimension))
+
+    def product(direction: Array) -> Array:
+        u[moving] = scaling * direction.reshape(-1, dimension)
+        forces: Array = scaling * penalty.forces(u)[moving]
+        return -forces.ravel()
+
+    size = dimension * len(moving)
+    if size <= _SMALL:
+        squares = np.linalg.eigvalsh(np.stack([product(row) for row in np.eye(size)]))
+    else:
+        squares = eigsh(
+            LinearOperator((size, size), matvec=product, dtype=np.float64),
+            k=1,
+            which="LA",
+            tol=_TOLERANCE,
+            v0=np.random.default_rng(0).standard_normal(size),
+            return_eigenvectors=False,
+        )
+    # The residual of the vector found bounds the error of its value by the tolerance.
+    return sqrt(max(0.0, float(squares.max())) * (1.0 + _TOLERANCE))
 
 
 @final
 @attrs.frozen(eq=False)
-class _Penalty(ForceCondition):
+class _Control(ForceCondition, FieldCondition):
     label: str
     particles: Indices  # (n,)
     reference: Array  # (n, d)
-    matrix: csr_array  # (n, n), the same for every component
+    parts: Sequence[tuple[slice, Penalty]]  # of every body
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
-        forces: Array = -(self.matrix @ (positions - self.reference))
+        u = positions - self.reference
+        forces = np.empty_like(u)
+        for extent, penalty in self.parts:
+            forces[extent] = penalty.forces(u[extent])
         return forces
+
+    @cached_property
+    def matrix(self) -> csr_array:
+        """K (n, n) [N/m]: the force is -K u in every component."""
+        return csr_array(block_diag([part.matrix() for _, part in self.parts], format="csr"))
 
     def stiffness(self, displacements: Array) -> csr_array:
         """Minus the derivative of the force, (d n, d n), particle by particle."""
         return csr_array(kron(self.matrix, np.eye(displacements.shape[1]), format="csr"))
 
+    def energies(self, positions: Array) -> Array:
+        """The penalty's energy, particle by particle, (n,) [J]: half of each pair's."""
+        u = positions - self.reference
+        return np.concatenate([0.25 * part.squares(u[extent]) for extent, part in self.parts])
+
     def energy(self, positions: Array) -> float:
         """The penalty's energy [J]."""
-        u = positions - self.reference
-        return 0.5 * float(np.vdot(u, self.matrix @ u))
+        return float(self.energies(positions).sum())
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         strain = float(observation.particles.volumes @ observation.energy_densities)
@@ -131,3 +184,24 @@ class _Penalty(ForceCondition):
             # Beyond some per cent, motions that the gradient does not see matter to the answer.
             f"{self.label} share [-]": own / (own + strain) if own + strain > 0.0 else 0.0,
         }
+
+    def fields(self, observation: Observation) -> Mapping[str, Array]:
+        """Where, and how far, motions that the gradient does not see matter.
+
+        The share is the penalty's part of a particle's energy: near 1 where the motion is one
+        that the gradient does not see, near 0 where it is resolved, whatever the size of the
+        load. It says nothing where there is next to no energy, and is 0 there. The error is the
+        strain that F misses, the mean of |e_ab| / |X_ab| over neighbours: to be held against the
+        strains of the problem, and almost independent of the strength.
+        """
+        own = self.energies(observation.state.positions)
+        volumes = np.where(observation.particles.ghosts, 0.0, observation.particles.volumes)
+        total = own + volumes * observation.energy_densities
+        moving = total > _AT_REST * total.max(initial=0.0)
+        moments = np.concatenate([part.moments for _, part in self.parts])
+        near = moments > 0.0
+        share, error = np.zeros_like(own), np.zeros_like(own)
+        share[moving] = own[moving] / total[moving]
+        # The root of the weighted mean of squares.
+        error[near] = np.sqrt(4.0 * own[near] / moments[near])
+        return {f"{self.label} share [-]": share, f"{self.label} error [-]": error}
