@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from solidsph import BuildError, Record, Simulation
 from solidsph.arrays import Array
 from solidsph.builder import Builder
 from solidsph.interfaces.condition import ForceCondition
+from solidsph_builtin.effects._penalty import PenaltyProducts
+from solidsph_builtin.effects._penalty_sweeps import PenaltySweeps
+from solidsph_builtin.effects.hourglass_control import HourglassControl
 from tests.scenes import box
 
 JITTERED = {"type": "jittered-lattice", "amplitude": 0.2, "seed": 4}
@@ -118,6 +126,127 @@ def test_a_checkerboard_is_no_longer_free(d: int) -> None:
     after = frequency(free.effect("hourglass-control", strength=0.1))
     assert before < 1e-4
     assert 0.25 < after < 1.0
+
+
+def recorded(builder: Builder, path: Path, u: Callable[[Array], Array]) -> Record:
+    """The record of one step from displacements u of the particles at X."""
+    simulation = builder.outputs(1).build()
+    X = simulation.particles.positions
+    start = attrs.evolve(simulation.initial, positions=X + u(X))
+    attrs.evolve(simulation, initial=start, steps=1).run(record=path)
+    return Record(path)
+
+
+def test_the_fields_tell_a_checkerboard_from_smooth_bending(tmp_path: Path) -> None:
+    spacing = 1.0 / 16
+    builder = box(2, 16).effect("hourglass-control", label="control a/b")
+
+    def checkerboard(X: Array) -> Array:
+        signs = np.where(np.rint(X / spacing - 0.5).sum(axis=1) % 2, -1.0, 1.0)
+        # It dies away towards the surface, where one-sided supports would see it.
+        height = np.prod(np.sin(np.pi * X) ** 2, axis=1)
+        return 1e-3 * spacing * (signs * height)[:, None] * np.ones(2)
+
+    def bending(X: Array) -> Array:
+        # Of pure bending: a strain of 0.02 y.
+        x, y = X.T - 0.5
+        return 0.02 * np.column_stack([x * y, -0.5 * x**2])
+
+    shares, errors = {}, {}
+    for name, u in (("checkerboard", checkerboard), ("bending", bending)):
+        with recorded(builder, tmp_path / f"{name}.h5", u) as record:
+            assert {"control a%2Fb share", "control a%2Fb error"} < set(record.field_names)
+            assert record.units["control a%2Fb share"] == "-"
+            inside = np.abs(record.particles.positions - 0.5).max(axis=1) < 0.25
+            share = record.field("control a%2Fb share")[0]
+            assert ((share >= 0.0) & (share <= 1.0)).all()
+            shares[name], errors[name] = share, record.field("control a%2Fb error")[0]
+    assert shares["checkerboard"][inside].min() > 0.9
+    # In the middle neighbours along an axis move by 2e-3 sqrt(2) spacings against each other,
+    # diagonal ones not at all.
+    assert 1e-3 < errors["checkerboard"].max() < 2e-3 * np.sqrt(2.0)
+    # Linear gradients are exact for quadratic fields where neighbours lie in pairs, and off by
+    # half the strain's change over a support beside a surface.
+    assert shares["bending"][inside].max() < 1e-6
+    assert shares["bending"].max() < 1e-3
+    assert errors["bending"][inside].max() < 1e-8
+    assert errors["bending"].max() < 0.02 * 3 * spacing
+
+
+def test_a_body_at_rest_has_no_share(tmp_path: Path) -> None:
+    builder = box(2, 6).effect("hourglass-control")
+    with recorded(builder, tmp_path / "rest.h5", np.zeros_like) as record:
+        assert not record.field("hourglass-control share")[:].any()
+        assert not record.field("hourglass-control error")[:].any()
+    turned = np.array([[0.0, -1.0], [1.0, 0.0]]) - np.eye(2)
+    with recorded(builder, tmp_path / "turned.h5", lambda X: X @ turned.T + 1e3) as record:
+        assert not record.field("hourglass-control share")[0].any()
+        # Places are rounded to 1e-13, a millionth of a millionth of a spacing.
+        assert record.field("hourglass-control error")[0].max() < 1e-11
+
+
+@pytest.mark.parametrize("gradient", ["corrected", "quadratic"])
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_sweeps_products_and_the_matrix_are_the_same(d: int, gradient: str) -> None:
+    """Three ways to the same force, with ghosts that are not penalised among the neighbours."""
+    builder = (
+        box(
+            d,
+            {1: 12, 2: 6, 3: 5}[d],
+            discretisation={"type": "lattice", "ghost_faces": ["left"], "ghosts": 4},
+        )
+        .kernel("modified-mollifier", cover=3.5)
+        .formulation("total-lagrangian", gradient=gradient)
+        .boundary("symmetry", axis="x")
+    )
+    simulation = builder.build()
+    assert simulation.particles.ghosts.any()
+    (body,) = simulation.setting.bodies
+    u = random_motion(simulation) - simulation.particles.positions
+    products, sweeps = PenaltyProducts.of(body, 0.3), PenaltySweeps.of(body, 0.3)
+    expected = -(products.matrix() @ u)
+    assert np.abs(expected[simulation.particles.ghosts]).max() > 0.0  # by the gradient's adjoint
+    # Sums of some hundred terms in another order.
+    allowed = 1e-12 * np.abs(expected).max()
+    for penalty in (products, sweeps):
+        assert np.abs(penalty.forces(u) - expected).max() < allowed
+        energy = 0.25 * penalty.squares(u).sum()
+        assert energy == pytest.approx(-0.5 * float(np.vdot(u, expected)), rel=1e-12)
+    assert sweeps.squares(u) == pytest.approx(products.squares(u), rel=1e-12)
+    assert abs(sweeps.matrix() - products.matrix()).max() < 1e-12 * products.matrix().max()
+    total = sweeps.forces(u).sum(axis=0)
+    assert np.abs(total).max() < 1e-14 * np.abs(expected).sum()
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    d=st.integers(1, 3),
+    cells=st.integers(5, 8),
+    kernel=st.sampled_from(
+        [("modified-mollifier", 3.0), ("modified-mollifier", 5.5), ("cubic-spline", 2.6)]
+    ),
+    gradient=st.sampled_from(["corrected", "quadratic"]),
+    amplitude=st.floats(0.0, 0.45),
+)
+def test_the_declared_stiffness_bounds_the_true_one_closely(
+    d: int, cells: int, kernel: tuple[str, float], gradient: str, amplitude: float
+) -> None:
+    jittered = {"type": "jittered-lattice", "amplitude": amplitude, "seed": 1}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # few neighbours: a linear fit in places
+        simulation = (
+            box(d, min(cells, 6) if d == 3 else cells, discretisation=jittered)
+            .kernel(kernel[0], cover=kernel[1])
+            .formulation("total-lagrangian", gradient=gradient)
+            .build()
+        )
+        effect = HourglassControl(strength=0.3)
+        bodies = simulation.setting.bodies
+        declared = effect.stiffness_rate(bodies)
+        K = PenaltyProducts.of(bodies[0], 0.3).matrix().toarray()
+    scaling = 1.0 / np.sqrt(bodies[0].masses)
+    true = np.sqrt(np.linalg.eigvalsh(scaling[:, None] * K * scaling)[-1])
+    assert true <= declared <= 1.02 * true
 
 
 def test_it_needs_the_reference_configuration() -> None:

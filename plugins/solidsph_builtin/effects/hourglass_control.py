@@ -24,12 +24,12 @@ from solidsph.setting import Setting
 from solidsph.smoothing import UNIT_SPHERE
 from solidsph_builtin.effects._penalty import Penalty, PenaltyProducts
 
-# Compiling the sweeps takes about 10 s once a process, and products some 30 ns a pair more than they
+# Compiling the sweeps takes some 10 s once a process, and products some 30 ns a pair more than they
 # do: from here on it pays within about a thousand steps.
 _MANY_PAIRS = 300_000
 
-# Of the largest energy of any particle: what holds less is at rest, and its share is rounding.
-_AT_REST = 1e-12
+# Strain that rounding may leave of a rigid motion.
+_AT_REST = 1e-10
 
 # Of the penalty's largest eigenvalue, the square of a frequency.
 _TOLERANCE = 0.02
@@ -188,20 +188,23 @@ class _Control(ForceCondition, FieldCondition):
     def fields(self, observation: Observation) -> Mapping[str, Array]:
         """Where, and how far, motions that the gradient does not see matter.
 
-        The share is the penalty's part of a particle's energy: near 1 where the motion is one
-        that the gradient does not see, near 0 where it is resolved, whatever the size of the
-        load. It says nothing where there is next to no energy, and is 0 there. The error is the
-        strain that F misses, the mean of |e_ab| / |X_ab| over neighbours: to be held against the
-        strains of the problem, and almost independent of the strength.
+        The error is the strain that F misses, the mean of |e_ab| / |X_ab| over neighbours: to be
+        held against the strains of the problem, and almost independent of the strength.
+
+        The share is the penalty's part of a particle's energy: near 1 where the motion is one that
+        the gradient does not see, near 0 where it is resolved, whatever the size of the load. The
+        strain energy counts as at least its mean over the body: an end that is next to unstrained
+        would show the ratio of two small numbers, and hide where the answer suffers.
         """
         own = self.energies(observation.state.positions)
-        volumes = np.where(observation.particles.ghosts, 0.0, observation.particles.volumes)
-        total = own + volumes * observation.energy_densities
-        moving = total > _AT_REST * total.max(initial=0.0)
-        moments = np.concatenate([part.moments for _, part in self.parts])
-        near = moments > 0.0
         share, error = np.zeros_like(own), np.zeros_like(own)
-        share[moving] = own[moving] / total[moving]
-        # The root of the weighted mean of squares.
-        error[near] = np.sqrt(4.0 * own[near] / moments[near])
+        V = np.where(observation.particles.ghosts, 0.0, observation.particles.volumes)
+        for extent, part in self.parts:
+            density, volumes = observation.energy_densities[extent], V[extent]
+            strain = volumes * np.maximum(density, volumes @ density / volumes.sum())
+            near = part.moments > 0.0
+            # The root of the weighted mean of squares.
+            error[extent][near] = np.sqrt(4.0 * own[extent][near] / part.moments[near])
+            moving = error[extent] > _AT_REST
+            share[extent][moving] = own[extent][moving] / (own[extent] + strain)[moving]
         return {f"{self.label} share [-]": share, f"{self.label} error [-]": error}
