@@ -50,6 +50,14 @@ def test_run_a_scene_then_plot_it(scene: Path) -> None:
     assert done.returncode == 0, done.stderr
     for picture in json.loads(done.stdout)["pictures"]:
         assert Path(folder / picture).read_bytes().startswith(b"\x89PNG")
+    for field in ("volume_ratio", "velocity"):
+        done = solidsph("plot", str(record), "--field", field, cwd=folder)
+        assert done.returncode == 0, done.stderr
+        picture = record.with_name(f"record-{field}.png")
+        assert picture.read_bytes().startswith(b"\x89PNG")
+    done = solidsph("plot", str(record), "--field", "volumeratio", cwd=folder)
+    assert done.returncode == 2
+    assert "did you mean 'volume_ratio'? fields: velocity, cauchy_stress" in done.stderr
 
 
 def test_run_gives_one_json_object(scene: Path) -> None:

@@ -15,6 +15,7 @@ from solidsph.engines.matrix import MatrixEngine
 from solidsph.errors import SceneError
 from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.formulation import Configuration
+from solidsph.mismatch import Mismatch, MismatchOperator, MismatchProducts
 from solidsph.smoothing import UNIT_SPHERE
 
 # What the matrix engine takes for a step and for each pair in it, if the pairs stay and if they
@@ -23,6 +24,10 @@ from solidsph.smoothing import UNIT_SPHERE
 _STEP, _PAIR = 1e-4, 25e-9
 _MOVING_STEP, _MOVING_PAIR = 1e-3, 400e-9
 _COMPILATION = 10.0
+
+# Compiled sweeps over a mismatch take some 10 s to compile, and products some 30 ns a pair more
+# than they do: from here on they pay within about a thousand evaluations.
+_PAIRS_FOR_PRODUCTS = 300_000
 
 # Beyond so many pairs the matrices alone fill a gigabyte, however few steps there are.
 _MANY_PAIRS = 1e7
@@ -50,6 +55,15 @@ def _matrix_time(body: Body) -> float:
     if body.formulation.configuration is Configuration.REFERENCE:
         return _STEP + _PAIR * _expected_pairs(body)
     return _MOVING_STEP + _MOVING_PAIR * _expected_pairs(body)
+
+
+def mismatch_operator(mismatch: Mismatch) -> MismatchOperator:
+    """The operator of a mismatch that suits the size of its body."""
+    if _expected_pairs(mismatch.body) < _PAIRS_FOR_PRODUCTS:
+        return MismatchProducts.of(mismatch)
+    from solidsph.engines.compiled.mismatch import MismatchSweeps  # brings the compiler with it
+
+    return MismatchSweeps.of(mismatch)
 
 
 def _expected_pairs(body: Body) -> float:

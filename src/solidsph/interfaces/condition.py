@@ -2,7 +2,7 @@
 
 A handler or an effect is a frozen set of parameters; bound to a setting it becomes one or more
 conditions that hold arrays. What a condition can do is its type: determine motion, change the
-stress, or add forces. A run calls only those that are there.
+stress, add forces, or show fields. A run calls only those that are there.
 """
 
 from __future__ import annotations
@@ -39,6 +39,17 @@ class Condition(ABC):
     @abstractmethod
     def report(self, observation: Observation) -> Mapping[str, float]:
         """What was asked for and what was achieved: columns "quantity [unit]" of numbers."""
+
+
+class FieldCondition(Condition):
+    """Has something to show of every particle."""
+
+    @abstractmethod
+    def fields(self, observation: Observation) -> Mapping[str, Array]:
+        """Fields "quantity [unit]" for the record, of all particles, ghosts among them.
+
+        Each is (n,), (n, d) or (n, d, d), and the same ones are there in every observation.
+        """
 
 
 class MotionCondition(Condition):

@@ -8,9 +8,11 @@ and what an engine compiles into its own loop.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import block_diag, csr_array, kron
 
 from solidsph.arrays import Array, Indices, Mask, Vector
 from solidsph.interfaces.condition import (
@@ -19,6 +21,7 @@ from solidsph.interfaces.condition import (
     MotionCondition,
     StressCondition,
 )
+from solidsph.mismatch import MismatchOperator, MismatchProducts
 
 
 class ScheduledMotion(MotionCondition):
@@ -154,3 +157,39 @@ class LinearForce(ForceCondition):
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         forces: Array = -(self.matrix @ (positions - self.reference))
         return forces
+
+
+class MismatchForce(ForceCondition):
+    """Forces that resist the mismatch of neighbours (`solidsph.mismatch`), body by body."""
+
+    @property
+    @abstractmethod
+    def reference(self) -> Array:
+        """X, (n, d) [m]."""
+
+    @property
+    @abstractmethod
+    def operators(self) -> Sequence[MismatchOperator]:
+        """One for every body."""
+
+    @property
+    def particles(self) -> Indices:
+        return np.arange(len(self.reference))
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        u = positions - self.reference
+        forces = np.zeros_like(u)
+        for operator in self.operators:
+            extent = operator.mismatch.body.extent
+            forces[extent] = operator.forces(u[extent])
+        return forces
+
+    @cached_property
+    def matrix(self) -> csr_array:
+        """K (n, n) [N/m]: the force is -K u in every component; large in 3D."""
+        blocks = [MismatchProducts.of(one.mismatch).matrix() for one in self.operators]
+        return csr_array(block_diag(blocks, format="csr"))
+
+    def stiffness(self, displacements: Array) -> csr_array:
+        """Minus the derivative of the force, (d n, d n), particle by particle."""
+        return csr_array(kron(self.matrix, np.eye(displacements.shape[1]), format="csr"))

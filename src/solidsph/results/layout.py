@@ -68,8 +68,13 @@ def static_fields(dimension: int) -> tuple[Field, ...]:
 
 
 def tag_name(tag: str) -> str:
-    """Name of the array that marks a tag's particles; `/` would be a group to HDF5."""
-    return "tag " + tag.replace("%", "%25").replace("/", "%2F")
+    """Name of the array that marks a tag's particles."""
+    return "tag " + field_name(tag)
+
+
+def field_name(quantity: str) -> str:
+    """Name of the array of a quantity; `/` would be a group to HDF5."""
+    return quantity.replace("%", "%25").replace("/", "%2F")
 
 
 def padded(values: Array, components: tuple[int, ...]) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -11,16 +12,30 @@ from matplotlib.figure import Figure
 from solidsph.arrays import Array
 from solidsph.results.record import Record
 
+_STRESS = "cauchy_stress"
 
-def draw(record: Record, folder: Path, stem: str) -> Sequence[Path]:
-    """Write the pictures of a record into `folder`; returns their paths."""
+
+def draw(record: Record, folder: Path, stem: str, field: str = _STRESS) -> Sequence[Path]:
+    """Write the pictures of a record into `folder`; returns their paths.
+
+    Args:
+        record: what to draw.
+        folder: where to; made if it is missing.
+        stem: beginning of the file names.
+        field: what the particles are coloured by.
+
+    Raises:
+        RecordError: the record has no such field.
+    """
+    record.field(field)
     folder.mkdir(parents=True, exist_ok=True)
-    motion = folder / f"{stem}-motion.png"
+    what = "motion" if field == _STRESS else re.sub(r"[^\w.-]+", "-", field)
+    motion = folder / f"{stem}-{what}.png"
     energy = folder / f"{stem}-energy.png"
     if record.dimension == 1:
-        _draw_histories(record, motion)
+        _draw_histories(record, field, motion)
     else:
-        _draw_bodies(record, motion)
+        _draw_bodies(record, field, motion)
     _draw_energies(record.times, record.history, energy)
     return [motion, energy]
 
@@ -30,7 +45,22 @@ def largest_principal(stress: Array) -> Array:
     return np.asarray(np.linalg.eigvalsh(stress)[:, -1], dtype=np.float64)
 
 
-def _draw_histories(record: Record, path: Path) -> None:
+def _shown(values: Array) -> Array:
+    """One number a particle, (n,): a scalar, a vector's length, a tensor's largest principal."""
+    if values.ndim == 1:
+        return values
+    if values.ndim == 2:
+        return np.asarray(np.linalg.norm(values, axis=1), dtype=np.float64)
+    return largest_principal(values)
+
+
+def _label(record: Record, field: str) -> str:
+    """What the colours mean."""
+    words = field.replace("_", " ").replace("cauchy", "Cauchy")
+    return f"{words} [{record.units[field]}]"
+
+
+def _draw_histories(record: Record, field: str, path: Path) -> None:
     particles = record.particles
     real = np.flatnonzero(~particles.ghosts)
     order = real[np.argsort(particles.positions[real, 0])]
@@ -41,15 +71,16 @@ def _draw_histories(record: Record, path: Path) -> None:
     left.set_xlabel("time [s]")
     left.set_ylabel("displacement [m]")
     left.set_title(f"{len(order)} particles", fontsize=10)
-    stress = record.field("cauchy_stress")[:][:, order, 0, 0]
-    mesh = right.pcolormesh(X, record.times, stress, cmap="cividis", shading="nearest")
+    # On a line vectors and tensors have one component, sign and all.
+    values = record.field(field)[:].reshape(record.count, -1)[:, order]
+    mesh = right.pcolormesh(X, record.times, values, cmap="cividis", shading="nearest")
     right.set_xlabel("X [m]")
     right.set_ylabel("time [s]")
-    figure.colorbar(mesh, ax=right, label="Cauchy stress [Pa]")
+    figure.colorbar(mesh, ax=right, label=_label(record, field))
     figure.savefig(path, dpi=150)
 
 
-def _draw_bodies(record: Record, path: Path) -> None:
+def _draw_bodies(record: Record, field: str, path: Path) -> None:
     particles = record.particles
     real = ~particles.ghosts
     spans = [np.ptp(record.positions[k][real], axis=0) for k in (0, -1)]
@@ -58,18 +89,19 @@ def _draw_bodies(record: Record, path: Path) -> None:
     figure = Figure(figsize=(11.0, height), layout="constrained")
     solid = {"projection": "3d"} if record.dimension == 3 else {}
     axes = figure.subplots(1, 2, subplot_kw=solid)
-    stresses = [largest_principal(record.field("cauchy_stress")[k][real]) for k in (0, -1)]
-    low, high = min(s.min() for s in stresses), max(s.max() for s in stresses)
+    values = [_shown(record.field(field)[k][real]) for k in (0, -1)]
+    low, high = min(v.min() for v in values), max(v.max() for v in values)
     # Marker size that about fills a spacing, in points, on an axis some 300 points wide.
     size = max(1.0, (280.0 * float(particles.spacings[0]) / extent) ** 2)
-    for axis, k, stress in zip(axes, (0, -1), stresses, strict=True):
+    for axis, k, colours in zip(axes, (0, -1), values, strict=True):
         x = record.positions[k][real]
-        dots = axis.scatter(*x.T, c=stress, s=size, cmap="cividis", vmin=low, vmax=high)
+        dots = axis.scatter(*x.T, c=colours, s=size, cmap="cividis", vmin=low, vmax=high)
         axis.set_title(f"t = {record.times[k]:.4g} s", fontsize=10)
         axis.set_xlabel("x [m]")
         axis.set_ylabel("y [m]")
         axis.set_aspect("equal")
-    figure.colorbar(dots, ax=axes, shrink=0.8, label="largest principal Cauchy stress [Pa]")
+    kind = ("", "length of ", "largest principal ")[len(record.field(field).shape) - 2]
+    figure.colorbar(dots, ax=axes, shrink=0.8, label=kind + _label(record, field))
     figure.savefig(path, dpi=150)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,8 +10,9 @@ import numpy as np
 
 from solidsph.errors import SceneError
 from solidsph.hooks import implementation
-from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.condition import FieldCondition, Observation
 from solidsph.results.energy import kinetic_energy, ledger, strain_energy
+from solidsph.results.layout import field_name
 from solidsph.results.record_writer import Field, PluginUsed, RecordWriter
 
 if TYPE_CHECKING:
@@ -36,7 +38,8 @@ class Recorder:
             state.time,
             state.step,
             state.positions,
-            _fields(observation),
+            _fields(observation)
+            | {name: values for name, _, values in _conditions_fields(simulation, observation)},
             self._history(simulation, observation),
         )
 
@@ -60,8 +63,12 @@ class Recorder:
                 Field("velocity", (d,), "m/s"),
                 Field("cauchy_stress", (d, d), "Pa"),
                 Field("volume_ratio", (), "-"),
+                *(
+                    Field(name, values.shape[1:], unit)
+                    for name, unit, values in _conditions_fields(simulation, observation)
+                ),
             ],
-            columns={name: name.rpartition(" [")[2].rstrip("]") for name in columns},
+            columns={name: _parted(name)[1] for name in columns},
         )
 
     def _history(self, simulation: Simulation, observation: Observation) -> dict[str, float]:
@@ -69,6 +76,23 @@ class Recorder:
         for condition in simulation.conditions:
             columns |= condition.report(observation)
         return columns
+
+
+def _conditions_fields(
+    simulation: Simulation, observation: Observation
+) -> Iterator[tuple[str, str, Array]]:
+    """Name, unit and values of every field that conditions have to show."""
+    for condition in simulation.conditions:
+        if isinstance(condition, FieldCondition):
+            for name, values in condition.fields(observation).items():
+                quantity, unit = _parted(name)
+                yield field_name(quantity), unit, values
+
+
+def _parted(name: str) -> tuple[str, str]:
+    """Quantity and unit of "quantity [unit]"."""
+    quantity, _, unit = name.rpartition(" [")
+    return quantity, unit.rstrip("]")
 
 
 def scene_text(simulation: Simulation) -> str:

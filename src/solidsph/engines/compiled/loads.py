@@ -12,9 +12,17 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
 from solidsph.arrays import Array, Indices
+from solidsph.engines.compiled.chain import chain
+from solidsph.engines.compiled.mismatch import MismatchSweeps, Sweeps, body_sweep
 from solidsph.engines.compiled.pointwise import NotCompilableError, registered
 from solidsph.interfaces.condition import ForceCondition
-from solidsph.interfaces.declared import LinearForce, PointwiseForce, ScheduledForce
+from solidsph.interfaces.declared import (
+    LinearForce,
+    MismatchForce,
+    PointwiseForce,
+    ScheduledForce,
+)
+from solidsph.mismatch import MismatchOperator
 
 
 class Load(NamedTuple):
@@ -47,6 +55,13 @@ class Linear(NamedTuple):
     weights: Array
 
 
+class Mismatched(NamedTuple):
+    """Forces of mismatches."""
+
+    bodies: tuple[Sweeps, ...]
+    now: Scheduled  # those of the step in hand
+
+
 def load_pass(load: ForceCondition, dimension: int, threaded: bool) -> Any:
     """Compiled (load, step, u, v, path, total): total += its force, work += that along `path`.
 
@@ -58,11 +73,12 @@ def load_pass(load: ForceCondition, dimension: int, threaded: bool) -> Any:
             return _accounted(_scheduled(dimension), dimension, threaded)
         case LinearForce():
             return _accounted(_linear(dimension), dimension, threaded)
+        case MismatchForce():
+            return _mismatch(len(load.operators), dimension, threaded)
         case PointwiseForce():
-            formula = _formula(load.force, dimension, load.values.shape[1])
-            return _accounted(
-                _pointwise(formula, dimension, load.values.shape[1]), dimension, threaded
-            )
+            count = load.values.shape[1]
+            formula = _formula(load.force, dimension, count)
+            return _accounted(_pointwise(formula, dimension, count), dimension, threaded)
     raise NotCompilableError(f"load {load.label!r} is not of a declared kind")
 
 
@@ -79,6 +95,9 @@ def load_data(
         case LinearForce():
             matrix = load.matrix
             own = Linear(matrix.indptr, matrix.indices, matrix.data)
+        case MismatchForce():
+            sweeps = tuple(_sweeps(one).arrays for one in load.operators)
+            own = Mismatched(sweeps, Scheduled(np.zeros((1, *reference.shape))))
         case PointwiseForce():
             own = Pointwise(reference, np.ascontiguousarray(load.values))
         case _:
@@ -133,6 +152,26 @@ def _linear(dimension: int) -> Any:
                 force[i] -= weight * u[q, i]
 
     return fill
+
+
+@cache
+def _mismatch(bodies: int, dimension: int, threaded: bool) -> Any:
+    each = chain((body_sweep(dimension, threaded),) * bodies)
+    account = _accounted(_scheduled(dimension), dimension, threaded)
+
+    @njit
+    def apply(load, step, u, v, path, total):
+        own = load.own
+        each(own.bodies, u, own.now.table[0])
+        account(Load(load.particles, load.before, load.work, own.now), 0, u, v, path, total)
+
+    return apply
+
+
+def _sweeps(operator: MismatchOperator) -> MismatchSweeps:
+    if isinstance(operator, MismatchSweeps):
+        return operator
+    return MismatchSweeps.of(operator.mismatch)
 
 
 @cache
