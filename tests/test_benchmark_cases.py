@@ -332,7 +332,7 @@ def test_elastic_spin_over_a_hundred_turns(tmp_path: Path) -> None:
 
 
 @pytest.mark.validation
-def test_sheet_with_hole_at_every_refinement(tmp_path: Path) -> None:
+def test_sheet_with_hole_keeps_within_its_bars_at_every_spacing(tmp_path: Path) -> None:
     for spacing in (0.1, 0.05, 1.0 / 30.0):
         outcome = run_case(SheetWithHole(spacing=spacing), tmp_path)
         told(f"sheet, spacing {spacing:.4g}", outcome)

@@ -55,7 +55,12 @@ def draw_sheet(
     line.set_xlim(0.0, 1.02)
     line.set_ylim(bottom=0.0)
     line.axvspan(0.0, radius / width, color="0.9")
-    line.text(0.5 * radius / width, 0.5, "hole", ha="center", rotation=90)
+    line.text(
+        *(0.5 * radius / width, 0.04, "hole"),
+        transform=line.get_xaxis_transform(),
+        ha="center",
+        rotation=90,
+    )
     line.legend(frameon=False, loc="upper right")
     figure.suptitle(f"{title}: {particles.count} particles", fontsize=11)
     path.parent.mkdir(parents=True, exist_ok=True)
