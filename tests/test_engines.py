@@ -15,6 +15,7 @@ from solidsph import Simulation, registry
 from solidsph.arrays import Array, Mask, Scalar, Tensor
 from solidsph.body import Body
 from solidsph.builder import Builder
+from solidsph.engines.compiled import shares
 from solidsph.engines.compiled.engine import CompiledEngine, CompiledForces
 from solidsph.engines.engine import Engine, InternalForces
 from solidsph.engines.matrix import MatrixEngine, MatrixForces
@@ -213,12 +214,16 @@ def test_single_precision_is_precision_of_strain(d: int, arrangement: dict[str, 
 
 @pytest.mark.parametrize("divergence", registry.names("divergences"))
 @on_every_arrangement
-def test_compiled_by_several_threads(arrangement: dict[str, Any], divergence: str) -> None:
+def test_compiled_by_several_threads(
+    arrangement: dict[str, Any], divergence: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The same forces as the reference's, and the same bits at every call."""
+    monkeypatch.setattr(shares, "WORTH_A_THREAD", 1)
     formulation = {"type": "total-lagrangian", "divergence": divergence}
     simulation = block(2, arrangement, lengths=[4.0, 6.0], formulation=formulation).build()
     reference = prepared(MatrixEngine(), simulation)
     forces = compiled(simulation)
+    assert forces.parts[0].gradient_shares.threaded
     u = random_displacements(simulation)
     assert_same(forces, reference, u)
     assert np.array_equal(forces.forces(0.0, u), forces.forces(0.0, u))

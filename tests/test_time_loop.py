@@ -11,6 +11,7 @@ import pytest
 from solidsph import DivergedError, Simulation, registry
 from solidsph.arrays import Array, Indices, Vector
 from solidsph.builder import Builder
+from solidsph.engines.compiled import shares
 from solidsph.engines.compiled.loop import CompiledLoop
 from solidsph.interfaces.condition import ForceCondition, Observation
 from solidsph.interfaces.declared import PointwiseForce
@@ -126,9 +127,9 @@ def test_the_paper_s_bar() -> None:
     )
 
 
-def test_several_bodies_and_threads() -> None:
-    """Enough particles for two threads to share."""
-    builder = box(3, 14).body(
+def test_several_bodies_and_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shares, "WORTH_A_THREAD", 1)
+    builder = box(3, 7).body(
         "other",
         shape={"type": "box", "lengths": [0.4, 0.4, 0.4], "origin": [3.0, 0.0, 0.0]},
         spacing=0.1,
@@ -140,8 +141,10 @@ def test_several_bodies_and_threads() -> None:
         },
     )
     builder = builder.boundary("clamp", where="left").effect("mass-damping", rate=50.0)
+    builder = builder.effect("hourglass-control")
     simulation, loop, by_step = loops(builder)
     state = simulation.start()
+    assert loop.threads > 1
     ours = loop.advance(state, 4)
     assert_same(ours, by_step.advance(state, 4), simulation)
     again = loop.advance(state, 4)

@@ -187,7 +187,7 @@ def _part(body: Body, law: Any, dtype: str) -> CompiledBody:
         weights = divergence.weights(pairs, weights, particles.volumes)[pairs.reversed_order()]
         force = compressed(in_chunks(pairs, weights), d, dtype, shortest_run)
         factors = np.ones(n)
-    threads = thread_count(n)
+    threads = thread_count(count)
     gradient_shares = shared(gradient, d, dtype, threads)
     force_shares = gradient_shares if divergence.adjoint else shared(force, d, dtype, threads)
     return CompiledBody(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -62,47 +63,45 @@ class Mismatched(NamedTuple):
     now: Scheduled  # those of the step in hand
 
 
-def load_pass(load: ForceCondition, dimension: int, threaded: bool) -> Any:
-    """Compiled (load, step, u, v, path, total): total += its force, work += that along `path`.
+class LoadPass(NamedTuple):
+    """A load made ready for the loop."""
+
+    apply: Any  # compiled (load, step, u, v, path, total): total += force, work += that along path
+    own: Callable[[Array], Any]  # times (t,) at which the steps to come end -> what its kind needs
+
+
+def load_pass(load: ForceCondition, reference: Array, threaded: bool) -> LoadPass:
+    """The pass of a load on particles whose X is `reference` (n, d) [m].
 
     Raises:
         NotCompilableError: the load is not of a declared kind, or its formula does not compile.
     """
+    d = reference.shape[1]
     match load:
         case ScheduledForce():
-            return _accounted(_scheduled(dimension), dimension, threaded)
-        case LinearForce():
-            return _accounted(_linear(dimension), dimension, threaded)
-        case MismatchForce():
-            return _mismatch(len(load.operators), dimension, threaded)
-        case PointwiseForce():
-            count = load.values.shape[1]
-            formula = _formula(load.force, dimension, count)
-            return _accounted(_pointwise(formula, dimension, count), dimension, threaded)
-    raise NotCompilableError(f"load {load.label!r} is not of a declared kind")
-
-
-def load_data(
-    load: ForceCondition, reference: Array, times: Array, before: Array, threads: int
-) -> Load:
-    """What the loop holds of a load over steps that end at `times` (t,) [s].
-
-    `reference` is X (n, d) [m], and `before` (k, d) its force at the start [N].
-    """
-    match load:
-        case ScheduledForce():
-            own: Any = Scheduled(np.ascontiguousarray(load.schedule(times)))
+            return LoadPass(
+                _accounted(_scheduled(d), d, threaded),
+                lambda times: Scheduled(np.ascontiguousarray(load.schedule(times))),
+            )
         case LinearForce():
             matrix = load.matrix
-            own = Linear(matrix.indptr, matrix.indices, matrix.data)
+            linear = Linear(matrix.indptr, matrix.indices, matrix.data)
+            return LoadPass(_accounted(_linear(d), d, threaded), lambda times: linear)
         case MismatchForce():
-            sweeps = tuple(_sweeps(one).arrays for one in load.operators)
-            own = Mismatched(sweeps, Scheduled(np.zeros((1, *reference.shape))))
+            sweeps = [_sweeps(operator) for operator in load.operators]
+            own = Mismatched(
+                tuple(one.arrays for one in sweeps), Scheduled(np.zeros((1, *reference.shape)))
+            )
+            each = chain(tuple(body_sweep(one.sweep) for one in sweeps))
+            account = _accounted(_scheduled(d), d, threaded)
+            return LoadPass(_mismatch(each, account), lambda times: own)
         case PointwiseForce():
-            own = Pointwise(reference, np.ascontiguousarray(load.values))
-        case _:
-            raise AssertionError("load_pass has refused it")
-    return Load(load.particles, before, np.zeros(threads), own)
+            values = np.ascontiguousarray(load.values)
+            count = values.shape[1]
+            formula = _pointwise(_formula(load.force, d, count), d, count)
+            pointwise = Pointwise(reference, values)
+            return LoadPass(_accounted(formula, d, threaded), lambda times: pointwise)
+    raise NotCompilableError(f"load {load.label!r} is not of a declared kind")
 
 
 @cache
@@ -155,10 +154,7 @@ def _linear(dimension: int) -> Any:
 
 
 @cache
-def _mismatch(bodies: int, dimension: int, threaded: bool) -> Any:
-    each = chain((body_sweep(dimension, threaded),) * bodies)
-    account = _accounted(_scheduled(dimension), dimension, threaded)
-
+def _mismatch(each: Any, account: Any) -> Any:
     @njit
     def apply(load, step, u, v, path, total):
         own = load.own

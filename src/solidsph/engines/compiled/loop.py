@@ -15,7 +15,7 @@ from solidsph.arrays import Array
 from solidsph.dynamics import Dynamics
 from solidsph.engines.compiled.chain import chain
 from solidsph.engines.compiled.internal import Internal, internal_forces
-from solidsph.engines.compiled.loads import Load, load_data, load_pass
+from solidsph.engines.compiled.loads import Load, LoadPass, load_pass
 from solidsph.engines.compiled.motions import (
     Following,
     MotionWords,
@@ -33,6 +33,9 @@ from solidsph.time_loop import NOT_FINITE, StepError, TimeLoop
 
 if TYPE_CHECKING:
     from solidsph.engines.compiled.engine import CompiledBody
+
+# Operations for every particle in a step, beside those for pairs.
+_PER_PARTICLE = 10
 
 # Numbers in the tables of what varies in time, for the steps that go together.
 _TABLE = 1 << 18
@@ -64,8 +67,10 @@ def compiled_loop(
     if not isinstance(integrator, PointwiseIntegrator):
         raise NotCompilableError(f"integrator {type(integrator).__name__} is not pointwise")
     particles = dynamics.particles
-    d, threads = particles.dimension, thread_count(particles.count)
+    d = particles.dimension
+    threads = thread_count(_PER_PARTICLE * particles.count)  # of what is done particle by particle
     internal = internal_forces(bodies, conditions)
+    loads = [load_pass(load, particles.positions, threads > 1) for load in dynamics.loads]
     words = [motion_words(motion, d) for motion in dynamics.motions]
     by_word = [tuple(one[k] for one in words) for k in range(len(MotionWords._fields))]
     steps = _steps(
@@ -74,10 +79,10 @@ def compiled_loop(
         _formula(integrator.leap, 4),
         _formula(integrator.arrive, 3),
         internal.forces,
-        chain(tuple(load_pass(load, d, threads > 1) for load in dynamics.loads)),
+        chain(tuple(one.apply for one in loads)),
         MotionWords(*(chain(functions) for functions in by_word)),
     )
-    return CompiledLoop(dynamics, step_size, internal, steps, threads)
+    return CompiledLoop(dynamics, step_size, internal, loads, steps, threads)
 
 
 @final
@@ -88,6 +93,7 @@ class CompiledLoop(TimeLoop):
     dynamics: Dynamics
     step_size: float  # [s]
     internal: Internal
+    loads: Sequence[LoadPass]
     steps: Any  # compiled
     threads: int
     most_steps: int = attrs.field(init=False)  # for which tables are made at once
@@ -127,7 +133,7 @@ class CompiledLoop(TimeLoop):
             count = min(stop - state.step - done, self.most_steps)
             numbers = np.arange(done + 1, done + count + 1, dtype=np.float64)
             times = state.time + self.step_size * numbers
-            loads = accounts.loads(times, self.threads)
+            loads = accounts.loads([one.own(times) for one in self.loads], self.threads)
             motions = accounts.motions(times)
             carried_out = self.steps(
                 count,
@@ -184,11 +190,12 @@ class _Accounts:
         ]
         return cls(dynamics, dict(state.work), loads, reactions)
 
-    def loads(self, times: Array, threads: int) -> tuple[Load, ...]:
-        """What the loop holds of the loads."""
-        X = self.dynamics.particles.positions
-        pairs = zip(self.dynamics.loads, self.load_forces, strict=True)
-        return tuple(load_data(load, X, times, before, threads) for load, before in pairs)
+    def loads(self, own: Sequence[Any], threads: int) -> tuple[Load, ...]:
+        """What the loop holds of the loads, with what each kind needs."""
+        each = zip(self.dynamics.loads, self.load_forces, own, strict=True)
+        return tuple(
+            Load(load.particles, before, np.zeros(threads), one) for load, before, one in each
+        )
 
     def motions(self, times: Array) -> tuple[Scheduled | Following, ...]:
         """What the loop holds of the motions."""

@@ -56,10 +56,11 @@ class MismatchSweeps(MismatchOperator):
         """The operator of a mismatch."""
         body = mismatch.body
         n, d = body.particles.positions.shape
-        threads = thread_count(n)
         shortest_run = max(2, group(d, _DTYPE) // 2)
         chunks = weighted_chunks(body, np.ones(n, dtype=np.bool_))
         rows = compressed(chunks, d, _DTYPE, shortest_run)
+        # Beside the near pairs there are those of the gradient, twice.
+        threads = thread_count(3 * len(mismatch.columns))
         shares = shared(rows, d, _DTYPE, threads)
         arrays = Sweeps(
             extent=(body.extent.start, body.extent.stop),
@@ -152,9 +153,8 @@ def mismatch_sweep(dimension: int, threaded: bool) -> Any:
 
 
 @cache
-def body_sweep(dimension: int, threaded: bool) -> Any:
-    """Compiled (arrays, u (n, d), forces (n, d)) as above, of one body among all particles."""
-    sweep = mismatch_sweep(dimension, threaded)
+def body_sweep(sweep: Any) -> Any:
+    """Compiled (arrays, u (n, d), forces (n, d)) as `sweep`, of one body among all particles."""
 
     @njit
     def own(arrays, u, forces):

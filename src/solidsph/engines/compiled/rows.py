@@ -248,9 +248,11 @@ def _each_once(
         a = known[place, 0]
         if known[place, 1] != n or not _same_members(offsets, weights, a, start, n):
             a = end
+            # Number by number: assigning rows would compile what broadcasts, and its messages.
             for m in range(n):
                 offsets[end + m] = offsets[start + m]
-                weights[end + m] = weights[start + m]
+                for k in range(weights.shape[1]):
+                    weights[end + m, k] = weights[start + m, k]
             known[place, 0], known[place, 1] = a, n
             end += n
         spans[row, 0], spans[row, 1] = a, a + n

@@ -21,8 +21,9 @@ from solidsph.engines.compiled.blocks import STRIDE, group
 from solidsph.engines.compiled.rows import Rows
 from solidsph.engines.compiled.sweeps import spread_sweep, sweeps
 
-# Below this many particles, waking a second thread costs more than it does.
-_ALONE = 2000
+# A second thread must be woken for every pass, which takes some tens of microseconds: as long as
+# one thread takes for so many operations of a nanosecond.
+WORTH_A_THREAD = 200_000
 
 _ALIGNMENT = 64  # bytes of a cache line
 
@@ -31,9 +32,9 @@ _ALIGNMENT = 64  # bytes of a cache line
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 
-def thread_count(particles: int) -> int:
-    """How many threads go through so many particles."""
-    return 1 if particles < _ALONE else int(get_num_threads())
+def thread_count(operations: int) -> int:
+    """How many threads share so many operations of about a nanosecond in several passes."""
+    return 1 if operations < WORTH_A_THREAD else int(get_num_threads())
 
 
 @attrs.frozen(eq=False)
