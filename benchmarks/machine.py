@@ -73,8 +73,17 @@ def processor() -> str:
     return platform.processor() or platform.machine()
 
 
+def _company() -> str:
+    """How many other programs there are to share the processor with."""
+    if not hasattr(os, "getloadavg"):
+        return ""
+    load = os.getloadavg()[0]
+    return f"When the run began {load:.1f} programs were running or waiting to (load average)."
+
+
 def machine_table(threads: list[int]) -> Table:
     """What the machine can do, by the number of threads."""
+    company = _company()
     rows = []
     for count in threads:
         rate = rates(count)
@@ -90,5 +99,5 @@ def machine_table(threads: list[int]) -> Table:
         f"The machine: {processor()}, {os.cpu_count()} cores",
         ("threads", "read GB/s", "triad GB/s", "1e9 multiply-adds/s", "the same, float32"),
         tuple(rows),
-        "Measured in the same run. A multiply-add is two floating point operations.",
+        f"Measured in the same run. A multiply-add is two floating point operations. {company}",
     )
