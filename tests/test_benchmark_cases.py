@@ -106,6 +106,9 @@ def test_a_case_that_diverges_has_not_passed(tmp_path: Path) -> None:
     assert outcome.runs[0].outcome.startswith("diverged")
     assert not any(m.passed for m in outcome.measurements)
     assert outcome.measurements[0].verdict.startswith("diverged")
+    longer = run_case(Csm3(across=5, duration=2.5, time_step_factor=1.0), tmp_path)
+    assert len(longer.measurements) == 7
+    assert not any(m.passed for m in longer.measurements)
 
 
 def test_an_extremum_between_outputs_is_that_of_the_parabola() -> None:

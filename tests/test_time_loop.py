@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import attrs
 import numpy as np
 import pytest
+from numba.core.config import NUMBA_NUM_THREADS
 
 from solidsph import DivergedError, Simulation, registry
 from solidsph.arrays import Array, Indices, Vector
@@ -127,6 +128,7 @@ def test_the_paper_s_bar() -> None:
     )
 
 
+@pytest.mark.skipif(NUMBA_NUM_THREADS < 2, reason="there is one thread only")
 def test_several_bodies_and_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shares, "WORTH_A_THREAD", 1)
     builder = box(3, 7).body(
@@ -177,6 +179,35 @@ def test_a_run_by_the_loop_ends_where_a_run_by_steps_does() -> None:
     assert np.allclose(ends[0].positions, ends[1].positions, rtol=0.0, atol=1e-12)
 
 
+def test_conditions_that_share_an_account_are_carried_out_step_by_step() -> None:
+    """Nobody could tell whose force the account holds at the start of a stretch."""
+
+    simulation = box(2, 7).effect(Spring()).engine("compiled").build()
+    (load,) = simulation.dynamics.loads
+    twice = attrs.evolve(simulation.dynamics, loads=[load, load])
+    loop = twice.internal.time_loop(twice, simulation.integrator, simulation.step_size)
+    assert isinstance(loop, StepByStep)
+
+
+def test_formulas_divide_as_arrays_do() -> None:
+    """What is undefined for a moment is no error: here 1/(1 + 1/0) is 0."""
+    assert_agree(box(2, 7).effect(Rational()))
+
+
+def test_single_precision_in_the_loop() -> None:
+    simulation = stretched(box(2, 7).boundary("clamp", where="left")).engine("matrix").build()
+    single = stretched(box(2, 7).boundary("clamp", where="left")).engine("compiled-float32").build()
+    loop = single.time_loop()
+    assert isinstance(loop, CompiledLoop)
+    X = simulation.particles.positions
+    ours = loop.advance(single.start(), STEPS).positions - X
+    parts = simulation.dynamics, simulation.integrator, simulation.step_size
+    theirs = StepByStep(*parts).advance(simulation.start(), STEPS).positions - X
+    # Forces are rounded to some 1e-7 of the largest; displacements have some steps to gather it.
+    missed = np.abs(ours - theirs).max() / np.abs(theirs).max()
+    assert 1e-12 < missed < 1e-5
+
+
 def test_it_stops_at_the_step_that_goes_wrong() -> None:
     # A speed at which neighbours pass each other within some steps.
     builder = box(1, 24).initial(velocity={"x": "-40000*(X - 0.5)"})
@@ -218,6 +249,37 @@ class _Springs(PointwiseForce):
     @staticmethod
     def force(position: Vector, velocity: Vector, values: Vector) -> Vector:
         return (-values[0] * np.sin(position[0]), 0.0)
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {}
+
+
+@attrs.frozen
+class Rational(Spring.__base__):
+    """A force that is computed by way of infinity."""
+
+    def bind(self, setting, label: str) -> ForceCondition:
+        return _Rational(label, setting.select("all"), np.zeros((setting.particles.count, 1)))
+
+    def arrays(self, setting) -> Mapping[str, int]:
+        return {}
+
+    def damping_rate(self) -> float:
+        return 0.0
+
+    def stiffness_rate(self, bodies) -> float:
+        return 0.0
+
+
+@attrs.frozen(eq=False)
+class _Rational(PointwiseForce):
+    label: str
+    particles: Indices
+    values: Array
+
+    @staticmethod
+    def force(position: Vector, velocity: Vector, values: Vector) -> Vector:
+        return (-velocity[0] + 1.0 / (1.0 + 1.0 / values[0]), -velocity[1])
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         return {}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import attrs
 import numpy as np
 
@@ -23,6 +25,8 @@ class Body:
     smoothing: SmoothingKernel
     material: Material
     formulation: Formulation
+    # What parts have made of these arrays, by keys of theirs; it lives as long as the body does.
+    made: dict[object, Any] = attrs.field(factory=dict, init=False, repr=False)
 
     def pairs(self) -> Pairs:
         """Neighbours in the reference configuration, numbered within the body.

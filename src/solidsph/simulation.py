@@ -34,7 +34,7 @@ class Result:
 
     state: State  # the last one
     record: Path | None  # the file written, if one was asked for
-    seconds: float  # wall time of the loop [s]
+    seconds: float  # wall time of the run, compiling and recording included [s]
     effort: Mapping[str, Any]  # what it took besides: "quantity [unit]" -> a number, or yes or no
 
 
@@ -72,7 +72,8 @@ class Simulation:
         positions = self.dynamics.place(self.initial.time, self.initial.positions)
         velocities = self.dynamics.carry(self.initial.time, self.initial.velocities)
         state = attrs.evolve(self.initial, positions=positions, velocities=velocities)
-        return self.integrator.start(state, self.dynamics, self.step_size)
+        with np.errstate(all="ignore"):  # as in the steps that follow
+            return self.integrator.start(state, self.dynamics, self.step_size)
 
     def time_loop(self) -> TimeLoop:
         """What carries out the steps."""

@@ -40,6 +40,7 @@ class Csm1(Case):
     tolerance: float = number(default=0.005)  # largest error of the tip that passes [-]
 
     def __attrs_post_init__(self) -> None:
+        check_count("csm1", "load_steps", self.load_steps, 1)
         clamp_named("csm1", self.clamp)
         check_count("csm1", "across", self.across, 3)
         check_positive("csm1", "tolerance", self.tolerance, "parts of one")

@@ -19,7 +19,7 @@ from solidsph.results.pictures import largest_principal
 from solidsph.results.record import Record
 from solidsph.scene import Scene
 from solidsph_builtin.cases._compare import FINISHED, compared
-from solidsph_builtin.cases._scheme import with_scheme
+from solidsph_builtin.cases._scheme import check_count, with_scheme
 
 YOUNGS_MODULUS = 70e6  # [Pa]
 POISSONS_RATIO = 0.49
@@ -70,6 +70,7 @@ class SheetWithHole(Case):
     peak_tolerance: float = number(default=0.05)  # largest error of a stress that passes [-]
 
     def __attrs_post_init__(self) -> None:
+        check_count("sheet-with-hole", "load_steps", self.load_steps, 1)
         for name, unit in (("width", "m"), ("spacing", "m"), ("traction", "Pa")):
             check_positive("sheet-with-hole", name, getattr(self, name), unit)
         if not 0.0 < self.hole_ratio <= 0.7:

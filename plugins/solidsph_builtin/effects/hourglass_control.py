@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import final
-from weakref import WeakKeyDictionary
 
 import attrs
 import numpy as np
@@ -86,15 +85,13 @@ class HourglassControl(Effect):
         return max(_operator(body, self.strength).highest_frequency() for body in bodies)
 
 
-# The step is chosen before the term is bound: what is made for one serves the other.
-_MADE: WeakKeyDictionary[Body, dict[float, MismatchOperator]] = WeakKeyDictionary()
-
-
 def _operator(body: Body, strength: float) -> MismatchOperator:
-    made = _MADE.setdefault(body, {})
-    if strength not in made:
-        made[strength] = mismatch_operator(penalised(body, strength))
-    return made[strength]
+    # The step is chosen before the term is bound: what is made for one serves the other.
+    key = (HourglassControl, strength)
+    if key not in body.made:
+        body.made[key] = mismatch_operator(penalised(body, strength))
+    operator: MismatchOperator = body.made[key]
+    return operator
 
 
 def penalised(body: Body, strength: float) -> Mismatch:

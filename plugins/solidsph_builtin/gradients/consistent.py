@@ -33,6 +33,9 @@ _REGULAR = 1e-12
 _REFINEMENTS = 50
 _SOLVED = 1e-12
 
+# What is left where refinement stalls must be below any error that a patch test could show.
+_USELESS = 1e-8
+
 
 @final
 @attrs.frozen
@@ -85,9 +88,10 @@ class Consistent(Gradient):
                     "its surface is known in the reference configuration; use 'total-lagrangian'"
                 ]
             )
+        inner = self.of.of_body(body)
         pairs = body.pairs()
         slopes = body.smoothing.gradient(pairs.offsets, pairs.distances)
-        plain = self.of.weights(pairs, slopes, particles.cells)
+        plain = inner.weights(pairs, slopes, particles.cells)
         V = particles.volumes
         sums = [np.bincount(pairs.columns, V[pairs.rows] * g, minlength=n) for g in plain.T]
         missing = particles.area_vectors - np.stack(sums, axis=1)
@@ -96,7 +100,7 @@ class Consistent(Gradient):
         for face in particles.faces.values():
             surface[face.particles] = True
         missing = _possible(missing, particles.positions, surface, self.exact_degree)
-        return _OfBody(self.of, V, _solved(change.matrix(), missing, surface))
+        return _OfBody(inner, V, _solved(change.matrix(), missing, surface))
 
 
 @final
@@ -199,4 +203,13 @@ def _solved(matrix: csr_array, missing: Array, surface: Mask) -> Array:
         left = missing - softened @ multipliers
         if np.abs(left).max() <= _SOLVED * np.abs(missing).max():
             break
+    unsolved = float(np.abs(left).max() / max(np.abs(missing).max(), 1e-300))
+    if not unsolved <= _USELESS:
+        raise BuildError(
+            [
+                "gradient 'consistent': no change of the weights makes the sums right (a part of "
+                f"{unsolved:.3g} of what is missing is left); a larger cover gives it more weights "
+                "to change, or take the gradient within by itself"
+            ]
+        )
     return multipliers

@@ -19,8 +19,9 @@ from solidsph.statics import critical_step, tangent
 from solidsph.statics.factors import SingularError, factorised
 from solidsph.statics.freedoms import Freedoms, freedoms
 from solidsph.statics.tangent import is_symmetric
+from solidsph.time_loop import StepByStep, StepError
 
-_TIMED_STEPS = 5
+_TIMED = 0.1  # [s]
 
 
 @click.command()
@@ -38,7 +39,7 @@ def explain(target: str, settings: tuple[str, ...], as_json: bool) -> None:
     for name, facts in explanations.items():
         say(f"\n{name}: {scenes[name].title}" if scenes[name].title else f"\n{name}")
         show_table(
-            "parts", ["kind", "name", "from"], [list(row.values()) for row in facts["parts"]]
+            "parts", ["kind", "name", "from", "why"], [list(row.values()) for row in facts["parts"]]
         )
         show_table(
             "numbers", ["", "value", "why"], [list(row.values()) for row in facts["numbers"]]
@@ -129,10 +130,11 @@ def _of_motion(simulation: Simulation) -> list[tuple[str, Any, str]]:
             else "BELOW 1: the run will blow up; take a smaller time_step_factor",
         ),
         ("steps", simulation.steps, f"for {scene.duration:g} s"),
+        _loop(simulation),
         (
             "predicted wall time [s]",
             _seconds_per_step(simulation) * simulation.steps,
-            f"{_TIMED_STEPS} steps timed here and now, without outputs and compiling",
+            "some steps timed here and now, without outputs and compiling",
         ),
         _record_size(simulation, outputs),
     ]
@@ -165,11 +167,29 @@ def _record_size(simulation: Simulation, outputs: int) -> tuple[str, Any, str]:
 
 
 def _seconds_per_step(simulation: Simulation) -> float:
+    """Without what is done once for all steps together; not a number if it fails at once."""
     loop = simulation.time_loop()
-    state = loop.advance(simulation.start(), 1)  # compiles what is to be compiled
-    begun = clock.perf_counter()
-    loop.advance(state, 1 + _TIMED_STEPS)
-    return (clock.perf_counter() - begun) / _TIMED_STEPS
+    count, taken = 1, 0.0
+    try:
+        state = loop.advance(simulation.start(), 1)  # compiles what is to be compiled
+        while taken < _TIMED:
+            count *= 2
+            begun = clock.perf_counter()
+            loop.advance(state, 1 + count)
+            taken = clock.perf_counter() - begun
+    except StepError:
+        return float("nan")
+    return taken / count
+
+
+def _loop(simulation: Simulation) -> tuple[str, str, str]:
+    if isinstance(simulation.time_loop(), StepByStep):
+        return ("time loop", "step by step", "each step by the parts themselves, which fits all")
+    return (
+        "time loop",
+        "compiled",
+        "whole steps between outputs: every part is of a declared kind",
+    )
 
 
 def _seconds_per_iteration(simulation: Simulation, own: Freedoms) -> float:

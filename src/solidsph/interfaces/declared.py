@@ -137,28 +137,6 @@ class PointwiseForce(ForceCondition):
         return np.column_stack([np.broadcast_to(one, len(x)) for one in found])
 
 
-class LinearForce(ForceCondition):
-    """f = -K u, the same for every component of the displacement u = x - X of all particles."""
-
-    @property
-    @abstractmethod
-    def reference(self) -> Array:
-        """X, (n, d) [m]."""
-
-    @property
-    @abstractmethod
-    def matrix(self) -> csr_array:
-        """K, (n, n) [N/m]."""
-
-    @property
-    def particles(self) -> Indices:
-        return np.arange(len(self.reference))
-
-    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
-        forces: Array = -(self.matrix @ (positions - self.reference))
-        return forces
-
-
 class MismatchForce(ForceCondition):
     """Forces that resist the mismatch of neighbours (`solidsph.mismatch`), body by body."""
 

@@ -29,6 +29,11 @@ class Recorder:
         self._initial_energy = 0.0
 
     @implementation
+    def solidsph_setup(self, simulation: Simulation) -> None:
+        # A run that fails before its first output must not seem to have left an older record.
+        self._path.unlink(missing_ok=True)
+
+    @implementation
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
         if self._writer is None:
             self._initial_energy = kinetic_energy(observation) + strain_energy(observation)

@@ -67,10 +67,10 @@ def run_case(
         outcome, begun = "finished", clock.perf_counter()
         try:
             carry_out(simulation, record=path, observers=begin(name, simulation))
-        except DivergedError as cause:
-            outcome = f"diverged at step {cause.step}: {cause.cause}"
-        except ConvergenceError as cause:
-            outcome = f"no equilibrium beyond load factor {cause.load_factor:g}: {cause.cause}"
+        except (DivergedError, ConvergenceError) as cause:
+            if not path.exists():  # it failed before there was anything to measure
+                raise
+            outcome = _told(cause)
         seconds = clock.perf_counter() - begun
         with Record(path) as record:
             steps = int(record.steps[-1])
@@ -92,6 +92,12 @@ def run_case(
         measurements = case.measure(records)
         pictures = case.draw(records, folder)
     return CaseResult(measurements, runs, pictures, peak_memory())
+
+
+def _told(cause: DivergedError | ConvergenceError) -> str:
+    if isinstance(cause, DivergedError):
+        return f"diverged at step {cause.step}: {cause.cause}"
+    return f"no equilibrium beyond load factor {cause.load_factor:g}: {cause.cause}"
 
 
 def peak_memory() -> int:

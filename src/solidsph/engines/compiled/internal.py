@@ -36,7 +36,6 @@ class Fused(NamedTuple):
 class Staged(NamedTuple):
     """A body whose stress is seen by conditions in between."""
 
-    extent: tuple[int, int]
     table: Indices  # of the gathering pass
     rows: Rows
     u: NDArray[Any]  # flat
@@ -145,9 +144,8 @@ def _staged(stress_pass: Any, imposed: Any, spread: Any, ghosts_act: bool) -> An
 
 
 def _staged_data(part: CompiledBody) -> Staged:
-    extent, d = part.body.extent, part.body.particles.dimension
+    d = part.body.particles.dimension
     return Staged(
-        extent=(extent.start, extent.stop),
         table=part.gradient_shares.table,
         rows=part.gradient,
         u=part.u,

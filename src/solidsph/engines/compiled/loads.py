@@ -7,18 +7,20 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange, types
-from numba.core.errors import NumbaError
+from numba import njit, prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
-from numpy.typing import NDArray
 
 from solidsph.arrays import Array, Indices
 from solidsph.engines.compiled.chain import chain
 from solidsph.engines.compiled.mismatch import MismatchSweeps, Sweeps, body_sweep
-from solidsph.engines.compiled.pointwise import NotCompilableError, registered
+from solidsph.engines.compiled.pointwise import (
+    NotCompilableError,
+    compiled_function,
+    numbers_type,
+)
+from solidsph.engines.compiled.vectors import ROW, moved
 from solidsph.interfaces.condition import ForceCondition
 from solidsph.interfaces.declared import (
-    LinearForce,
     MismatchForce,
     PointwiseForce,
     ScheduledForce,
@@ -48,14 +50,6 @@ class Pointwise(NamedTuple):
     values: Array  # (k, m)
 
 
-class Linear(NamedTuple):
-    """Forces by a constant sparse matrix, whose rows stand as its particles do."""
-
-    starts: NDArray[np.int32]
-    columns: NDArray[np.int32]
-    weights: Array
-
-
 class Mismatched(NamedTuple):
     """Forces of mismatches."""
 
@@ -83,10 +77,6 @@ def load_pass(load: ForceCondition, reference: Array, threaded: bool) -> LoadPas
                 _accounted(_scheduled(d), d, threaded),
                 lambda times: Scheduled(np.ascontiguousarray(load.schedule(times))),
             )
-        case LinearForce():
-            matrix = load.matrix
-            linear = Linear(matrix.indptr, matrix.indices, matrix.data)
-            return LoadPass(_accounted(_linear(d), d, threaded), lambda times: linear)
         case MismatchForce():
             sweeps = [_sweeps(operator) for operator in load.operators]
             own = Mismatched(
@@ -98,7 +88,9 @@ def load_pass(load: ForceCondition, reference: Array, threaded: bool) -> LoadPas
         case PointwiseForce():
             values = np.ascontiguousarray(load.values)
             count = values.shape[1]
-            formula = _pointwise(_formula(load.force, d, count), d, count)
+            vector = numbers_type(d)
+            force = compiled_function(load.force, vector, vector, numbers_type(count))
+            formula = _pointwise(force, d, count)
             pointwise = Pointwise(reference, values)
             return LoadPass(_accounted(formula, d, threaded), lambda times: pointwise)
     raise NotCompilableError(f"load {load.label!r} is not of a declared kind")
@@ -141,19 +133,6 @@ def _scheduled(dimension: int) -> Any:
 
 
 @cache
-def _linear(dimension: int) -> Any:
-    @njit
-    def fill(own, step, m, p, u, v, force):
-        force[:] = 0.0
-        for k in range(own.starts[m], own.starts[m + 1]):
-            q, weight = own.columns[k], own.weights[k]
-            for i in range(dimension):
-                force[i] -= weight * u[q, i]
-
-    return fill
-
-
-@cache
 def _mismatch(each: Any, account: Any) -> Any:
     @njit
     def apply(load, step, u, v, path, total):
@@ -172,38 +151,13 @@ def _sweeps(operator: MismatchOperator) -> MismatchSweeps:
 
 @cache
 def _pointwise(formula: Any, dimension: int, count: int) -> Any:
-    vector, moved = _VECTOR[dimension], _MOVED[dimension]
+    row = ROW[dimension]
 
     @njit
     def fill(own, step, m, p, u, v, force):
         values = to_fixed_tuple(own.values[m], count)
-        found = formula(moved(own.reference, u, p), vector(v, p), values)
+        found = formula(moved(row(own.reference, p), 1.0, row(u, p)), row(v, p), values)
         for i in range(dimension):
             force[i] = found[i]
 
     return fill
-
-
-# Rows of arrays (n, d) as tuples: (values, p) -> values[p], and (X, u, p) -> X[p] + u[p].
-_VECTOR = {
-    1: njit(lambda a, p: (a[p, 0],)),
-    2: njit(lambda a, p: (a[p, 0], a[p, 1])),
-    3: njit(lambda a, p: (a[p, 0], a[p, 1], a[p, 2])),
-}
-_MOVED = {
-    1: njit(lambda a, b, p: (a[p, 0] + b[p, 0],)),
-    2: njit(lambda a, b, p: (a[p, 0] + b[p, 0], a[p, 1] + b[p, 1])),
-    3: njit(lambda a, b, p: (a[p, 0] + b[p, 0], a[p, 1] + b[p, 1], a[p, 2] + b[p, 2])),
-}
-
-
-@cache
-def _formula(force: Any, dimension: int, count: int) -> Any:
-    """The compiled formula of a pointwise force."""
-    formula = njit(registered(force))
-    vector = types.UniTuple(types.float64, dimension)
-    try:
-        formula.compile((vector, vector, types.UniTuple(types.float64, count)))
-    except NumbaError as cause:
-        raise NotCompilableError(str(cause)) from cause
-    return formula

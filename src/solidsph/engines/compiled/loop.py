@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, final
 import attrs
 import numpy as np
 from numba import njit, prange, types
-from numba.core.errors import NumbaError
 
 from solidsph.arrays import Array
 from solidsph.dynamics import Dynamics
@@ -23,7 +22,7 @@ from solidsph.engines.compiled.motions import (
     motion_data,
     motion_words,
 )
-from solidsph.engines.compiled.pointwise import NotCompilableError, registered
+from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function
 from solidsph.engines.compiled.shares import thread_count
 from solidsph.interfaces.condition import ExtensionCondition, StressCondition
 from solidsph.interfaces.declared import ScheduledForce, ScheduledMotion
@@ -39,6 +38,9 @@ _PER_PARTICLE = 10
 
 # Numbers in the tables of what varies in time, for the steps that go together.
 _TABLE = 1 << 18
+
+# Operations of about a nanosecond in these steps: an interruption waits for so long.
+_AT_ONCE = 3e8
 
 
 class _Moving(NamedTuple):
@@ -66,6 +68,9 @@ def compiled_loop(
     """
     if not isinstance(integrator, PointwiseIntegrator):
         raise NotCompilableError(f"integrator {type(integrator).__name__} is not pointwise")
+    labels = [c.label for c in (*dynamics.loads, *dynamics.motions)]
+    if any(labels.count(load.label) > 1 for load in dynamics.loads):
+        raise NotCompilableError("several conditions share the account of a load")
     particles = dynamics.particles
     d = particles.dimension
     threads = thread_count(_PER_PARTICLE * particles.count)  # of what is done particle by particle
@@ -76,8 +81,8 @@ def compiled_loop(
     steps = _steps(
         d,
         threads > 1,
-        _formula(integrator.leap, 4),
-        _formula(integrator.arrive, 3),
+        compiled_function(integrator.leap, *[types.float64] * 4),
+        compiled_function(integrator.arrive, *[types.float64] * 3),
         internal.forces,
         chain(tuple(one.apply for one in loads)),
         MotionWords(*(chain(functions) for functions in by_word)),
@@ -104,7 +109,8 @@ class CompiledLoop(TimeLoop):
         parts = [load.schedule(two) for load in self._scheduled_loads]
         parts += [motion.schedule(two, k) for motion in self._scheduled_motions for k in range(3)]
         width = sum(int(part[0].size) for part in parts if len(part) > 1)
-        return max(1, _TABLE // max(1, width))
+        work = _PER_PARTICLE * self.dynamics.particles.count + 2 * self.dynamics.internal.pair_count
+        return max(1, min(_TABLE // max(1, width), int(_AT_ONCE / work)))
 
     @property
     def _scheduled_loads(self) -> Sequence[ScheduledForce]:
@@ -243,17 +249,6 @@ def _handed_on(
 
 
 @cache
-def _formula(function: Any, arguments: int) -> Any:
-    """A pointwise formula of numbers, compiled."""
-    formula = njit(registered(function))
-    try:
-        formula.compile((types.float64,) * arguments)
-    except NumbaError as cause:
-        raise NotCompilableError(str(cause)) from cause
-    return formula
-
-
-@cache
 def _steps(
     dimension: int,
     threaded: bool,
@@ -282,16 +277,11 @@ def _steps(
     def kick(threads, dt, moving, inverse_masses):
         _, v, a, h, _, total = moving
         n = len(v)
-        sums = np.zeros(threads)
         for t in prange(threads):
-            added = 0.0
             for p in range(t * n // threads, (t + 1) * n // threads):
                 for i in range(dimension):
                     a[p, i] = total[p, i] * inverse_masses[p]
                     v[p, i] = arrive(h[p, i], a[p, i], dt)
-                    added += a[p, i]
-            sums[t] = added
-        return np.isfinite(sums.sum())
 
     @njit
     def steps(count, dt, threads, moving, masses, inverse_masses, bodies, load_parts, motion_parts):
@@ -302,9 +292,9 @@ def _steps(
             internal(bodies, u, total)
             loads(load_parts, step, u, v, path, total)
             hand_on(motion_parts, total)
-            finite = kick(threads, dt, moving, inverse_masses)
+            kick(threads, dt, moving, inverse_masses)
             react(motion_parts, step, masses, total, path, a, v)
-            if not finite:
+            if not np.isfinite(a.sum()):
                 return step + 1
         return count
 

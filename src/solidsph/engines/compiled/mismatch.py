@@ -106,7 +106,8 @@ def mismatch_sweep(dimension: int, threaded: bool) -> Any:
                 for k in range(d):
                     jets[a, i, 1 + k] = 0.5 * tensors[i, k, a]
 
-    @njit(parallel=threaded)
+    # A particle without volume makes what is undefined show as such, and no error.
+    @njit(parallel=threaded, error_model="numpy")
     def pull(starts, columns, weights, X, factors, jets, pulls, tensors):
         for a in prange(len(pulls)):
             # Force and products of each component; those of missing dimensions are not used.
