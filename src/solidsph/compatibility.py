@@ -55,7 +55,9 @@ def statics(scene: Scene) -> Iterator[str]:
         if isinstance(value, bool) or not isinstance(value, int) or value < 1:
             yield f"statics: {name} must be a whole number of at least 1, got {value!r}"
     if not isinstance(wanted.tolerance, (int, float)) or not 0.0 < wanted.tolerance < 1.0:
-        yield f"statics: tolerance must lie between 0 and 1, got {wanted.tolerance!r}; 1e-9 is usual"
+        yield (
+            f"statics: tolerance must lie between 0 and 1, got {wanted.tolerance!r}; 1e-9 is usual"
+        )
     default = attrs.fields(Scene).time_step_factor.default
     for name, given in (
         ("an integrator", scene.integrator is not None),

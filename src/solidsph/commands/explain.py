@@ -185,11 +185,7 @@ def _seconds_per_step(simulation: Simulation) -> float:
 def _loop(simulation: Simulation) -> tuple[str, str, str]:
     if isinstance(simulation.time_loop(), StepByStep):
         return ("time loop", "step by step", "each step by the parts themselves, which fits all")
-    return (
-        "time loop",
-        "compiled",
-        "whole steps between outputs: every part is of a declared kind",
-    )
+    return ("time loop", "compiled", "whole steps together: all parts are of declared kinds")
 
 
 def _seconds_per_iteration(simulation: Simulation, own: Freedoms) -> float:
