@@ -50,7 +50,7 @@ class ElasticSpin(Case):
     kernel: str = "cubic-spline"
     cover: float = number(default=2.2)  # [spacings]
     gradient: str = "quadratic"
-    hourglass: float = number(default=0.1)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
     engine: str = "auto"
     integrator: str = "central-difference"
     time_step_factor: float = number(default=0.4)  # of the CFL step

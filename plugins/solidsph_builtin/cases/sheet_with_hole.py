@@ -49,8 +49,8 @@ class SheetWithHole(Case):
     into itself towards the edges.
 
     Rubber is nearly incompressible, and its pressure sees neighbours that move against each other:
-    with the quadratic gradient the stress above the hole zigzags from particle to particle, with
-    the consistent one and a little hourglass control it does not.
+    with the quadratic gradient the stress above the hole zigzags from particle to particle. With
+    the consistent one and hourglass control a few per cent of that are left, away from the hole.
     """
 
     title: ClassVar[str] = "A sheet with a hole, pulled"
