@@ -182,16 +182,11 @@ def test_a_run_by_the_loop_ends_where_a_run_by_steps_does() -> None:
 def test_conditions_that_share_an_account_are_carried_out_step_by_step() -> None:
     """Nobody could tell whose force the account holds at the start of a stretch."""
 
-    simulation = box(2, 7).effect(Spring()).engine("compiled").build()
+    simulation = box(2, 7).effect(Custom(Formula)).engine("compiled").build()
     (load,) = simulation.dynamics.loads
     twice = attrs.evolve(simulation.dynamics, loads=[load, load])
     loop = twice.internal.time_loop(twice, simulation.integrator, simulation.step_size)
     assert isinstance(loop, StepByStep)
-
-
-def test_formulas_divide_as_arrays_do() -> None:
-    """What is undefined for a moment is no error: here 1/(1 + 1/0) is 0."""
-    assert_agree(box(2, 7).effect(Rational()))
 
 
 def test_single_precision_in_the_loop() -> None:
@@ -224,11 +219,13 @@ def test_it_stops_at_the_step_that_goes_wrong() -> None:
 
 
 @attrs.frozen
-class Spring(Effect):
-    """An effect of a third party: a formula, and nothing about any compiler."""
+class Custom(Effect):
+    """An effect of a third party: a condition on all particles, and nothing about any compiler."""
+
+    condition: type[ForceCondition]
 
     def bind(self, setting, label: str) -> ForceCondition:
-        return _Springs(label, setting.select("all"), np.ones((setting.particles.count, 1)))
+        return self.condition(label, setting.select("all"))
 
     def arrays(self, setting) -> Mapping[str, int]:
         return {}
@@ -241,56 +238,28 @@ class Spring(Effect):
 
 
 @attrs.frozen(eq=False)
-class _Springs(PointwiseForce):
+class Formula(PointwiseForce):
+    """Springs, and a drag that is computed by way of infinity: 1/(1 + 1/0) is 0."""
+
     label: str
     particles: Indices
-    values: Array
+
+    @property
+    def values(self) -> Array:
+        return np.tile([1.0, 0.0], (len(self.particles), 1))
 
     @staticmethod
     def force(position: Vector, velocity: Vector, values: Vector) -> Vector:
-        return (-values[0] * np.sin(position[0]), 0.0)
+        return (1.0 / (1.0 + 1.0 / values[1]) - values[0] * np.sin(position[0]), -velocity[1])
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         return {}
 
 
-@attrs.frozen
-class Rational(Spring.__base__):
-    """A force that is computed by way of infinity."""
-
-    def bind(self, setting, label: str) -> ForceCondition:
-        return _Rational(label, setting.select("all"), np.zeros((setting.particles.count, 1)))
-
-    def arrays(self, setting) -> Mapping[str, int]:
-        return {}
-
-    def damping_rate(self) -> float:
-        return 0.0
-
-    def stiffness_rate(self, bodies) -> float:
-        return 0.0
-
-
 @attrs.frozen(eq=False)
-class _Rational(PointwiseForce):
-    label: str
-    particles: Indices
-    values: Array
+class Opaque(ForceCondition):
+    """A force that is any code."""
 
-    @staticmethod
-    def force(position: Vector, velocity: Vector, values: Vector) -> Vector:
-        return (-velocity[0] + 1.0 / (1.0 + 1.0 / values[0]), -velocity[1])
-
-    def report(self, observation: Observation) -> Mapping[str, float]:
-        return {}
-
-
-def test_an_effect_of_one_s_own_goes_into_the_loop() -> None:
-    assert_agree(box(2, 7).effect(Spring()))
-
-
-@attrs.frozen(eq=False)
-class _Opaque(ForceCondition):
     label: str
     particles: Indices
 
@@ -301,24 +270,12 @@ class _Opaque(ForceCondition):
         return {}
 
 
-@attrs.frozen
-class Opaque(Spring.__base__):
-    """An effect that is any code."""
-
-    def bind(self, setting, label: str) -> ForceCondition:
-        return _Opaque(label, setting.select("all"))
-
-    def arrays(self, setting) -> Mapping[str, int]:
-        return {}
-
-    def damping_rate(self) -> float:
-        return 0.0
-
-    def stiffness_rate(self, bodies) -> float:
-        return 0.0
+def test_a_formula_of_one_s_own_goes_into_the_loop() -> None:
+    """And divides as arrays do."""
+    assert_agree(box(2, 7).effect(Custom(Formula)))
 
 
 def test_what_declares_nothing_is_carried_out_step_by_step() -> None:
-    simulation = box(1, 24).effect(Opaque()).engine("compiled").build()
+    simulation = box(1, 24).effect(Custom(Opaque)).engine("compiled").build()
     assert isinstance(simulation.time_loop(), StepByStep)
     simulation.run()
