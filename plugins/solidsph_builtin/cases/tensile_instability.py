@@ -52,6 +52,7 @@ class TensileInstability(Case):
 
     title: ClassVar[str] = "A bar in tension, perturbed: total against updated Lagrangian"
     source: ClassVar[str] = "Ismail & Reddy, section 5.2, Figs. 12 to 14"
+    figures: ClassVar[tuple[str, ...]] = ("fig-12", "fig-13", "fig-14")
 
     stretch: float = number(default=1.2)  # of the finite perturbation [-]
     perturbation: float = number(default=0.05)  # of the displacement [-]

@@ -116,6 +116,7 @@ def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bo
                     for r in result.runs
                 ],
                 "pictures": [str(path) for path in result.pictures],
+                "tables": [str(path) for path in result.tables],
             }
         )
     else:
@@ -138,6 +139,8 @@ def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bo
             say(f"reference: {source}")
         for path in result.pictures:
             say(f"picture: {path}")
+        for path in result.tables:
+            say(f"data: {path}")
         say(f"records: {folder}/*.h5 (ParaView opens them; so does: solidsph plot FILE)")
         say("verdict: " + ("as the source predicts" if result.passed else "NOT as predicted"))
     if not result.passed:
@@ -154,4 +157,5 @@ def _row(measurement: Measurement) -> dict[str, Any]:
         "error": measurement.error,
         "verdict": measurement.verdict,
         "as expected": measurement.passed,
+        "paper": measurement.paper,
     }

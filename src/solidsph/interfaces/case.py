@@ -5,12 +5,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 
 import attrs
 
+from solidsph.arrays import Array
 from solidsph.results.record import Record
 from solidsph.scene import Scene
+
+Curves: TypeAlias = Mapping[str, Array]
+"""Columns (k,) of a table by their headings, "quantity [unit]"; all of one length."""
 
 
 @attrs.frozen
@@ -25,6 +29,7 @@ class Measurement:
     error: float | None = None  # as the case measures it, relative unless it says otherwise
     verdict: str = ""  # what it means, in a word or two
     passed: bool = True  # whether the outcome is the one that the source predicts
+    paper: str = ""  # what the paper says of it, where it says something
 
 
 class Case(ABC):
@@ -37,6 +42,10 @@ class Case(ABC):
     title: ClassVar[str]
     source: ClassVar[str]
 
+    figures: ClassVar[tuple[str, ...]] = ()
+    """Figures of the paper that it reproduces, such as "fig-11". The name of a picture begins with
+    that of its figure; one that shows several begins with all their numbers, "fig-13-14"."""
+
     @abstractmethod
     def scenes(self) -> Mapping[str, Scene]:
         """The scenes to run, by name."""
@@ -48,3 +57,7 @@ class Case(ABC):
     @abstractmethod
     def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
         """Write the case's pictures into `folder`; returns their paths."""
+
+    def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
+        """The data of its pictures, to be written as tables, by name."""
+        return {}

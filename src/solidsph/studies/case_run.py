@@ -9,11 +9,12 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import attrs
+import numpy as np
 
 from solidsph.builder import Builder
 from solidsph.carry_out import carry_out
 from solidsph.errors import ConvergenceError, DivergedError
-from solidsph.interfaces.case import Case, Measurement
+from solidsph.interfaces.case import Case, Curves, Measurement
 from solidsph.results.record import Record
 from solidsph.simulation import Simulation
 
@@ -38,6 +39,7 @@ class CaseResult:
     measurements: Sequence[Measurement]
     runs: Sequence[SceneRun]
     pictures: Sequence[Path]
+    tables: Sequence[Path]  # of the curves in the pictures
     peak_memory: int  # of this process so far [bytes]
 
     @property
@@ -91,7 +93,18 @@ def run_case(
         }
         measurements = case.measure(records)
         pictures = case.draw(records, folder)
-    return CaseResult(measurements, runs, pictures, peak_memory())
+        tables = [
+            _written(folder / f"{name}.csv", curves)
+            for name, curves in case.curves(records).items()
+        ]
+    return CaseResult(measurements, runs, pictures, tables, peak_memory())
+
+
+def _written(path: Path, curves: Curves) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    values = np.column_stack(list(curves.values()))
+    np.savetxt(path, values, "%.9g", delimiter=",", header=",".join(curves), comments="")
+    return path
 
 
 def _told(cause: DivergedError | ConvergenceError) -> str:

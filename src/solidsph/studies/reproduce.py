@@ -1,0 +1,108 @@
+"""Reproducing a paper: every case that shows one of its figures, and all pictures on one sheet."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable, Mapping, Sequence
+from math import ceil
+from pathlib import Path
+
+import attrs
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+
+from solidsph import registry
+from solidsph.errors import SceneError
+from solidsph.interfaces.case import Case
+from solidsph.simulation import Simulation
+from solidsph.studies.case_run import CaseResult, run_case
+
+_COLUMNS = 3  # of the contact sheet
+
+Begin = Callable[[str, Simulation], Sequence[object]]
+
+
+@attrs.frozen
+class Reproduction:
+    """What the cases made of the figures that were asked for."""
+
+    results: Mapping[str, CaseResult]  # by case
+    pictures: Sequence[Path]  # those of these figures, in their order
+    sheet: Path | None  # all of them at once; None if there is no picture
+
+    @property
+    def passed(self) -> bool:
+        """Whether every measurement came out as its source predicts."""
+        return all(result.passed for result in self.results.values())
+
+
+def figures() -> Mapping[str, str]:
+    """The case that reproduces each figure of the paper, in the order of the figures.
+
+    Raises:
+        SceneError: two cases claim one figure.
+    """
+    found: dict[str, str] = {}
+    for name in registry.names("cases"):
+        for figure in registry.load("cases", name).figures:
+            if figure in found:
+                raise SceneError(
+                    f"cases {found[figure]!r} and {name!r} both reproduce {figure!r}; uninstall one"
+                )
+            found[figure] = name
+    return dict(sorted(found.items(), key=lambda pair: _number(pair[0])))
+
+
+def reproduce(wanted: Sequence[str], folder: Path, begin: Begin) -> Reproduction:
+    """Run every case that shows one of the `wanted` figures, or any figure if there are none.
+
+    Args:
+        wanted: names of figures, such as "fig-11".
+        folder: where each case gets a folder of its own.
+        begin: as in `run_case`.
+
+    Raises:
+        SceneError: no case reproduces such a figure.
+    """
+    known = figures()
+    for figure in wanted:
+        if figure not in known:
+            near = difflib.get_close_matches(figure, known, 1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(known)}"
+            raise SceneError(f"no case reproduces {figure!r}; {hint}")
+    chosen = wanted or list(known)
+    results = {}
+    for name in dict.fromkeys(known[figure] for figure in chosen):
+        case: Case = registry.load("cases", name)()
+        results[name] = run_case(case, folder / name, begin=begin)
+    every = [path for result in results.values() for path in result.pictures]
+    shown = {path: numbers for path in every if (numbers := _numbers(path, chosen))}
+    pictures = sorted(shown, key=lambda path: (min(shown[path]), path.name))
+    return Reproduction(results, pictures, _contact_sheet(pictures, folder) if pictures else None)
+
+
+def _number(figure: str) -> int:
+    return int(re.sub(r"\D", "", figure) or 0)
+
+
+def _numbers(path: Path, chosen: Sequence[str]) -> set[int]:
+    """Numbers of the chosen figures that a picture shows: "fig-13-14-..." shows two."""
+    match = re.match(r"fig((?:-\d+)+)", path.name)
+    shown = {int(number) for number in match[1].split("-")[1:]} if match else set()
+    return shown & {_number(figure) for figure in chosen}
+
+
+def _contact_sheet(pictures: Sequence[Path], folder: Path) -> Path:
+    rows = ceil(len(pictures) / _COLUMNS)
+    columns = min(_COLUMNS, len(pictures))
+    sheet = Figure(figsize=(7.0 * columns, 5.0 * rows), layout="constrained")
+    axes = sheet.subplots(rows, columns, squeeze=False).ravel()
+    for axis in axes:
+        axis.set_axis_off()
+    for axis, path in zip(axes, pictures, strict=False):
+        axis.imshow(imread(path))
+        axis.set_title(path.stem, fontsize=12)
+    path = folder / "contact-sheet.png"
+    sheet.savefig(path, dpi=100)
+    return path
