@@ -35,7 +35,7 @@ def draw_edges(
     axes[0, 0].set_ylabel("$\\langle f \\rangle$ [1]")
     axes[1, 0].set_ylabel("$\\langle f' \\rangle$, plain gradient [1/ps]")
     axes[2, 0].set_ylabel("$\\langle f' \\rangle$, corrected gradient [1/ps]")
-    title = f"A falling edge ({kernel}); Ismail & Reddy, {' and '.join(figures)}"
+    title = f"Falling edges ({kernel}); Ismail & Reddy, {' and '.join(figures)}"
     finish(figure, axes[-1], "distance from the middle [ps]", title, path)
 
 

@@ -123,7 +123,7 @@ def _smoothing_errors_at_left_end(line: Line, f: Polynomial) -> Array:
     made = (
         (line.smoothing @ values)[first] - mass * f(0.0),
         (line.gradient @ values)[first] - unit * f.deriv()(0.0),
-        line.second(values)[first] - unit**2 * f.deriv(2)(0.0),
+        (line.gradient @ (line.gradient @ values))[first] - unit**2 * f.deriv(2)(0.0),
     )
     return np.array(made, dtype=np.float64)
 

@@ -37,15 +37,18 @@ def draw_cover(axis: Axes, x: Array, values: Array, cover: float, k: int, count:
 
 def draw_ends(lines: Mapping[float, Line], kernel: str, path: Path) -> None:
     """Fig. 3: without extra particles the approximation droops at both ends."""
-    figure = Figure(figsize=(13.0, 4.6), layout="constrained")
-    axes = figure.subplots(1, len(ORDERS))
-    _row(axes, lines)
+    figure = Figure(figsize=(13.0, 8.0), layout="constrained")
+    whole, near = figure.subplots(2, len(ORDERS))
+    _row(whole, lines)
     # The gradients leave the picture at the ends, where f itself counts as a step.
-    axes[1].set_ylim(-1.5, 1.5)
-    axes[2].set_ylim(-12.0, 12.0)
+    whole[1].set_ylim(-1.5, 1.5)
+    whole[2].set_ylim(-12.0, 12.0)
+    reach = 2.5 * max(line.kernel.support_radius for line in lines.values())
+    _row(near, lines, reach)
+    near[0].text(0.95, 0.95, "the left end", transform=near[0].transAxes, ha="right", va="top")
     some = next(iter(lines.values()))
     title = f"$(x - 1/2)^4$ without extra particles, spacing {some.spacing:g} m ({kernel})"
-    finish(figure, axes, "x [m]", f"{title}; {_SOURCE}, Fig. 3", path)
+    finish(figure, near, "x [m]", f"{title}; {_SOURCE}, Fig. 3", path)
 
 
 def draw_complete(rows: Sequence[Mapping[float, Line]], kernel: str, path: Path) -> None:
@@ -67,13 +70,14 @@ def draw_complete(rows: Sequence[Mapping[float, Line]], kernel: str, path: Path)
     finish(figure, axes[-1], "x [m]", f"{title}; {_SOURCE}, Figs. 4 and 5", path)
 
 
-def _row(axes: Sequence[Axes], lines: Mapping[float, Line]) -> None:
-    x = np.linspace(0.0, LENGTH, 400)
+def _row(axes: Sequence[Axes], lines: Mapping[float, Line], reach: float = LENGTH) -> None:
+    """f and its derivatives from 0 to `reach` [m]."""
+    x = np.linspace(0.0, min(reach, LENGTH), 400)
     for axis, (order, name) in zip(axes, ORDERS.items(), strict=True):
         axis.plot(x, F.deriv(order)(x), color="0.8", linewidth=5.0, label="exact")
         for k, (cover, line) in enumerate(lines.items()):
-            real = line.real
-            draw_cover(axis, line.X[real], approximated(line, order)[real], cover, k, len(lines))
+            shown = line.real & (reach >= line.X)
+            draw_cover(axis, line.X[shown], approximated(line, order)[shown], cover, k, len(lines))
         power = 4 - order
         axis.set_ylabel(f"$\\langle {name} \\rangle$ [m$^{power}$]")
         axis.grid(color="0.93")

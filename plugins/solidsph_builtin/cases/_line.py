@@ -32,11 +32,6 @@ class Line:
     smoothing: csr_array  # (n, n), <f> = W f
     gradient: csr_array  # (n, n), <df/dX> = X_1 f [1/m]
 
-    def second(self, f: Array) -> Array:
-        """The gradient of the gradient of f (n,), as the paper takes it."""
-        result: Array = self.gradient @ (self.gradient @ f)
-        return result
-
 
 def complete_line(kernel: str, cover: float, cells: int, *, gradient: str = "standard") -> Line:
     """Particles from 0 to 1, on both ends, with ghosts enough for a gradient of a gradient."""

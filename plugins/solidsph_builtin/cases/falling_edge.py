@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar, final
 
@@ -16,7 +16,7 @@ from solidsph.results.record import Record
 from solidsph.scene import Scene
 from solidsph.smoothing import SmoothingKernel
 from solidsph_builtin.cases._line import LENGTH, Line, check_covers, complete_line
-from solidsph_builtin.cases._moments import of_lattice
+from solidsph_builtin.cases._moments import Moments, of_lattice
 from solidsph_builtin.cases._scheme import check_count
 
 GRADIENTS = ("standard", "corrected")
@@ -110,34 +110,48 @@ class FallingEdge(Case):
     def _figure(
         self, figure: str, width: int, says: str, lines: Mapping[str, Mapping[float, Line]]
     ) -> Iterator[Measurement]:
-        over = f"edge over {width} spacing{'s' if width > 1 else ''}"
-        for gradient, by_cover in lines.items():
-            found, theory = {}, {}
-            for cover, line in by_cover.items():
-                found[cover] = slope_error(line, width, line.gradient @ edge(line, width))
-                sums = by_sums(line.kernel, line, width)
-                if gradient == "corrected":
-                    sums /= of_lattice(line.kernel, line.spacing).slope[1]
-                theory[cover] = slope_error(line, width, sums)
-            small, best = min(found), min(found, key=found.__getitem__)
-            label = {"standard": "plain", "corrected": "corrected"}[gradient]
-            for cover in dict.fromkeys((small, max(found))):
-                yield _measurement(
-                    f"{figure}, {over}: error of the {label} slope, cover {cover:g}",
-                    found[cover],
-                    theory[cover],
-                    says,
-                )
-            place = sorted(found.values()).index(found[small]) + 1
-            yield attrs.evolve(
-                _measurement(
-                    f"{figure}, {over}: smallest error of the {label} slope, cover {best:g}",
-                    found[best],
-                    min(theory.values()),
-                    says,
-                ),
-                verdict=f"cover {small:g} is number {place} of {len(found)}",
+        over = f"{figure}, edge over {width} spacing{'s' if width > 1 else ''}"
+        plain, corrected = (lines[gradient] for gradient in GRADIENTS)
+        yield from _slopes(f"{over}: error of the plain", plain, width, says, lambda moments: 1.0)
+        yield from _slopes(
+            f"{over}: error of the corrected",
+            corrected,
+            width,
+            says,
+            lambda moments: moments.slope[1],
+        )
+        for cover in dict.fromkeys((min(plain), max(plain))):
+            line = plain[cover]
+            one = line.smoothing @ np.ones(len(line.X))
+            yield _measurement(
+                f"{over}: steepness of <f> / <1> in its middle over the true one, cover {cover:g}",
+                _steepness(line.smoothing @ edge(line, width) / one, width),
+                _steepness(values_by_sums(line.kernel, line, width), width)
+                / of_lattice(line.kernel, line.spacing).value[0],
+                says,
             )
+
+
+def _slopes(
+    what: str,
+    lines: Mapping[float, Line],
+    width: int,
+    says: str,
+    divisor: Callable[[Moments], float],
+) -> Iterator[Measurement]:
+    """Errors of the slope at the smallest and the largest cover, and at the best if another."""
+    found, theory = {}, {}
+    for cover, line in lines.items():
+        sums = slopes_by_sums(line.kernel, line, width)
+        sums /= divisor(of_lattice(line.kernel, line.spacing))
+        found[cover] = slope_error(line, width, line.gradient @ edge(line, width))
+        theory[cover] = slope_error(line, width, sums)
+    ranked = sorted(found, key=found.__getitem__)
+    for cover in dict.fromkeys((min(found), max(found), ranked[0])):
+        yield attrs.evolve(
+            _measurement(f"{what} slope, cover {cover:g}", found[cover], theory[cover], says),
+            verdict=f"number {ranked.index(cover) + 1} of {len(ranked)} covers",
+        )
 
 
 def _measurement(quantity: str, value: float, reference: float, paper: str) -> Measurement:
@@ -153,6 +167,12 @@ def _measurement(quantity: str, value: float, reference: float, paper: str) -> M
         passed=error <= _ROUNDING,
         paper=paper,
     )
+
+
+def _steepness(values: Array, width: int) -> float:
+    """Of `values` (n,) between the two middle particles, over that of the edge [-]."""
+    right = len(values) // 2
+    return float((values[right - 1] - values[right]) * width)
 
 
 def edge(line: Line, width: int) -> Array:
@@ -180,15 +200,29 @@ def slope_error(line: Line, width: int, slope: Array) -> float:
     return float(np.linalg.norm(slope[line.real] - true) / np.linalg.norm(true))
 
 
-def by_sums(kernel: SmoothingKernel, line: Line, width: int) -> Array:
+def slopes_by_sums(kernel: SmoothingKernel, line: Line, width: int) -> Array:
     """The plain slope at every particle (n,), by neighbours at +-k spacings, k = 1, 2, ..."""
-    dx = line.spacing
-    x = line.X - 0.5 * LENGTH
-    slope = np.zeros(len(x))
+    slopes = np.zeros(len(line.X))
+    for r, left, right in _neighbours(kernel, line, width):
+        slopes -= line.spacing * float(kernel.slope(np.array([r]))[0]) * (right - left)
+    return slopes
+
+
+def values_by_sums(kernel: SmoothingKernel, line: Line, width: int) -> Array:
+    """<f> at every particle (n,), in the same way."""
+    values = line.spacing * float(kernel.value(np.zeros(1))[0]) * edge(line, width)
+    for r, left, right in _neighbours(kernel, line, width):
+        values += line.spacing * float(kernel.value(np.array([r]))[0]) * (right + left)
+    return values
+
+
+def _neighbours(
+    kernel: SmoothingKernel, line: Line, width: int
+) -> Iterator[tuple[float, Array, Array]]:
+    """Each distance within the support [m], and f there on the left and on the right, (n,)."""
+    x, dx = line.X - 0.5 * LENGTH, line.spacing
     for r in dx * np.arange(1.0, np.ceil(kernel.support_radius / dx)):
-        change = falling(x + r, width * dx) - falling(x - r, width * dx)
-        slope -= dx * float(kernel.slope(np.array([r]))[0]) * change
-    return slope
+        yield float(r), falling(x - r, width * dx), falling(x + r, width * dx)
 
 
 def _table(lines: Mapping[str, Mapping[float, Line]], width: int) -> Curves:

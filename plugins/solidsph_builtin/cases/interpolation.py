@@ -253,12 +253,10 @@ def _left_by_the_cut(line: Line) -> tuple[float, float]:
 def approximated(line: Line, order: int) -> Array:
     """<f>, <f'> or <<f'>'> at every particle (n,)."""
     f = F(line.X)
-    made: Array = {
-        0: lambda: line.smoothing @ f,
-        1: lambda: line.gradient @ f,
-        2: lambda: line.second(f),
-    }[order]()
-    return made
+    matrices = (line.smoothing,), (line.gradient,), (line.gradient, line.gradient)
+    for matrix in matrices[order]:
+        f = matrix @ f
+    return f
 
 
 def largest_error(line: Line, order: int, approximation: Polynomial | None = None) -> float:
@@ -272,12 +270,8 @@ def largest_error(line: Line, order: int, approximation: Polynomial | None = Non
 
 def in_theory(moments: Moments, order: int) -> Polynomial:
     """The same as a polynomial, where supports are complete."""
-    if order == 0:
-        return moments.smoothed(F)
-    made = F
-    for _ in range(order):
-        made = moments.differentiated(made)
-    return made
+    first = moments.differentiated(F)
+    return (moments.smoothed(F), first, moments.differentiated(first))[order]
 
 
 def _table(lines: Mapping[float, Line]) -> Curves:
