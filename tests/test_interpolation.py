@@ -290,7 +290,6 @@ def test_any_kernel_can_be_asked_for(name: str) -> None:
 @pytest.mark.validation
 @every_kernel
 def test_the_error_law_of_any_kernel(name: str) -> None:
-    assert Interpolation(kernel=name).measure({})
     assert [m.quantity for m in Interpolation(kernel=name).measure({}) if not m.passed] == []
 
 
@@ -331,7 +330,14 @@ def test_moments_of_the_slope_are_those_of_the_value_by_parts(name: str) -> None
     assert smoothed.coef[:4] == pytest.approx([1 + 3 * m_2, 2 + 12 * m_2, 3, 4], rel=1e-8)
 
 
-@pytest.mark.parametrize("case", [KernelProfiles(), FallingEdge(cells=41), Interpolation(fine=30)])
+@pytest.mark.parametrize(
+    "case",
+    [
+        KernelProfiles(),
+        FallingEdge(covers=(1.5, 2.5), cells=41),
+        Interpolation(covers=(1.5, 2.5), fine=30),
+    ],
+)
 def test_pictures_and_tables_are_there_by_the_names_of_their_figures(case, tmp_path: Path) -> None:
     pictures = case.draw({}, tmp_path)
     shown = {
@@ -344,8 +350,9 @@ def test_pictures_and_tables_are_there_by_the_names_of_their_figures(case, tmp_p
     for path in pictures:
         assert path.read_bytes().startswith(b"\x89PNG")
         assert path.stat().st_size > 20_000
-    assert {"-".join(name.split("-")[:2]) for name in case.curves({})} == set(case.figures)
-    for table in case.curves({}).values():
+    tables = case.curves({})
+    assert {"-".join(name.split("-")[:2]) for name in tables} == set(case.figures)
+    for table in tables.values():
         assert len({len(column) for column in table.values()}) == 1
         assert all(np.isfinite(column).all() for column in table.values())
 

@@ -15,6 +15,7 @@ from solidsph.interfaces.case import Case, Curves, Measurement
 from solidsph.results.record import Record
 from solidsph.scene import Scene
 from solidsph.smoothing import SmoothingKernel
+from solidsph_builtin.cases._compare import closed_form
 from solidsph_builtin.cases._line import LENGTH, Line, check_covers, complete_line
 from solidsph_builtin.cases._moments import Moments, of_lattice
 from solidsph_builtin.cases._scheme import check_count
@@ -31,8 +32,7 @@ _PAPER = (
     "1.5 spacings approximate the gradient very well, others are significantly different",
 )
 
-# Sums of some twenty terms on spacings of 1e-2: rounding is below 1e-12 of the largest.
-_ROUNDING = 1e-9
+_SUMS = "sums over an endless lattice"
 
 
 @final
@@ -123,12 +123,13 @@ class FallingEdge(Case):
         for cover in dict.fromkeys((min(plain), max(plain))):
             line = plain[cover]
             one = line.smoothing @ np.ones(len(line.X))
-            yield _measurement(
+            yield closed_form(
                 f"{over}: steepness of <f> / <1> in its middle over the true one, cover {cover:g}",
                 _steepness(line.smoothing @ edge(line, width) / one, width),
                 _steepness(values_by_sums(line.kernel, line, width), width)
                 / of_lattice(line.kernel, line.spacing).value[0],
-                says,
+                source=_SUMS,
+                paper=says,
             )
 
 
@@ -149,24 +150,15 @@ def _slopes(
     ranked = sorted(found, key=found.__getitem__)
     for cover in dict.fromkeys((min(found), max(found), ranked[0])):
         yield attrs.evolve(
-            _measurement(f"{what} slope, cover {cover:g}", found[cover], theory[cover], says),
+            closed_form(
+                f"{what} slope, cover {cover:g}",
+                found[cover],
+                theory[cover],
+                source=_SUMS,
+                paper=says,
+            ),
             verdict=f"number {ranked.index(cover) + 1} of {len(ranked)} covers",
         )
-
-
-def _measurement(quantity: str, value: float, reference: float, paper: str) -> Measurement:
-    error = abs(value - reference)
-    return Measurement(
-        quantity=quantity,
-        value=value,
-        unit="1",
-        reference=reference,
-        source="sums over an endless lattice",
-        error=error,
-        verdict="as the closed form" if error <= _ROUNDING else "NOT as the closed form",
-        passed=error <= _ROUNDING,
-        paper=paper,
-    )
 
 
 def _steepness(values: Array, width: int) -> float:

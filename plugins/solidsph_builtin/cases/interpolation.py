@@ -15,6 +15,7 @@ from solidsph.interfaces.case import Case, Curves, Measurement
 from solidsph.results.record import Record
 from solidsph.scene import Scene
 from solidsph_builtin.cases import _error_law as law
+from solidsph_builtin.cases._compare import ROUNDING, closed_form
 from solidsph_builtin.cases._line import (
     Line,
     bare_line,
@@ -33,9 +34,6 @@ ORDERS = {0: "f", 1: "f'", 2: "f''"}
 # At which the discrete gradient of f = x is known to three digits, with the modified mollifier
 # normalised by the particles' own sum.
 _COVERS_OF_SLOPES = (1.5, 2.0, 2.5, 3.5)
-
-# Sums of some twenty terms, differentiated twice on spacings of 1e-2: rounding is below 1e-11.
-_ROUNDING = 1e-9
 
 _LATTICE = "moments of the kernel on an endless lattice"
 
@@ -118,21 +116,21 @@ class Interpolation(Case):
         moments = of_lattice(line.kernel, line.spacing)
         f, one = F(line.X), np.ones(len(line.X))
         at = f"at the end without ghosts, cover {cover:g}"
-        yield matched(
+        yield closed_form(
             f"Fig. 3: <1> {at}",
             (line.smoothing @ one)[0],
             0.5 * moments.value[0],
             source="half of the sum over a lattice; 1/2 for many particles",
             paper=droops,
         )
-        yield matched(
+        yield closed_form(
             f"Fig. 3: <f> / f {at}",
             (line.smoothing @ f)[0] / f[0],
             moments.smoothed_at_left_end(F)(0.0) / F(0.0),
             source="one-sided " + _LATTICE,
             paper=droops,
         )
-        yield matched(
+        yield closed_form(
             f"Fig. 3: <f'> / f' {at}",
             (line.gradient @ f)[0] / F.deriv()(0.0),
             moments.differentiated_at_left_end(F)(0.0) / F.deriv()(0.0),
@@ -141,7 +139,7 @@ class Interpolation(Case):
         )
         whole = whole_line(self.kernel, cover, self.fine)
         half_more = 0.5 * whole.spacing * float(whole.kernel.value(np.zeros(1))[0])
-        yield matched(
+        yield closed_form(
             f"Fig. 3: <1> {at}, a whole cell for the last particle",
             (whole.smoothing @ one)[0],
             0.5 * moments.value[0] + half_more,
@@ -164,7 +162,7 @@ class Interpolation(Case):
                 for c, line in lines.items()
             }
             for cover in ends:
-                yield matched(
+                yield closed_form(
                     f"{figure}: largest error of {name}, cover {cover:g}",
                     found[cover],
                     theory[cover],
@@ -172,7 +170,7 @@ class Interpolation(Case):
                     paper=small if cover < 2.0 else other,
                 )
             best = min(found, key=found.__getitem__)
-            yield matched(
+            yield closed_form(
                 f"{figure}: largest error of {name}, at its smallest: cover {best:g}",
                 found[best],
                 min(theory.values()),
@@ -204,39 +202,14 @@ class Interpolation(Case):
                 ),
                 ("corrected", (corrected.gradient @ x)[middle], 1.0, 0.0),
             ):
-                yield matched(
+                yield closed_form(
                     f"gradient of f = x, {label}, cover {cover:g}",
                     value,
                     reference,
                     source="exact for linear fields" if label == "corrected" else _LATTICE,
                     paper="" if label == "corrected" else says,
-                    allowed=_ROUNDING + allowed,
+                    allowed=ROUNDING + allowed,
                 )
-
-
-def matched(
-    quantity: str,
-    value: float,
-    reference: float,
-    *,
-    source: str,
-    paper: str,
-    allowed: float = _ROUNDING,
-) -> Measurement:
-    """A number beside its closed form, which it must have but for rounding."""
-    value, reference = float(value), float(reference)
-    error = abs(value - reference) / max(abs(reference), _ROUNDING)
-    return Measurement(
-        quantity=quantity,
-        value=value,
-        unit="1",
-        reference=reference,
-        source=source,
-        error=error,
-        verdict="as the closed form" if error <= allowed else "NOT as the closed form",
-        passed=error <= allowed,
-        paper=paper,
-    )
 
 
 def _left_by_the_cut(line: Line) -> tuple[float, float]:
