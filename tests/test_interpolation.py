@@ -281,8 +281,9 @@ def test_which_cover_wins_at_a_jump() -> None:
 
 @every_kernel
 def test_any_kernel_can_be_asked_for(name: str) -> None:
-    assert all(m.passed for m in FallingEdge(kernel=name, covers=(1.5, 2.5)).measure({}))
-    case = Interpolation(kernel=name, covers=(1.5, 2.5))
+    edges = FallingEdge(kernel=name, covers=(2.5,), widths=(15, 5, 3, 1), cells=31)
+    assert all(m.passed for m in edges.measure({}))
+    case = Interpolation(kernel=name, covers=(2.5,), fine=20)
     rows = [*case._ends(), *case._slopes_of_x(), *case._errors(8, "Fig. 5", small="", other="")]
     assert [row.quantity for row in rows if not row.passed] == []
 
@@ -338,11 +339,17 @@ def test_moments_of_the_slope_are_those_of_the_value_by_parts(name: str) -> None
         Interpolation(covers=(1.5, 2.5), fine=30),
     ],
 )
-def test_pictures_and_tables_are_there_by_the_names_of_their_figures(case, tmp_path: Path) -> None:
+def test_pictures_and_tables_are_there_by_the_names_of_their_figures(
+    case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Short series of lines: it is not their numbers that are looked at.
+    monkeypatch.setattr(_error_law, "_CELLS", (30, 40))
+    monkeypatch.setattr(_error_law, "_SEEDS", 1)
     pictures = case.draw({}, tmp_path)
     shown = {
         f"fig-{number}"
         for path in pictures
+        if path.stem.startswith("fig-")
         for number in path.stem.split("-")[1:]
         if number.isdigit()
     }
@@ -351,10 +358,11 @@ def test_pictures_and_tables_are_there_by_the_names_of_their_figures(case, tmp_p
         assert path.read_bytes().startswith(b"\x89PNG")
         assert path.stat().st_size > 20_000
     tables = case.curves({})
-    assert {"-".join(name.split("-")[:2]) for name in tables} == set(case.figures)
+    assert {"-".join(name.split("-")[:2]) for name in tables} - {"eq-13"} == set(case.figures)
     for table in tables.values():
         assert len({len(column) for column in table.values()}) == 1
         assert all(np.isfinite(column).all() for column in table.values())
+        assert not any("," in name for name in table)  # which would split it in the file
 
 
 def test_a_case_without_scenes_runs(tmp_path: Path) -> None:

@@ -87,17 +87,21 @@ class Interpolation(Case):
 
     def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
         from solidsph_builtin.cases._interpolation_picture import draw_complete, draw_ends
+        from solidsph_builtin.cases._law_picture import draw_law
 
         paths = [folder / "fig-3-no-extra-particles.png", folder / "fig-4-5-fine-and-coarse.png"]
         draw_ends(self.bare(), self.kernel, paths[0])
         draw_complete([self.complete(n) for n in (self.fine, self.coarse)], self.kernel, paths[1])
-        return paths
+        draw_law(self.kernel, F, folder / "eq-13-error-law.png")
+        return [*paths, folder / "eq-13-error-law.png"]
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         return {
             "fig-3-no-extra-particles": _table(self.bare()),
             "fig-4-fine": _table(self.complete(self.fine)),
             "fig-5-coarse": _table(self.complete(self.coarse)),
+            "eq-13-smoothing": _smoothing_table(self.kernel),
+            "eq-13-discretisation": _discretisation_table(self.kernel),
         }
 
     def bare(self) -> Mapping[float, Line]:
@@ -258,3 +262,18 @@ def _table(lines: Mapping[float, Line]) -> Curves:
         for cover, line in lines.items():
             table[f"{name} cover {cover:g} {unit}"] = approximated(line, order)[line.real]
     return table
+
+
+def _smoothing_table(kernel: str) -> Curves:
+    h, errors = law.smoothing_data(kernel, F)
+    named = {f"error of {name} [m^{4 - order}]": errors[:, order] for order, name in ORDERS.items()}
+    return {"h [m]": h, **named}
+
+
+def _discretisation_table(kernel: str) -> Curves:
+    table = {}
+    for label, (ratio, error) in law.discretisation_data(kernel).items():
+        table[f"dx/h {label} [1]"] = ratio
+        table[f"error of <1> {label} [1]"] = error
+    # A comma ends a column of the file.
+    return {name.replace(",", ""): values for name, values in table.items()}
