@@ -378,6 +378,7 @@ def test_a_case_without_scenes_runs(tmp_path: Path) -> None:
         (lambda: Interpolation(covers=(0.9,)), "a cover must be more than 1"),
         (lambda: Interpolation(covers=()), "covers must be a list"),
         (lambda: Interpolation(fine=2), "fine must be a whole number of at least 4"),
+        (lambda: Interpolation(fine=5), "fine must be at least the largest cover"),
         (lambda: FallingEdge(cells=60), "cells must be odd"),
         (lambda: FallingEdge(widths=(31, 15, 4, 1)), "a width must be odd"),
         (lambda: FallingEdge(widths=(31, 15, 1)), "widths must be 4 whole numbers"),

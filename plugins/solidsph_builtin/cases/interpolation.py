@@ -11,6 +11,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from solidsph.arrays import Array
+from solidsph.errors import SceneError
 from solidsph.interfaces.case import Case, Curves, Measurement
 from solidsph.results.record import Record
 from solidsph.scene import Scene
@@ -61,6 +62,11 @@ class Interpolation(Case):
         check_covers("interpolation", self.covers)
         check_count("interpolation", "fine", self.fine, 4)
         check_count("interpolation", "coarse", self.coarse, 4)
+        if max(self.covers) > self.fine:
+            raise SceneError(
+                f"case 'interpolation': fine must be at least the largest cover, so that a support "
+                f"leaves one end only, got fine = {self.fine} and a cover of {max(self.covers):g}"
+            )
 
     def scenes(self) -> Mapping[str, Scene]:
         return {}
