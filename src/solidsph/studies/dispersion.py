@@ -60,8 +60,11 @@ def dispersion(dynamics: Dynamics, state: State, wave_numbers: int = 200) -> Dis
             f"a particle answers to the {reach} on either side, and the bar of {len(order)} ends "
             f"too near its middle; take at least {4 * reach + 3} particles"
         )
-    k = np.linspace(0.0, np.pi, wave_numbers + 1)[1:]
-    exponents = np.sqrt(np.exp(-1j * k[:, None] * shifts) @ column)
+    # At these wave numbers the phase repeats after `period` particles.
+    period = 2 * wave_numbers
+    folded = np.bincount(shifts % period, column, period)
+    exponents = np.sqrt(np.fft.fft(folded)[1 : wave_numbers + 1])
+    k = np.pi * np.arange(1, wave_numbers + 1) / wave_numbers
     return Dispersion(k, exponents.real, np.abs(exponents.imag))
 
 
