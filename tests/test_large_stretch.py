@@ -41,6 +41,7 @@ def history(outcome: CaseResult, name: str) -> History:
 
 
 @pytest.mark.parametrize("name", SCENES)
+@pytest.mark.validation
 def test_the_mean_stress_follows_the_curve(outcome: CaseResult, name: str) -> None:
     mean = measured(outcome, f"{name}: mean Cauchy stress")
     assert mean.error is not None
@@ -49,6 +50,7 @@ def test_the_mean_stress_follows_the_curve(outcome: CaseResult, name: str) -> No
 
 
 @pytest.mark.parametrize("name", SCENES)
+@pytest.mark.validation
 def test_at_the_end_the_mean_is_on_the_curve(outcome: CaseResult, name: str) -> None:
     """What the fast start leaves has spread by then: 1e-4 without any average over time."""
     one = history(outcome, name)
@@ -60,6 +62,7 @@ def test_at_the_end_the_mean_is_on_the_curve(outcome: CaseResult, name: str) -> 
     assert one.mean[-1] == pytest.approx(P / held, rel=1e-3)
 
 
+@pytest.mark.validation
 def test_what_starts_in_homogeneous_motion_stays_on_the_curve(outcome: CaseResult) -> None:
     exact = measured(outcome, f"{MOVING}: largest error")
     # The consistent gradient is solved to 1e-12; measured 2e-10 after 1800 steps.
@@ -67,6 +70,7 @@ def test_what_starts_in_homogeneous_motion_stays_on_the_curve(outcome: CaseResul
     assert exact.passed
 
 
+@pytest.mark.validation
 def test_the_first_wave_is_the_simple_wave_of_the_theory(outcome: CaseResult) -> None:
     wave = measured(outcome, "stretch behind the first wave")
     # Ringing of the jump, averaged over a few particles.
@@ -74,6 +78,7 @@ def test_the_first_wave_is_the_simple_wave_of_the_theory(outcome: CaseResult) ->
     assert wave.reference == pytest.approx(1.180, abs=1e-3)
 
 
+@pytest.mark.validation
 def test_no_particle_turns_over_and_every_run_ends(outcome: CaseResult) -> None:
     smallest = measured(outcome, "smallest J")
     # The strip that starts squeezed to 0.75 rings a little below that.
@@ -82,6 +87,7 @@ def test_no_particle_turns_over_and_every_run_ends(outcome: CaseResult) -> None:
     assert [run.outcome for run in outcome.runs] == 6 * ["finished"]
 
 
+@pytest.mark.validation
 def test_the_swing_about_the_curve_dies_away(outcome: CaseResult) -> None:
     one = history(outcome, BAR)
     swings = np.abs(one.stresses / np.maximum(one.curve(one.stretches), 1.0)[:, None] - 1.0)
@@ -91,6 +97,7 @@ def test_the_swing_about_the_curve_dies_away(outcome: CaseResult) -> None:
     assert measured(outcome, "bar: largest swing").value < early
 
 
+@pytest.mark.validation
 def test_picture_and_data(outcome: CaseResult) -> None:
     (picture,) = outcome.pictures
     assert picture.name == "fig-15-large-stretch.png"
@@ -108,6 +115,7 @@ def test_picture_and_data(outcome: CaseResult) -> None:
     assert f"fig-15-{PLAIN}.csv" in tables
 
 
+@pytest.mark.validation
 def test_nearly_incompressible_rubber_gives_way_and_the_case_says_so(rubber: CaseResult) -> None:
     bar = measured(rubber, "bar: stretch at which the material loses ellipticity")
     assert bar.value == pytest.approx(3.631, abs=5e-4)
@@ -120,6 +128,7 @@ def test_nearly_incompressible_rubber_gives_way_and_the_case_says_so(rubber: Cas
     assert measured(rubber, f"{MOVING}: largest error").passed  # as far as the law is elliptic
 
 
+@pytest.mark.validation
 def test_beyond_the_loss_the_homogeneous_motion_falls_apart(rubber: CaseResult) -> None:
     """Rounding grows only where the bar softens: the total form does not hide it, nor hasten it."""
     (run,) = [run for run in rubber.runs if run.name == MOVING]
@@ -192,6 +201,7 @@ def test_the_mean_over_a_passage_removes_what_swings_with_its_period() -> None:
     assert limited[-1] == pytest.approx(50.19, rel=1e-4)
 
 
+@pytest.mark.validation
 def test_stress_off_the_curve_fails(outcome: CaseResult) -> None:
     """Records of one material judged as those of another, stiffer by 3 %."""
     other = LargeStretch(youngs_modulus=1.03 * LargeStretch().youngs_modulus)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from matplotlib.colors import LogNorm
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
@@ -29,7 +29,14 @@ def draw_maps(
         if not one.connected.all():
             apart = np.where(one.connected, np.nan, 0.0)
             axis.pcolor(
-                one.stretches, one.covers, apart, hatch="////", alpha=0.0, shading="nearest"
+                one.stretches,
+                one.covers,
+                apart,
+                cmap=ListedColormap(["white"]),
+                hatch="////",
+                edgecolor="0.3",
+                linewidth=0.0,
+                shading="nearest",
             )
         axis.axvline(1.0, color="black", linewidth=0.8)
         axis.axhline(cover, color="black", linewidth=0.8, linestyle="--")
