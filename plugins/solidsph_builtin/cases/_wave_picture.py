@@ -22,8 +22,9 @@ def draw_histories(
     columns: Sequence[Panel], stations: Sequence[float], title: str, path: Path
 ) -> None:
     """Above the bar; below one row a station and one column a panel, all on one scale."""
-    figure = Figure(figsize=(13.0, 9.6), layout="constrained")
-    grid = figure.add_gridspec(len(stations) + 1, len(columns), height_ratios=(0.55, *[1.0] * 4))
+    figure = Figure(figsize=(max(7.5, 3.25 * len(columns)), 9.6), layout="constrained")
+    rows = len(stations)
+    grid = figure.add_gridspec(rows + 1, len(columns), height_ratios=(0.55, *[1.0] * rows))
     _draw_bar(figure.add_subplot(grid[0, :]), stations)
     first: Any = None
     for column, (heading, exact, record, viscous) in enumerate(columns):
@@ -52,12 +53,12 @@ def draw_histories(
                 )
             axes.set_xlim(0.0, 1e6 * max(panel[2].times[-1] for panel in columns))
             axes.axhline(0.0, color="0.85", linewidth=0.6, zorder=0)
-            axes.tick_params(labelbottom=row == len(stations) - 1, labelleft=column == 0)
+            axes.tick_params(labelbottom=row == rows - 1, labelleft=column == 0)
             if row == 0:
                 axes.set_title(heading, fontsize=9)
             if column == 0:
                 axes.set_ylabel(f"T11 at {station:g} m\n[kPa]", fontsize=9)
-            if row == len(stations) - 1:
+            if row == rows - 1:
                 axes.set_xlabel("time [us]")
             if row == 0 and column == 0:
                 handles = axes.get_legend_handles_labels()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import sqrt
+from math import ceil, sqrt
 from pathlib import Path
 from typing import ClassVar, final
 
@@ -33,7 +33,11 @@ from solidsph_builtin.cases._scheme import check_count
 
 STATIONS = (0.0, 0.05, 0.10, 0.15)  # of the histories [m]
 
+_OUTPUTS = 600
 _TRAVELLING = 0.05  # [m], a station that sees each passage of the pulse by itself
+
+# Scenes that go by no reading and pulse alone.
+_MOVED, _PAPER_SUMS = "uniaxial-strain-smooth-moved", "paper-speed-square-paper-sums"
 
 # Largest relative errors that pass.
 _ARRIVAL, _PEAK, _WALL, _PLATEAU = 0.01, 0.02, 0.03, 0.02
@@ -70,7 +74,8 @@ class WaveBar(Case):
     names E / rho the square of its speed, which is that of a bar free to contract. Both are run:
     the first as it stands, the second with nu = 0, for which the two speeds are one. The pulse is
     a traction, square and smooth; the paper imposes a strain, which is a motion of the left end,
-    and after which that end is held and not free: one scene shows it.
+    and after which that end is held and not free: one scene shows it. Another runs the paper's own
+    sums with ghosts, on which nothing is judged.
     """
 
     title: ClassVar[str] = "A small stress wave in a bar"
@@ -82,6 +87,7 @@ class WaveBar(Case):
     pulse: float = number(default=10e-6)  # its duration [s]
     transits: float = number(default=3.2)  # duration [wave transits of the bar]
     convergence: Sequence[int] = (61, 121, 241)  # particles, of the smooth pulse
+    paper_cover: float = number(default=3.5)  # of the paper's own sums [spacings]
     linear: float = number(default=0.5)  # strengths of the artificial viscosity [-]
     quadratic: float = number(default=1.0)
     kernel: str = "cubic-spline"
@@ -101,6 +107,13 @@ class WaveBar(Case):
                     "stresses are read; take one more than a multiple of three, such as 61"
                 )
         check_positive("wave-bar", "pulse", self.pulse, "seconds")
+        check_positive("wave-bar", "paper_cover", self.paper_cover, "particle spacings")
+        longest = 2.0 * (LENGTH - STATIONS[2]) / STRAIN.speed
+        if self.pulse > longest:
+            raise SceneError(
+                f"case 'wave-bar': a pulse of {self.pulse:.4g} s has not passed 0.10 m when it "
+                f"comes back from the wall; take at most {longest:.4g} s"
+            )
         if not -1e8 <= self.stress < 0.0:
             raise SceneError(
                 f"case 'wave-bar': stress must be compressive and at most 1e8 Pa, for which the "
@@ -132,7 +145,8 @@ class WaveBar(Case):
                 self._loaded(reading, self.pulses[1], self.particles), self.linear, self.quadratic
             )
             scenes[f"{reading.name}-square-viscous"] = viscous.scene()
-        scenes[f"{STRAIN.name}-smooth-moved"] = self._moved(self.pulses[0]).scene()
+        scenes[_MOVED] = self._moved(self.pulses[0]).scene()
+        scenes[_PAPER_SUMS] = self._paper_sums(self.pulses[1]).scene()
         for count in self.convergence:
             scenes[_convergence_name(count)] = self._loaded(STRAIN, self.pulses[0], count).scene()
         return scenes
@@ -147,7 +161,8 @@ class WaveBar(Case):
                 *self._square(reading, records[f"{reading.name}-square-viscous"], viscous=True),
             )
         ]
-        found += self._returned(records[f"{STRAIN.name}-smooth-moved"])
+        found += self._returned(records[_MOVED])
+        found += self._paper_noise(records[_PAPER_SUMS])
         return [*found, *self._order(records)]
 
     def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
@@ -167,13 +182,22 @@ class WaveBar(Case):
         ]
         histories = folder / "fig-10-11-wave-bar.png"
         draw_histories(panels, STATIONS, self.title, histories)
+        own = (
+            f"the paper's sums, cover {self.paper_cover:g} spacings\n"
+            f"square pulse of strain, {PAPER.label}",
+            self.exact(PAPER, square, HELD),
+            records[_PAPER_SUMS],
+            None,
+        )
+        noise = folder / "fig-11-wave-bar-paper-sums.png"
+        draw_histories([own], STATIONS, self.title, noise)
         if len(self.convergence) < 2:
-            return [histories]
+            return [histories, noise]
         converging = folder / "wave-bar-convergence.png"
         counts = list(self.convergence)
         errors = [self._error(records[_convergence_name(count)]) for count in counts]
         draw_convergence(counts, errors, converging)
-        return [histories, converging]
+        return [histories, noise, converging]
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         tables = {}
@@ -184,6 +208,9 @@ class WaveBar(Case):
                     name = f"{reading.name}-{pulse.name}{tail}"
                     if name in records:
                         tables[f"histories-{name}"] = _table(records[name], exact)
+        held = {_MOVED: (STRAIN, self.pulses[0]), _PAPER_SUMS: (PAPER, self.pulses[1])}
+        for name, (reading, pulse) in held.items():
+            tables[f"histories-{name}"] = _table(records[name], self.exact(reading, pulse, HELD))
         return tables
 
     def _loaded(self, reading: Reading, pulse: Pulse, particles: int) -> Builder:
@@ -193,13 +220,48 @@ class WaveBar(Case):
         )
 
     def _moved(self, pulse: Pulse) -> Builder:
-        """The pulse as a strain, the paper's way: v = -T / (rho c) at the left end."""
-        rate = -self.stress / (DENSITY * STRAIN.speed)
+        """The pulse as a strain, the paper's way."""
         return self._bar(STRAIN, pulse, self.particles).boundary(
-            "prescribed-motion",
-            where="left",
-            displacement={"x": f"{rate!r}*{pulse.integral_formula}"},
+            "prescribed-motion", where="left", displacement={"x": self._motion(STRAIN, pulse)}
         )
+
+    def _paper_sums(self, pulse: Pulse) -> Builder:
+        """The same with the paper's kernel and plain sums, completed by ghosts."""
+        return (
+            Builder()
+            .title(f"{self.title}: {pulse.name} pulse of strain, the paper's sums")
+            .body(
+                "bar",
+                shape={"type": "interval", "length": LENGTH},
+                spacing=LENGTH / (self.particles - 1),
+                discretisation={
+                    "type": "lattice",
+                    "on_boundary": True,
+                    "ghosts": ceil(self.paper_cover),
+                },
+            )
+            .kernel("modified-mollifier", cover=self.paper_cover)
+            .material(
+                "neo-hookean",
+                youngs_modulus=YOUNGS_MODULUS,
+                poissons_ratio=PAPER.poissons_ratio,
+                density=DENSITY,
+            )
+            .formulation("total-lagrangian", gradient="standard", divergence="plain")
+            .boundary("clamp", where="right")
+            .boundary(
+                "prescribed-motion", where="left", displacement={"x": self._motion(PAPER, pulse)}
+            )
+            .boundary("ghost-extension")
+            .integrator("central-difference", time_step_factor=0.5)
+            .duration(self.transits * LENGTH / PAPER.speed)
+            .outputs(_OUTPUTS)
+            .engine(self.engine)
+        )
+
+    def _motion(self, reading: Reading, pulse: Pulse) -> str:
+        """Displacement of the left end that sends the pulse: v = -T / (rho c)."""
+        return f"{-self.stress / (DENSITY * reading.speed)!r}*{pulse.integral_formula}"
 
     def _bar(self, reading: Reading, pulse: Pulse, particles: int) -> Builder:
         return (
@@ -212,7 +274,7 @@ class WaveBar(Case):
             .boundary("clamp", where="right")
             .integrator(self.integrator, time_step_factor=self.time_step_factor)
             .duration(self.transits * LENGTH / reading.speed)
-            .outputs(600)
+            .outputs(_OUTPUTS)
         )
 
     def _smooth(self, reading: Reading, record: Record) -> list[Measurement]:
@@ -261,7 +323,6 @@ class WaveBar(Case):
             arrival = attrs.evolve(
                 arrival, verdict="not judged: the front disperses", passed=_complete(record)
             )
-        overshoot = max(histories.overshoot(station) for station in STATIONS)
         return [
             histories.worst(f"{what}: plateau", "Pa", _PLATEAU, Histories.plateau, STATIONS[:3]),
             attrs.evolve(
@@ -272,15 +333,7 @@ class WaveBar(Case):
             ),
             arrival,
             attrs.evolve(
-                compared(
-                    record,
-                    f"{what}: largest overshoot of the plateau, over it",
-                    overshoot,
-                    "1",
-                    None,
-                    "",
-                    0.0,
-                ),
+                _overshoot(histories, what),
                 paper="" if viscous else "noise, unless some numerical damping is considered",
             ),
         ]
@@ -303,6 +356,30 @@ class WaveBar(Case):
                 back[1],
                 SOURCE,
                 _PEAK,
+            ),
+        ]
+
+    def _paper_noise(self, record: Record) -> list[Measurement]:
+        """What the paper's own sums make of the square pulse; nothing of it is judged."""
+        histories = Histories.of(record, self.exact(PAPER, self.pulses[1], HELD))
+        what = f"the paper's sums, cover {self.paper_cover:g}, square pulse of strain"
+        found = [
+            histories.worst(
+                f"{what}: arrival, at half the plateau",
+                "s",
+                _ARRIVAL,
+                Histories.arrival,
+                STATIONS[1:],
+            ),
+            histories.worst(f"{what}: plateau", "Pa", _PLATEAU, Histories.plateau, STATIONS[:3]),
+            histories.worst(
+                f"{what}: plateau at the wall", "Pa", _WALL, Histories.plateau, [LENGTH]
+            ),
+        ]
+        return [
+            *(attrs.evolve(m, verdict="not judged", passed=_complete(record)) for m in found),
+            attrs.evolve(
+                _overshoot(histories, what), paper="noise, common to all approximations (Fig. 11)"
             ),
         ]
 
@@ -352,6 +429,12 @@ class WaveBar(Case):
 # With an error h^2 k^3 of each wave number k, and sin^2 of Fourier coefficients k^-3: all below
 # h^(-2/3) are right, and what lies beyond has the norm k^(-5/2), so h^(5/3).
 _ORDER = 5.0 / 3.0
+
+
+def _overshoot(histories: Histories, what: str) -> Measurement:
+    largest = max(histories.overshoot(station) for station in STATIONS)
+    quantity = f"{what}: largest overshoot of the plateau, over it"
+    return compared(histories.record, quantity, largest, "1", None, "", 0.0)
 
 
 def _complete(record: Record) -> bool:
