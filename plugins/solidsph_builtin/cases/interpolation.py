@@ -51,7 +51,7 @@ class Interpolation(Case):
 
     title: ClassVar[str] = "Interpolation of a quartic and its derivatives"
     source: ClassVar[str] = "Ismail & Reddy, section 3, Figs. 3 to 5, eq. 13"
-    figures: ClassVar[tuple[str, ...]] = ("fig-3", "fig-4", "fig-5")
+    figures: ClassVar[tuple[str, ...]] = ("fig-3", "fig-4", "fig-5", "eq-13")
 
     kernel: str = "modified-mollifier"
     covers: Sequence[float] = (1.5, 2.5, 3.5, 4.5, 5.5)  # [spacings]

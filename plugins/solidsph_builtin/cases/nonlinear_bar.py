@@ -55,6 +55,7 @@ class NonlinearBar(Case):
 
     title: ClassVar[str] = "Waves of finite amplitude in a bar"
     source: ClassVar[str] = "Rankine-Hugoniot conditions and simple waves of Ismail & Reddy's law"
+    figures: ClassVar[tuple[str, ...]] = ("section-6-viscosity",)
 
     velocities: Sequence[float] = (0.1, 0.3, 0.5)  # of pushes and of pulls [confined wave speeds]
     particles: int = 201
@@ -134,7 +135,9 @@ class NonlinearBar(Case):
     def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
         from solidsph_builtin.cases._nonlinear_picture import draw_profiles, draw_speeds
 
-        profiles, speeds = folder / "nonlinear-bar.png", folder / "nonlinear-bar-speeds.png"
+        profiles, speeds = (
+            folder / f"section-6-viscosity-{name}.png" for name in ("profiles", "speeds")
+        )
         draw_profiles(self.waves, records, self.law, self.title, profiles)
         measured = {
             wave.velocity: half_speed(records[name], wave) for name, wave in self.waves.items()

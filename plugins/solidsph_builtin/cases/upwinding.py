@@ -49,6 +49,7 @@ class Upwinding(Case):
 
     title: ClassVar[str] = "Upwinding by a kernel that is not symmetric"
     source: ClassVar[str] = "Ismail & Reddy, section 6; the spectrum of the discrete bar"
+    figures: ClassVar[tuple[str, ...]] = ("section-6-upwinding",)
 
     skews: Sequence[float] = (0.0, 0.25, 0.5, 0.75)
     particles: int = 60
@@ -114,7 +115,7 @@ class Upwinding(Case):
     def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
         from solidsph_builtin.cases._upwinding_picture import draw_modes
 
-        path = folder / "upwinding.png"
+        path = folder / "section-6-upwinding.png"
         draw_modes(self.curves(records)["upwinding"], _ALTERNATING, self.title, path)
         return [path]
 

@@ -43,8 +43,9 @@ class Case(ABC):
     source: ClassVar[str]
 
     figures: ClassVar[tuple[str, ...]] = ()
-    """Figures of the paper that it reproduces, such as "fig-11". The name of a picture begins with
-    that of its figure; one that shows several begins with all their numbers, "fig-13-14"."""
+    """Figures of the paper that it reproduces, such as "fig-11", and passages that it answers, such
+    as "section-6-viscosity". The name of a picture begins with that of its figure or passage; one
+    that shows several figures begins with all their numbers, "fig-13-14"."""
 
     @abstractmethod
     def scenes(self) -> Mapping[str, Scene]:
