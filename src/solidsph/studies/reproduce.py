@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
 
@@ -15,12 +15,9 @@ from matplotlib.image import imread
 from solidsph import registry
 from solidsph.errors import SceneError
 from solidsph.interfaces.case import Case
-from solidsph.simulation import Simulation
-from solidsph.studies.case_run import CaseResult, run_case
+from solidsph.studies.case_run import Begin, CaseResult, run_case
 
 _COLUMNS = 3  # of the contact sheet
-
-Begin = Callable[[str, Simulation], Sequence[object]]
 
 
 @attrs.frozen
