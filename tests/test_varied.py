@@ -8,6 +8,7 @@ import attrs
 import pytest
 
 from solidsph import SceneError, registry
+from solidsph.builder import Builder
 from solidsph.interfaces.case import Case
 from solidsph.scene import Scene
 from solidsph.studies.point import measured, together
@@ -34,11 +35,13 @@ def test_other_words_change_the_scene_and_nothing_else() -> None:
 
 
 def test_strengths_of_effects_are_changed_or_added() -> None:
-    (added,) = scene(**{"hourglass-control__strength": 0.3}).effects
+    gravity, added = scene(**{"hourglass-control__strength": 0.3}).effects
+    assert gravity == Csm3().scenes()["csm3"].effects[0]
     assert added.part == {"type": "hourglass-control", "strength": 0.3}
     case = Csm3(hourglass=0.5)
-    (changed,) = varied(case, {"hourglass-control.strength": 0.2}).scenes()["csm3"].effects
-    assert changed.part == {"type": "hourglass-control", "strength": 0.2}
+    effects = varied(case, {"hourglass-control.strength": 0.2}).scenes()["csm3"].effects
+    assert {"type": "hourglass-control", "strength": 0.2} in [one.part for one in effects]
+    assert len(effects) == 2
 
 
 def test_an_unknown_word_names_the_nearest() -> None:
@@ -56,10 +59,7 @@ def test_a_point_counts_what_no_machine_changes() -> None:
     assert attrs.evolve(one, seconds=(), peak_memory=0) == attrs.evolve(
         two, seconds=(), peak_memory=0
     )
-    simulation = next(iter(varied(case, {"cover": 2.2}).scenes().values()))
-    from solidsph.builder import Builder
-
-    built = Builder(simulation).build()
+    built = Builder(varied(case, {"cover": 2.2}).scenes()["csm3"]).build()
     assert one.steps == built.steps
     assert one.pair_evaluations == built.steps * built.dynamics.internal.pair_count
     assert together([one, two]).seconds == (*one.seconds, *two.seconds)
@@ -67,7 +67,7 @@ def test_a_point_counts_what_no_machine_changes() -> None:
 
 def test_what_goes_wrong_is_a_point_too() -> None:
     case = Csm3(across=3, duration=0.05, engine="matrix")
-    diverged = measured(case, {"time_step_factor": 1.6})
+    diverged = measured(case, {"time_step": 1.8e-4})
     assert not diverged.finished
     assert "diverged" in diverged.outcome
     refused = measured(case, {"cover": -1.0})
@@ -75,12 +75,12 @@ def test_what_goes_wrong_is_a_point_too() -> None:
     assert "cover" in refused.outcome
 
 
-@pytest.mark.parametrize("name", registry.names("cases"))
+@pytest.mark.parametrize(
+    "name", [name for name in registry.names("cases") if attrs.fields(registry.load("cases", name))]
+)
 def test_every_case_has_a_sensible_sweep(name: str) -> None:
     case: Case = registry.load("cases", name)()
     priced = case.priced()
-    if not attrs.fields(type(case)):
-        pytest.skip("no parameters")
     assert priced.sweep
     refining, *_ = priced.sweep
     spacings = [varied(priced, {refining: value}).resolution for value in priced.sweep[refining]]

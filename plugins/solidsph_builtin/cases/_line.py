@@ -40,9 +40,10 @@ def complete_line(kernel: str, cover: float, cells: int, *, gradient: str = "sta
     return line(kernel, cover, LENGTH / cells, arrangement, gradient=gradient)
 
 
-def bare_line(kernel: str, cover: float, cells: int) -> Line:
+def bare_line(kernel: str, cover: float, cells: int, *, gradient: str = "standard") -> Line:
     """The same without extra particles; the first and the last have half a cell each."""
-    return line(kernel, cover, LENGTH / cells, {"type": "lattice", "on_boundary": True})
+    arrangement = {"type": "lattice", "on_boundary": True}
+    return line(kernel, cover, LENGTH / cells, arrangement, gradient=gradient)
 
 
 def whole_line(kernel: str, cover: float, cells: int) -> Line:

@@ -26,6 +26,7 @@ from solidsph_builtin.cases._line import (
 )
 from solidsph_builtin.cases._moments import Moments, of_lattice
 from solidsph_builtin.cases._scheme import check_count
+from solidsph_builtin.cases._slopes import SlopeOfQuartic
 
 # Ismail & Reddy, section 3, after Zhang & Batra (2004).
 F = Polynomial([-0.5, 1.0]) ** 4
@@ -67,6 +68,10 @@ class Interpolation(Case):
                 f"case 'interpolation': fine must be at least the largest cover, so that a support "
                 f"leaves one end only, got fine = {self.fine} and a cover of {max(self.covers):g}"
             )
+
+    def priced(self) -> Case:
+        """One slope by one cover."""
+        return SlopeOfQuartic(kernel=self.kernel)
 
     def scenes(self) -> Mapping[str, Scene]:
         return {}
