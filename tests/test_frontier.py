@@ -1,0 +1,172 @@
+"""The front of a sweep, its orders and its prices, on points of which all is known."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import inf, isclose, nan
+
+import attrs
+import pandas
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from solidsph.studies.frontier import Frontier, power
+from solidsph.studies.point import Point
+from solidsph.studies.richardson import extrapolated
+
+# error = a h^p, time = b h^-q, so that error ~ time^(-p / q)
+SCHEMES = {"first": (1.0, 1.0, 1e-5, 3.0), "second": (25.0, 2.0, 4e-5, 3.0)}
+SPACINGS = (0.1, 0.05, 0.025, 0.0125)
+
+
+def point(error: float, time: float, **settings: object) -> Point:
+    return Point(settings, error, spacing=0.1, seconds=(time,))
+
+
+def known(scheme: str, h: float, noise: float = 1.0) -> Point:
+    a, p, b, q = SCHEMES[scheme]
+    time = b * h**-q
+    return Point(
+        {"spacing": h, "scheme": scheme},
+        error=a * h**p,
+        spacing=h,
+        # The median of three is the law, whatever the others are.
+        seconds=(time, time * noise, time / noise),
+        pair_evaluations=int(1e6 * time),
+    )
+
+
+@pytest.fixture
+def frontier() -> Frontier:
+    points = [known(scheme, h, 1.3) for h in SPACINGS for scheme in SCHEMES]
+    return Frontier(
+        [*points, Point({"spacing": 0.2, "scheme": "first"}, inf, "diverged")], "spacing"
+    )
+
+
+def test_orders_are_those_of_the_laws(frontier: Frontier) -> None:
+    orders = {one.settings["scheme"]: one for one in frontier.orders()}
+    for scheme, (_, p, _, q) in SCHEMES.items():
+        assert isclose(orders[scheme].in_spacing, p, rel_tol=1e-12)
+        assert isclose(orders[scheme].in_time, p / q, rel_tol=1e-12)
+        assert not orders[scheme].crosses
+
+
+def test_the_front_is_that_of_the_laws(frontier: Frontier) -> None:
+    finished = [one for one in frontier.points if one.finished]
+    expected = [
+        one
+        for one in finished
+        if not any(
+            (other.time <= one.time and other.error < one.error)
+            or (other.time < one.time and other.error <= one.error)
+            for other in finished
+        )
+    ]
+    assert sorted(map(Point.label, frontier.front())) == sorted(map(Point.label, expected))
+    # The second-order scheme is worse at first, and better in the end.
+    schemes = [one.settings["scheme"] for one in frontier.front()]
+    assert schemes == ["first", "first", "first", "second", "first", "second"]
+    assert {one["on the front"] for one in frontier} == {True, False}
+    by_work = frontier.front(lambda one: one.pair_evaluations)
+    assert [one.label() for one in by_work] == [one.label() for one in frontier.front()]
+
+
+def test_the_price_of_a_digit_is_that_of_the_law() -> None:
+    only = Frontier([known("second", h) for h in SPACINGS], "spacing")
+    assert isclose(only.next_digit(), 10.0**1.5, rel_tol=1e-12)
+
+
+def test_what_an_accuracy_and_a_time_buy(frontier: Frontier) -> None:
+    cheapest = frontier.cheapest(0.02)
+    assert cheapest is not None
+    others = [one for one in frontier.points if one.error <= 0.02]
+    assert cheapest.time == min(one.time for one in others)
+    assert frontier.cheapest(1e-9) is None
+    best = frontier.best(10.0)
+    assert best is not None
+    assert best.error == min(one.error for one in frontier.points if one.time <= 10.0)
+    assert frontier.best(1e-9) is None
+    worse = attrs.evolve(cheapest, seconds=(2.0 * cheapest.time,))
+    assert frontier.excess(cheapest) == 1.0
+    assert isclose(frontier.excess(worse), 2.0)
+
+
+def test_the_sentence_says_what_to_do(frontier: Frontier) -> None:
+    said = frontier.sentence()
+    cheapest = frontier.cheapest(0.01)
+    assert cheapest is not None
+    assert f"1 % takes {cheapest.time:.2g} s with {cheapest.label()}" in said
+    assert "further digit" in said
+    assert "no configuration finished: diverged" in Frontier(frontier.points[-1:], "h").sentence()
+    assert "10 % was not reached" in Frontier([point(0.5, 1.0, h=1)], "h").sentence()
+
+
+def test_refinement_that_moves_away_is_told() -> None:
+    away = Frontier(
+        [
+            attrs.evolve(known("first", h), error=e)
+            for h, e in zip(SPACINGS, (3, 1, 2, 3), strict=True)
+        ],
+        "spacing",
+    )
+    assert away.orders()[0].crosses
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(1e-6, 1.0), st.floats(1e-3, 1e3)), min_size=1, max_size=30, unique=True
+    )
+)
+def test_no_point_beats_the_front(pairs: list[tuple[float, float]]) -> None:
+    frontier = Frontier([point(e, t, n=n) for n, (e, t) in enumerate(pairs)], "n")
+    front = frontier.front()
+    assert front
+    for one in frontier.points:
+        assert frontier.excess(one) >= 1.0
+        assert any(best.time <= one.time and best.error <= one.error for best in front)
+    assert all(a.time < b.time and a.error > b.error for a, b in pairwise(front))
+
+
+def test_pandas_takes_it(frontier: Frontier) -> None:
+    table = pandas.DataFrame(frontier)
+    assert len(table) == len(frontier)
+    assert table["time [s]"].min() == min(one.time for one in frontier.points)
+
+
+def test_a_power_needs_two_costs() -> None:
+    assert isclose(power([1.0, 2.0, 4.0], [1.0, 0.25, 0.0625]), -2.0)
+    assert power([1.0], [1.0]) is not None
+    assert power([1.0, 1.0], [1.0, 2.0]) != power([1.0, 1.0], [1.0, 2.0])  # not a number
+
+
+@given(
+    p=st.floats(0.7, 4.0),
+    limit=st.floats(-3.0, 3.0).filter(lambda x: abs(x) > 0.1),
+    ratios=st.tuples(st.floats(1.3, 2.5), st.floats(1.3, 2.5)),
+)
+def test_the_limit_and_order_of_a_power_law_are_found(
+    p: float, limit: float, ratios: tuple[float, float]
+) -> None:
+    h = [ratios[0] * ratios[1], ratios[1], 1.0]
+    values = [limit + 0.01 * one**p for one in h]
+    found = extrapolated(h, values)
+    assert found.trusted
+    # Differences of 1e-2 of values of 1: some 1e-14 of rounding, amplified by a log of 1.3.
+    assert isclose(found.order, p, rel_tol=1e-8)
+    assert isclose(found.limit, limit, rel_tol=1e-8)
+    assert isclose(found.index, 1.25 * 0.01 / abs(values[-1]), rel_tol=1e-6)
+
+
+def test_what_may_not_be_extrapolated_says_so() -> None:
+    h = [4.0, 2.0, 1.0]
+    assert "swing" in extrapolated(h, [1.0, 1.2, 1.1]).warning
+    assert "asymptotic range" in extrapolated(h, [1.0, 1.1, 1.3]).warning
+    assert "asymptotic range" in extrapolated([8.0, *h], [0.0, 0.6, 0.95, 0.99]).warning
+    assert "nothing can be observed" in extrapolated(h, [1.0, 1.0, 1.0]).warning
+    assert extrapolated(h, [1.16, 1.04, 1.01]).trusted
+    with pytest.raises(ValueError, match="three results"):
+        extrapolated(h[:2], [1.0, 2.0])
+    with pytest.raises(ValueError, match="fall from coarse to fine"):
+        extrapolated([1.0, 2.0, 4.0], [1.0, 2.0, nan])
