@@ -1,0 +1,306 @@
+"""The cheapest configuration for an accuracy, and the nearest for a time, by few runs."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import pairwise, product
+from math import inf, isfinite, log
+from statistics import median
+from typing import Any, final
+
+import attrs
+
+from solidsph.errors import SceneError
+from solidsph.interfaces.case import Case
+from solidsph.studies.point import Point
+from solidsph.studies.varied import varied
+
+Settings = Mapping[str, Any]
+Axes = Mapping[str, Sequence[Any]]
+
+# Before two levels of a scheme are known: errors of second order, and times of an explicit run in
+# two dimensions. What is known replaces them.
+_ORDER, _GROWTH = 2.0, 3.0
+_ORDERS, _GROWTHS = (0.5, 4.0), (0.5, 5.0)
+
+# A candidate must promise to be so much cheaper than what is found to be worth a run.
+_GAIN = 1.25
+
+# How often the refining axis may be prolonged beyond the values that were given.
+_PROLONGED = 6
+
+
+class Goal(ABC):
+    """What is looked for."""
+
+    @abstractmethod
+    def met(self, point: Point) -> bool:
+        """Whether a point is good enough."""
+
+    @abstractmethod
+    def loss(self, error: float, time: float) -> float:
+        """What is to be small among those that are."""
+
+    @abstractmethod
+    def promising(self, error: float, time: float) -> bool:
+        """Whether a point of that predicted error and time would be good enough."""
+
+    @abstractmethod
+    def exhausted(self, error: float, time: float) -> bool:
+        """Whether nothing finer than a point of that error and time can be."""
+
+
+@final
+@attrs.frozen
+class Accuracy(Goal):
+    """At most an error; then the less time the better."""
+
+    error: float  # relative [-]
+
+    def met(self, point: Point) -> bool:
+        return point.finished and point.error <= self.error
+
+    def loss(self, error: float, time: float) -> float:
+        return time
+
+    def promising(self, error: float, time: float) -> bool:
+        return error <= self.error
+
+    def exhausted(self, error: float, time: float) -> bool:
+        return error <= self.error
+
+
+@final
+@attrs.frozen
+class Within(Goal):
+    """At most a wall time; then the smaller the error the better."""
+
+    time: float  # [s]
+
+    def met(self, point: Point) -> bool:
+        return point.finished and point.time <= self.time
+
+    def loss(self, error: float, time: float) -> float:
+        return error
+
+    def promising(self, error: float, time: float) -> bool:
+        return time <= self.time
+
+    def exhausted(self, error: float, time: float) -> bool:
+        return time > self.time
+
+
+@attrs.frozen
+class Found:
+    """What a search came to."""
+
+    point: Point | None  # the best that meets the goal; None if none does
+    tried: Sequence[Point]
+    sure: str  # how sure it is, in words
+
+    @property
+    def spent(self) -> float:
+        """Wall time of all runs [s]."""
+        return sum(sum(one.seconds) for one in self.tried if isfinite(one.time))
+
+
+def search(case: Case, axes: Axes, goal: Goal, run: Callable[[Settings], Point]) -> Found:
+    """Look for `goal` among the values of `axes`, and beyond the finest if need be.
+
+    Every scheme, that is a choice of all but the refining axis, runs at its coarsest. From there
+    powers of the spacing predict errors and times of the rest; the most promising is run, and what
+    it shows replaces the prediction, until nothing promises to be worth a run.
+
+    Args:
+        case: already `priced`.
+        axes: values by setting; the first refines, from coarse to fine.
+        run: what measures a configuration.
+    """
+    book = _Book(case, *_split(axes))
+    while True:
+        wanted = book.next(goal)
+        if wanted is None:
+            break
+        book.note(wanted, run(book.settings(wanted)))
+    best = book.best(goal)
+    return Found(best, list(book.points.values()), book.sure(goal, best))
+
+
+@attrs.define(eq=False)
+class _Book:
+    """What is known of every scheme at every level."""
+
+    case: Case
+    refining: str
+    levels: list[Any]
+    schemes: Sequence[Settings]
+    points: dict[tuple[int, int], Point] = attrs.field(factory=dict)  # by scheme and level
+    _spacings: dict[Any, float] = attrs.field(factory=dict)
+    _given: int = 0
+
+    def __attrs_post_init__(self) -> None:
+        self._given = len(self.levels)
+
+    def settings(self, place: tuple[int, int]) -> Settings:
+        scheme, level = place
+        return {self.refining: self.levels[level], **self.schemes[scheme]}
+
+    def note(self, place: tuple[int, int], point: Point) -> None:
+        self.points[place] = point
+
+    def best(self, goal: Goal) -> Point | None:
+        met = [point for point in self.points.values() if goal.met(point)]
+        return min(met, key=lambda point: goal.loss(point.error, point.time), default=None)
+
+    def next(self, goal: Goal) -> tuple[int, int] | None:
+        """The place to run next, None if there is nothing left to gain."""
+        for scheme in range(len(self.schemes)):
+            if (scheme, 0) not in self.points:
+                return scheme, 0
+        best = self.best(goal)
+        bound = goal.loss(best.error, best.time) / _GAIN if best else inf
+        offers = sorted(self._offers(goal))
+        if offers and offers[0][0] < bound:
+            return offers[0][1]
+        return None
+
+    def _offers(self, goal: Goal) -> Iterator[tuple[float, tuple[int, int]]]:
+        """Of each scheme the place that promises most, with its predicted loss."""
+        for scheme in range(len(self.schemes)):
+            offers = []
+            level = 0
+            while self._has(level):
+                error, time = self.predicted(scheme, level)
+                if (scheme, level) not in self.points and goal.promising(error, time):
+                    offers.append((goal.loss(error, time), (scheme, level)))
+                if goal.exhausted(error, time) and (scheme, level) not in self.points:
+                    break
+                level += 1
+            if offers:
+                yield min(offers)
+
+    def _has(self, level: int) -> bool:
+        """Whether there is such a level, prolonging the axis if it can be."""
+        if level >= len(self.levels) and len(self.levels) < self._given + _PROLONGED:
+            longer = _prolonged(self.case, self.refining, self.levels)
+            if longer is not None:
+                self.levels.append(longer)
+        return level < len(self.levels)
+
+    def spacing(self, level: int) -> float:
+        value = self.levels[level]
+        if value not in self._spacings:
+            self._spacings[value] = varied(self.case, {self.refining: value}).resolution
+        return self._spacings[value]
+
+    def predicted(self, scheme: int, level: int) -> tuple[float, float]:
+        """Error and time of a scheme at a level: measured, or by the powers of what is."""
+        if (scheme, level) in self.points:
+            point = self.points[scheme, level]
+            return point.error, point.time
+        known = {
+            place: point
+            for (one, place), point in self.points.items()
+            if one == scheme and point.finished
+        }
+        if not known:
+            return inf, inf
+        nearest = min(known, key=lambda place: abs(place - level))
+        ratio = log(self.spacing(level) / self.spacing(nearest))
+        base = known[nearest]
+        order = self._power(known, lambda point: point.error, _ORDER, _ORDERS)
+        growth = -self._power(known, lambda point: point.time, -self._growth(), _GROWTHS, -1.0)
+        return _scaled(base.error, order * ratio), _scaled(base.time, -growth * ratio)
+
+    def _growth(self) -> float:
+        """How times grow with refinement, by all schemes of which two levels are known."""
+        found = []
+        for scheme in range(len(self.schemes)):
+            known = {
+                place: point
+                for (one, place), point in self.points.items()
+                if one == scheme and point.finished
+            }
+            if len(known) > 1:
+                found.append(-self._power(known, lambda point: point.time, 0.0, _GROWTHS, -1.0))
+        return median(found) if found else _GROWTH
+
+    def _power(
+        self,
+        known: Mapping[int, Point],
+        value: Callable[[Point], float],
+        otherwise: float,
+        limits: tuple[float, float],
+        sign: float = 1.0,
+    ) -> float:
+        """Exponent of the spacing between the two finest known levels, within limits."""
+        if len(known) < 2:
+            return otherwise
+        coarse, fine = sorted(known)[-2:]
+        if value(known[coarse]) <= 0.0 or value(known[fine]) <= 0.0:
+            return otherwise
+        found = log(value(known[coarse]) / value(known[fine])) / log(
+            self.spacing(coarse) / self.spacing(fine)
+        )
+        return sign * min(max(sign * found, limits[0]), limits[1])
+
+    def sure(self, goal: Goal, best: Point | None) -> str:
+        """In words, how far the result can be trusted."""
+        tried = f"{len(self.points)} configurations tried"
+        if best is None:
+            return f"{tried}: none meets the goal, and none finer promises to"
+        place = next(place for place, point in self.points.items() if point is best)
+        errors = [
+            self.points[place[0], level].error
+            for level in range(len(self.levels))
+            if (place[0], level) in self.points
+        ]
+        if len(errors) < 2:
+            return (
+                f"{tried}: its error at no other spacing is known, so that it may be small by "
+                "chance"
+            )
+        if any(fine > coarse for coarse, fine in pairwise(errors)):
+            return f"{tried}: its error does not fall steadily, so that it may be small by chance"
+        return f"{tried}: its error falls with the spacing, as that of a sound scheme does"
+
+
+def _scaled(value: float, exponent: float) -> float:
+    from math import exp
+
+    return value * exp(min(max(exponent, -700.0), 700.0))
+
+
+def _split(axes: Axes) -> tuple[str, list[Any], Sequence[Settings]]:
+    if not axes:
+        raise SceneError("nothing to search: no axis; give --axis name=values")
+    refining, *others = axes
+    if not axes[refining]:
+        raise SceneError(f"axis {refining!r} has no values; give some, from coarse to fine")
+    schemes = [
+        dict(zip(others, values, strict=True)) for values in product(*(axes[o] for o in others))
+    ]
+    return refining, list(axes[refining]), schemes
+
+
+def _prolonged(case: Case, name: str, levels: Sequence[Any]) -> Any:
+    """A finer value than the last: steps of whole numbers double, numbers go on by their ratio."""
+    if len(levels) < 2:
+        return None
+    before, last = levels[-2:]
+    if isinstance(last, int) and isinstance(before, int):
+        step = 2 * (last - before)
+        guesses: list[Any] = [last + step + more for more in range(6)]
+    elif isinstance(last, float) and isinstance(before, float):
+        guesses = [last * last / before]
+    else:
+        return None
+    finest = varied(case, {name: last}).resolution
+    for guess in guesses:
+        try:
+            if varied(case, {name: guess}).resolution < finest:
+                return guess
+        except SceneError:
+            continue
+    return None
