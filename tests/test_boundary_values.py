@@ -103,14 +103,26 @@ def test_beside_the_boundary_the_full_solve_is_worse_than_no_ghosts_at_large_cov
         assert error[ways.SMALLEST] < error[ways.CONTINUED] < error[ways.ENDS_SOLVED]
 
 
-@covers
-def test_the_condition_is_below_that_of_an_endless_line(cover: float) -> None:
-    """Eigenvalues of a block lie between the extremes of the lattice's Fourier series."""
+def lattice_series(cover: float) -> np.ndarray:
+    """Eigenvalues of W on an endless lattice, by wave number."""
     W = weights(cover)
-    waves = np.linspace(0.0, np.pi, 20001)
-    series = W[0] + 2.0 * np.cos(np.outer(waves, np.arange(1, len(W)))) @ W[1:]
+    waves = np.outer(np.linspace(0.0, np.pi, 20001), np.arange(1, len(W)))
+    series: np.ndarray = W[0] + 2.0 * np.cos(waves) @ W[1:]
+    return series
+
+
+@pytest.mark.parametrize("cover", [1.5, 2.5, 3.5])
+def test_the_condition_is_below_that_of_an_endless_line(cover: float) -> None:
+    """Eigenvalues of a block lie between the extremes of the lattice's."""
+    series = lattice_series(cover)
     assert series.min() > 0.0
     assert 1.0 < block_condition(line(cover)) < series.max() / series.min()
+
+
+def test_at_the_largest_cover_no_bound_is_left() -> None:
+    """Waves that W turns round: between them and the others lies one that it does not see."""
+    assert lattice_series(5.5).min() < 0.0
+    assert block_condition(line(5.5)) > 1e3
 
 
 def test_the_condition_of_three_particles_that_see_their_nearest_only() -> None:
