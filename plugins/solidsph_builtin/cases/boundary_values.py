@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -17,7 +17,7 @@ from solidsph.scene import Scene
 from solidsph_builtin.cases import _boundary_theory as theory
 from solidsph_builtin.cases import _boundary_ways as ways
 from solidsph_builtin.cases._compare import ROUNDING, closed_form
-from solidsph_builtin.cases._line import Line, check_covers, complete_line, left_by_the_cut
+from solidsph_builtin.cases._line import LENGTH, Line, check_covers, complete_line, left_by_the_cut
 from solidsph_builtin.cases._scheme import check_count
 from solidsph_builtin.cases.interpolation import F
 
@@ -59,6 +59,10 @@ class BoundaryValues(Case):
     title: ClassVar[str] = "Boundary values and slopes, by the ways to impose them"
     source: ClassVar[str] = "Ismail & Reddy, section 2.3, Fig. 2, eqs. 11, 12"
     figures: ClassVar[tuple[str, ...]] = ("fig-2",)
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "cells": (20, 40, 80),
+        "covers": ((2.5,), (3.5,), (5.5,)),
+    }
 
     kernel: str = "modified-mollifier"
     covers: Sequence[float] = (1.5, 2.5, 3.5, 4.5, 5.5)  # [spacings]
@@ -73,6 +77,16 @@ class BoundaryValues(Case):
                 f"ends do not see each other, got cells = {self.cells} and a cover of "
                 f"{max(self.covers):g}"
             )
+
+    def accuracy(self, measurements: Sequence[Measurement]) -> Measurement:
+        """What the smallest change that is exact at the boundary does beside it."""
+        start = "largest error of <f> beside the boundary, smallest change"
+        found = next(m for m in measurements if m.quantity.startswith(start))
+        return attrs.evolve(found, error=found.value)
+
+    @property
+    def resolution(self) -> float:
+        return LENGTH / self.cells
 
     def scenes(self) -> Mapping[str, Scene]:
         return {}
