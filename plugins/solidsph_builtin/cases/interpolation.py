@@ -22,6 +22,7 @@ from solidsph_builtin.cases._line import (
     bare_line,
     check_covers,
     complete_line,
+    left_by_the_cut,
     whole_line,
 )
 from solidsph_builtin.cases._moments import Moments, of_lattice
@@ -204,7 +205,7 @@ class Interpolation(Case):
             x = plain.X - plain.X[middle]
             slope = (plain.gradient @ x)[middle]
             mass = (plain.smoothing @ np.ones(len(plain.X)))[middle]
-            cut_slope, cut_mass = _left_by_the_cut(plain)
+            cut_slope, cut_mass = left_by_the_cut(plain)
             cut_slope /= abs(moments.slope[1])
             says = "1.5 spacings under-predict the gradient" if cover < 2.0 else ""
             for label, value, reference, allowed in (
@@ -225,17 +226,6 @@ class Interpolation(Case):
                     paper="" if label == "corrected" else says,
                     allowed=ROUNDING + allowed,
                 )
-
-
-def _left_by_the_cut(line: Line) -> tuple[float, float]:
-    """How much <x'> and <1> hang on whether neighbours at just the support radius count.
-
-    That is decided by rounding, and shows only if the kernel is cut where it is not zero.
-    """
-    H = line.kernel.support_radius
-    within = np.array([np.nextafter(H, 0.0)])
-    slope = 2.0 * H * line.spacing * abs(float(line.kernel.slope(within)[0]))
-    return slope, 2.0 * line.spacing * float(line.kernel.value(within)[0])
 
 
 def approximated(line: Line, order: int) -> Array:
