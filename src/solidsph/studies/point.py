@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Mapping, Sequence
-from math import inf, isfinite, nan
+from math import inf, isfinite
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -26,8 +26,8 @@ class Point:
     error: float  # relative to the reference [-]; infinite if the run failed
     outcome: str = FINISHED  # or why it failed
     quantity: str = ""  # what the error is of
-    value: float = nan  # what was measured of it
-    reference: float = nan  # and what it should be; not a number if the error is all there is
+    value: float | None = None  # what was measured of it
+    reference: float | None = None  # and what it should be; None if the error is all there is
     spacing: float = inf  # of the particles [m]
     particles: int = 0
     steps: int = 0
@@ -70,7 +70,7 @@ def measured(case: Case, settings: Mapping[str, Any]) -> Point:
             outcome=failed[0] if failed else FINISHED,
             quantity=headline.quantity,
             value=headline.value,
-            reference=nan if headline.reference is None else headline.reference,
+            reference=headline.reference,
             spacing=wanted.resolution,
             particles=sum(run.particles for run in runs),
             steps=sum(run.steps for run in runs),

@@ -19,13 +19,20 @@ from solidsph.studies.varied import varied
 Settings = Mapping[str, Any]
 Axes = Mapping[str, Sequence[Any]]
 
-# Before two levels of a scheme are known: errors of second order, and times of an explicit run in
-# two dimensions. What is known replaces them.
-_ORDER, _GROWTH = 2.0, 3.0
+# Before two levels of a scheme are known: errors of a high order, so that no scheme is given up too
+# soon, and times of an explicit run in two dimensions. What is known replaces them.
+_ORDER, _GROWTH = 2.5, 3.0
 _ORDERS, _GROWTHS = (0.5, 4.0), (0.5, 5.0)
 
-# A candidate must promise to be so much cheaper than what is found to be worth a run.
+# What of the shortest run is there whatever the spacing: building, starting, compiling.
+_FIXED = 0.5
+
+_TINY = 1e-300
+
+# A candidate must promise to be so much better than what is found to be worth a run, and may
+# promise to miss the goal by so much.
 _GAIN = 1.25
+_MISS = 1.2
 
 # How often the refining axis may be prolonged beyond the values that were given.
 _PROLONGED = 6
@@ -65,7 +72,7 @@ class Accuracy(Goal):
         return time
 
     def promising(self, error: float, time: float) -> bool:
-        return error <= self.error
+        return error <= _MISS * self.error
 
     def exhausted(self, error: float, time: float) -> bool:
         return error <= self.error
@@ -85,7 +92,7 @@ class Within(Goal):
         return error
 
     def promising(self, error: float, time: float) -> bool:
-        return time <= self.time
+        return time <= _MISS * self.time
 
     def exhausted(self, error: float, time: float) -> bool:
         return time > self.time
@@ -105,7 +112,14 @@ class Found:
         return sum(sum(one.seconds) for one in self.tried if isfinite(one.time))
 
 
-def search(case: Case, axes: Axes, goal: Goal, run: Callable[[Settings], Point]) -> Found:
+def search(
+    case: Case,
+    axes: Axes,
+    goal: Goal,
+    run: Callable[[Settings], Point],
+    *,
+    longest: float = 600.0,
+) -> Found:
     """Look for `goal` among the values of `axes`, and beyond the finest if need be.
 
     Every scheme, that is a choice of all but the refining axis, runs at its coarsest. From there
@@ -116,10 +130,11 @@ def search(case: Case, axes: Axes, goal: Goal, run: Callable[[Settings], Point])
         case: already `priced`.
         axes: values by setting; the first refines, from coarse to fine.
         run: what measures a configuration.
+        longest: predicted wall time beyond which nothing is run [s].
     """
     book = _Book(case, *_split(axes))
     while True:
-        wanted = book.next(goal)
+        wanted = book.next(goal, longest)
         if wanted is None:
             break
         book.note(wanted, run(book.settings(wanted)))
@@ -153,25 +168,27 @@ class _Book:
         met = [point for point in self.points.values() if goal.met(point)]
         return min(met, key=lambda point: goal.loss(point.error, point.time), default=None)
 
-    def next(self, goal: Goal) -> tuple[int, int] | None:
+    def next(self, goal: Goal, longest: float) -> tuple[int, int] | None:
         """The place to run next, None if there is nothing left to gain."""
         for scheme in range(len(self.schemes)):
             if (scheme, 0) not in self.points:
                 return scheme, 0
         best = self.best(goal)
         bound = goal.loss(best.error, best.time) / _GAIN if best else inf
-        offers = sorted(self._offers(goal))
+        offers = sorted(self._offers(goal, longest))
         if offers and offers[0][0] < bound:
             return offers[0][1]
         return None
 
-    def _offers(self, goal: Goal) -> Iterator[tuple[float, tuple[int, int]]]:
+    def _offers(self, goal: Goal, longest: float) -> Iterator[tuple[float, tuple[int, int]]]:
         """Of each scheme the place that promises most, with its predicted loss."""
         for scheme in range(len(self.schemes)):
             offers = []
             level = 0
             while self._has(level):
                 error, time = self.predicted(scheme, level)
+                if time > longest:
+                    break
                 if (scheme, level) not in self.points and goal.promising(error, time):
                     offers.append((goal.loss(error, time), (scheme, level)))
                 if goal.exhausted(error, time) and (scheme, level) not in self.points:
@@ -199,51 +216,54 @@ class _Book:
         if (scheme, level) in self.points:
             point = self.points[scheme, level]
             return point.error, point.time
-        known = {
-            place: point
-            for (one, place), point in self.points.items()
-            if one == scheme and point.finished
-        }
+        known = self._known(scheme)
         if not known:
             return inf, inf
         nearest = min(known, key=lambda place: abs(place - level))
-        ratio = log(self.spacing(level) / self.spacing(nearest))
-        base = known[nearest]
-        order = self._power(known, lambda point: point.error, _ORDER, _ORDERS)
-        growth = -self._power(known, lambda point: point.time, -self._growth(), _GROWTHS, -1.0)
-        return _scaled(base.error, order * ratio), _scaled(base.time, -growth * ratio)
-
-    def _growth(self) -> float:
-        """How times grow with refinement, by all schemes of which two levels are known."""
-        found = []
-        for scheme in range(len(self.schemes)):
-            known = {
-                place: point
-                for (one, place), point in self.points.items()
-                if one == scheme and point.finished
-            }
-            if len(known) > 1:
-                found.append(-self._power(known, lambda point: point.time, 0.0, _GROWTHS, -1.0))
-        return median(found) if found else _GROWTH
-
-    def _power(
-        self,
-        known: Mapping[int, Point],
-        value: Callable[[Point], float],
-        otherwise: float,
-        limits: tuple[float, float],
-        sign: float = 1.0,
-    ) -> float:
-        """Exponent of the spacing between the two finest known levels, within limits."""
-        if len(known) < 2:
-            return otherwise
-        coarse, fine = sorted(known)[-2:]
-        if value(known[coarse]) <= 0.0 or value(known[fine]) <= 0.0:
-            return otherwise
-        found = log(value(known[coarse]) / value(known[fine])) / log(
-            self.spacing(coarse) / self.spacing(fine)
+        ratio = self.spacing(level) / self.spacing(nearest)
+        order = self._order(known)
+        fixed = self._fixed()
+        growth = self._growth(scheme, fixed)
+        return (
+            known[nearest].error * ratio**order,
+            fixed + (known[nearest].time - fixed) * ratio**-growth,
         )
-        return sign * min(max(sign * found, limits[0]), limits[1])
+
+    def _known(self, scheme: int) -> Mapping[int, Point]:
+        return {
+            level: point
+            for (one, level), point in self.points.items()
+            if one == scheme and point.finished
+        }
+
+    def _order(self, known: Mapping[int, Point]) -> float:
+        """Of the error, by the two finest levels known."""
+        errors = {level: max(point.error, _TINY) for level, point in known.items()}
+        found = self._power(errors)
+        return _ORDER if found is None else min(max(found, _ORDERS[0]), _ORDERS[1])
+
+    def _fixed(self) -> float:
+        """What every run takes whatever its spacing, about [s]."""
+        return _FIXED * min(point.time for point in self.points.values() if point.finished)
+
+    def _growth(self, scheme: int, fixed: float) -> float:
+        """Of the time beyond what is fixed: the scheme's own, or the middle one of the others."""
+        found = {}
+        for one in range(len(self.schemes)):
+            rest = {level: point.time - fixed for level, point in self._known(one).items()}
+            power = self._power(rest)
+            if power is not None:
+                found[one] = min(max(-power, _GROWTHS[0]), _GROWTHS[1])
+        if scheme in found:
+            return found[scheme]
+        return median(found.values()) if found else _GROWTH
+
+    def _power(self, values: Mapping[int, float]) -> float | None:
+        """Exponent of the spacing by which values went between the two finest levels."""
+        if len(values) < 2:
+            return None
+        coarse, fine = sorted(values)[-2:]
+        return log(values[coarse] / values[fine]) / log(self.spacing(coarse) / self.spacing(fine))
 
     def sure(self, goal: Goal, best: Point | None) -> str:
         """In words, how far the result can be trusted."""
@@ -264,12 +284,6 @@ class _Book:
         if any(fine > coarse for coarse, fine in pairwise(errors)):
             return f"{tried}: its error does not fall steadily, so that it may be small by chance"
         return f"{tried}: its error falls with the spacing, as that of a sound scheme does"
-
-
-def _scaled(value: float, exponent: float) -> float:
-    from math import exp
-
-    return value * exp(min(max(exponent, -700.0), 700.0))
 
 
 def _split(axes: Axes) -> tuple[str, list[Any], Sequence[Settings]]:
