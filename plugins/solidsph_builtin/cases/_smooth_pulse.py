@@ -27,7 +27,7 @@ class SmoothPulse(Case):
     title: ClassVar[str] = "A small, smooth stress wave in a bar"
     source: ClassVar[str] = SOURCE
     sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
-        "particles": (31, 61, 121, 241),
+        "particles": (61, 121, 241, 481, 961),
         "gradient": ("consistent", "quadratic", "corrected"),
         "cover": (1.6, 2.2, 3.5),
     }

@@ -122,9 +122,11 @@ def search(
 ) -> Found:
     """Look for `goal` among the values of `axes`, and beyond the finest if need be.
 
-    Every scheme, that is a choice of all but the refining axis, runs at its coarsest. From there
-    powers of the spacing predict errors and times of the rest; the most promising is run, and what
-    it shows replaces the prediction, until nothing promises to be worth a run.
+    A scheme is a choice of all but the refining axis. The one in the middle, and those that differ
+    from it in one choice, run at their coarsest: what each choice does to error and time is taken
+    to do the same in any company. From there powers of the spacing predict the rest; the most
+    promising is run, and what it shows replaces the prediction, until nothing promises to be worth
+    a run.
 
     Args:
         case: already `priced`.
@@ -170,7 +172,7 @@ class _Book:
 
     def next(self, goal: Goal, longest: float) -> tuple[int, int] | None:
         """The place to run next, None if there is nothing left to gain."""
-        for scheme in range(len(self.schemes)):
+        for scheme in self._star():
             if (scheme, 0) not in self.points:
                 return scheme, 0
         best = self.best(goal)
@@ -217,17 +219,45 @@ class _Book:
             point = self.points[scheme, level]
             return point.error, point.time
         known = self._known(scheme)
-        if not known:
-            return inf, inf
-        nearest = min(known, key=lambda place: abs(place - level))
+        if any(one == scheme for one, _ in self.points) and not known:
+            return inf, inf  # it failed
+        nearest = min(known, key=lambda place: abs(place - level), default=0)
+        point = known.get(nearest)
+        error, time = (point.error, point.time) if point else self._by_choices(scheme)
         ratio = self.spacing(level) / self.spacing(nearest)
-        order = self._order(known)
         fixed = self._fixed()
         growth = self._growth(scheme, fixed)
-        return (
-            known[nearest].error * ratio**order,
-            fixed + (known[nearest].time - fixed) * ratio**-growth,
-        )
+        return error * ratio ** self._order(known), fixed + (time - fixed) * ratio**-growth
+
+    def _by_choices(self, scheme: int) -> tuple[float, float]:
+        """Error and time of a scheme at its coarsest, from those that make one of its choices."""
+        centre, *star = self._star()
+        base = self.points[centre, 0]
+        error, time = base.error, base.time
+        for one in star:
+            (axis,) = self._differing(one, centre)
+            if self.schemes[scheme][axis] == self.schemes[one][axis]:
+                point = self.points[one, 0]
+                error *= max(point.error, _TINY) / max(base.error, _TINY)
+                time *= point.time / base.time
+        return error, time
+
+    def _star(self) -> Sequence[int]:
+        """The scheme of the case's own parameters, where the axes have them, and its neighbours."""
+        own = {
+            axis: value
+            for axis in self.schemes[0]
+            for value in [getattr(self.case, axis, None)]
+            if any(scheme[axis] == value for scheme in self.schemes)
+        }
+        middle = {**self.schemes[0], **own}
+        centre = next(i for i, scheme in enumerate(self.schemes) if scheme == middle)
+        near = [i for i in range(len(self.schemes)) if len(self._differing(i, centre)) == 1]
+        return [centre, *near]
+
+    def _differing(self, one: int, other: int) -> Sequence[str]:
+        a, b = self.schemes[one], self.schemes[other]
+        return [axis for axis in a if a[axis] != b[axis]]
 
     def _known(self, scheme: int) -> Mapping[int, Point]:
         return {
@@ -244,7 +274,8 @@ class _Book:
 
     def _fixed(self) -> float:
         """What every run takes whatever its spacing, about [s]."""
-        return _FIXED * min(point.time for point in self.points.values() if point.finished)
+        times = [point.time for point in self.points.values() if point.finished]
+        return _FIXED * min(times, default=0.0)
 
     def _growth(self, scheme: int, fixed: float) -> float:
         """Of the time beyond what is fixed: the scheme's own, or the middle one of the others."""

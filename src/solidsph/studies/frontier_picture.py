@@ -1,0 +1,106 @@
+"""The picture of a frontier: error against time, and against spacing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from solidsph.studies.frontier import Frontier
+from solidsph.studies.point import Point
+
+_MARKERS = "osD^vP*X<>"
+
+
+def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
+    """Dominated points in grey, the front in black; bars go from the quickest repeat to the
+    slowest. On the right every scheme as it is refined.
+    """
+    figure = Figure(figsize=(13.0, 6.0), layout="constrained")
+    by_time, by_spacing = figure.subplots(1, 2, sharey=True)
+    front = frontier.front()
+    schemes = list(dict.fromkeys(frontier.scheme(point) for point in front))
+    markers = {scheme: _MARKERS[i % len(_MARKERS)] for i, scheme in enumerate(schemes)}
+
+    others = [point for point in frontier.finished() if point not in front]
+    _points(by_time, others, "o", "0.75", "dominated")
+    by_time.loglog(
+        [point.time for point in front],
+        [100.0 * point.error for point in front],
+        color="black",
+        linewidth=1.0,
+        zorder=2,
+    )
+    for scheme, marker in markers.items():
+        mine = [point for point in front if frontier.scheme(point) == scheme]
+        _points(by_time, mine, marker, "black", scheme)
+    for point in front:
+        by_time.annotate(
+            f"{frontier.refining} {point.settings.get(frontier.refining, '')}",
+            (point.time, 100.0 * point.error),
+            xytext=(6, 5),
+            textcoords="offset points",
+            fontsize=8,
+        )
+    by_time.set_xscale("log")
+    by_time.set_yscale("log")
+    by_time.set_xlabel("wall time [s]")
+    quantity = next((point.quantity for point in frontier.points if point.quantity), "result")
+    by_time.set_ylabel(f"error [%] of: {quantity}")
+    by_time.legend(frameon=False, fontsize=8, loc="best")
+
+    for scheme, points in frontier.schemes().items():
+        on_front = scheme in markers
+        by_spacing.loglog(
+            [point.spacing for point in points],
+            [100.0 * point.error for point in points],
+            color="black" if on_front else "0.75",
+            linewidth=1.2 if on_front else 0.8,
+            marker=markers.get(scheme, "."),
+            markersize=5,
+            zorder=2 if on_front else 1,
+        )
+    _draw_order(by_spacing, frontier.finished())
+    by_spacing.set_xlabel("particle spacing [m]")
+    for axes in (by_time, by_spacing):
+        axes.grid(color="0.92", which="both", linewidth=0.6)
+        axes.set_axisbelow(True)
+    figure.suptitle(title, fontsize=12)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=150)
+
+
+def _points(axes: Axes, points: Sequence[Point], marker: str, color: str, label: str) -> None:
+    if not points:
+        return
+    axes.errorbar(
+        [point.time for point in points],
+        [100.0 * point.error for point in points],
+        xerr=[
+            [point.time - min(point.seconds) for point in points],
+            [max(point.seconds) - point.time for point in points],
+        ],
+        fmt=marker,
+        color=color,
+        markersize=5,
+        elinewidth=0.8,
+        label=label,
+        zorder=3 if color == "black" else 1,
+    )
+
+
+def _draw_order(axes: Axes, points: Sequence[Point]) -> None:
+    """What second order is, below all errors."""
+    if not points:
+        return
+    coarse, fine = max(p.spacing for p in points), min(p.spacing for p in points)
+    if not 0.0 < fine < coarse < float("inf"):
+        return
+    least = 100.0 * min(p.error for p in points if p.error > 0.0)
+    start = 0.7 * least * (coarse / fine) ** 2
+    axes.loglog([coarse, fine], [start, 0.7 * least], ":", color="0.4", linewidth=1.0)
+    axes.annotate(
+        "order 2", (fine, 0.7 * least), xytext=(4, -10), textcoords="offset points", fontsize=8
+    )
