@@ -81,7 +81,7 @@ def _draw_errors(axes: Axes, errors: Mapping[str, Array], spacings: Array) -> No
     least = 100.0 * min(float(values.min()) for values in errors.values())
     # Slopes to compare with, below the errors at the coarsest spacing.
     for order, style in ((1, (0, (1, 3))), (2, (0, (5, 5)))):
-        line = 0.55 * largest * (spacings / spacings[0]) ** order
+        line = 0.35 * largest * (spacings / spacings[0]) ** order
         axes.loglog(spacings, line, color="0.6", linestyle=style, linewidth=1.0, zorder=0)
         axes.annotate(
             f"order {order}",
@@ -96,9 +96,10 @@ def _draw_errors(axes: Axes, errors: Mapping[str, Array], spacings: Array) -> No
     axes.set_ylabel("error of the edge's mean u_x [%]")
     axes.legend(frameon=False, fontsize=9, loc="upper left")
     _spacing_axis(axes, spacings)
-    axes.set_ylim(0.4 * least, 2.5 * largest)
+    lowest = 0.8 * min(least, float(line[-1]))
+    axes.set_ylim(lowest, 2.5 * largest)
     known = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0])
-    shown = known[(known > 0.4 * least) & (known < 2.5 * largest)]
+    shown = known[(known > lowest) & (known < 2.5 * largest)]
     axes.set_yticks(shown, [f"{one:g}" for one in shown])
     axes.set_yticks([], minor=True)
 
@@ -111,12 +112,10 @@ def _draw_peaks(axes: Axes, peaks: Mapping[str, Array], peak: float, spacings: A
     axes.axhline(1e-6 * peak, color="0.4", linewidth=3.0, alpha=0.4, zorder=0)
     axes.annotate(
         f"reference: {1e-6 * peak:.2f} MPa",
-        (0.98, 1e-6 * peak),
+        (0.02, 1e-6 * peak),
         xycoords=axes.get_yaxis_transform(),
-        xytext=(0, -4),
+        xytext=(0, 5),
         textcoords="offset points",
-        ha="right",
-        va="top",
         fontsize=9,
     )
     axes.set_ylim(0.8e-6 * peak, 1.2e-6 * peak)

@@ -48,11 +48,11 @@ def draw_problem(record: Record, sheet: Quarter, path: Path) -> None:
             "", (1.17, height), (1.03, height), arrowprops={"arrowstyle": "-|>", "color": "black"}
         )
     words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 10}
-    axes.text(1.24, 0.5, f"{1e-6 * sheet.traction:g} MPa", rotation=90, **words)
+    axes.text(1.24, 0.5, f"traction {1e-6 * sheet.traction:g} MPa", rotation=90, **words)
     axes.text(-0.06, 0.6, "symmetry", rotation=90, **words)
     axes.text(0.6, -0.06, "symmetry", **words)
     axes.text(0.5, 1.05, "free", **words)
-    axes.annotate(f"a = {a:g} W", (0.5 * a, 0.12 * a), ha="center", va="bottom", fontsize=10)
+    axes.text(0.5 * a, -0.06, f"a = {a:g} W", **words)
     axes.annotate("", (a, 0.0), (0.0, 0.0), arrowprops={"arrowstyle": "<->", "color": "0.3"})
     axes.set_xlim(-0.12, 1.3)
     axes.set_ylim(-0.12, 1.12)
@@ -82,7 +82,7 @@ def draw_final(
         extension: what u_x of the edge must be at rest, over W [-].
         peak: what the largest stress must be at rest [Pa]; None if it is not known.
     """
-    figure = Figure(figsize=(12.0, 6.0), layout="constrained")
+    figure = Figure(figsize=(12.0, 6.4), layout="constrained")
     grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.1))
     axes = figure.add_subplot(grid[:, 0])
     stress = 1e-6 * largest_principal(ramped.field("cauchy_stress")[-1])
@@ -98,51 +98,56 @@ def draw_final(
         color="white",
         arrowprops={"arrowstyle": "->", "color": "white"},
     )
-    figure.colorbar(
-        mesh,
-        ax=axes,
-        location="bottom",
-        shrink=0.85,
-        aspect=40,
-        label="largest principal Cauchy stress [MPa]",
-    )
+    label = "largest principal Cauchy stress at rest [MPa]"
+    figure.colorbar(mesh, ax=axes, location="bottom", shrink=0.85, aspect=40, label=label)
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
-    axes.set_title("at rest; dotted: before", fontsize=10)
 
     above = figure.add_subplot(grid[0, 1])
     below = figure.add_subplot(grid[1, 1], sharex=above)
-    for record, style, name in (
-        (sudden, {"color": "0.55", "linewidth": 1.0}, "sudden, undamped"),
-        (ramped, {"color": "black", "linewidth": 1.8}, "ramped, damped"),
+    end = max(float(record.times[-1]) for record in (sudden, ramped)) / sheet.crossing
+    greatest = 60.0
+    for record, grey, thickness, name in (
+        (sudden, "0.55", 1.0, "sudden, undamped"),
+        (ramped, "black", 1.8, "ramped, damped"),
     ):
         times = record.times / sheet.crossing
-        above.plot(times, extensions(record) / sheet.width, label=name, **style)
+        extension_now = extensions(record) / sheet.width
+        above.plot(times, extension_now, color=grey, linewidth=thickness, label=name)
         stresses = [largest_principal(one).max() for one in record.field("cauchy_stress")]
-        below.plot(times, 1e-6 * np.array(stresses), label=name, **style)
-    line = {"color": "black", "linestyle": "--", "linewidth": 0.9}
-    above.axhline(extension, label=f"equilibrium: {extension:.4f}", **line)
+        below.plot(times, 1e-6 * np.array(stresses), color=grey, linewidth=thickness)
+        greatest = max(greatest, 1e-6 * max(stresses))
+    _draw_level(above, extension, f"equilibrium: {extension:.4f}", "--")
     if peak is not None:
-        below.axhline(1e-6 * peak, label=f"equilibrium: {1e-6 * peak:.1f} MPa", **line)
-    small = 3e-6 * sheet.traction
-    below.axhline(
-        2.0 * small,
-        color="black",
-        linestyle=":",
-        linewidth=0.9,
-        label=f"small hole, one undamped mode: {2.0 * small:g} MPa",
-    )
-    below.axhline(60.0, color="black", linestyle="-.", linewidth=0.9, label="the paper: 60 MPa")
+        _draw_level(below, 1e-6 * peak, f"equilibrium: {1e-6 * peak:.1f} MPa", "--")
+    twice = 6e-6 * sheet.traction
+    _draw_level(below, twice, f"small hole, swinging in one mode: {twice:g} MPa", ":")
+    _draw_level(below, 60.0, "the paper: 60 MPa", "-.")
+    above.set_ylim(0.0, 1.3 * float(extensions(sudden).max()) / sheet.width)
+    below.set_ylim(0.0, 1.15 * greatest)
+    above.set_xlim(0.0, end)
+    above.legend(frameon=False, fontsize=9, loc="upper right", ncols=2)
     above.set_ylabel("mean u_x of the edge / W")
     below.set_ylabel("largest stress [MPa]")
     below.set_xlabel("time [W / c_p]")
-    for panel in (above, below):
-        panel.set_ylim(bottom=0.0)
-        panel.set_xlim(0.0, float(max(sudden.times[-1], ramped.times[-1])) / sheet.crossing)
-        panel.legend(frameon=False, fontsize=9, loc="upper right")
-    above.set_ylim(top=1.75 * float(extensions(sudden).max()) / sheet.width)
-    below.set_ylim(top=100.0)
+    figure.suptitle(
+        f"The sheet comes to rest: {ramped.particles.count} particles (dotted: before)", fontsize=11
+    )
     _save(figure, path)
+
+
+def _draw_level(axes: Axes, height: float, label: str, style: str) -> None:
+    """A line across, named at its right end."""
+    axes.axhline(height, color="black", linestyle=style, linewidth=0.9)
+    axes.annotate(
+        label,
+        (0.99, height),
+        xycoords=axes.get_yaxis_transform(),
+        xytext=(0, 3),
+        textcoords="offset points",
+        ha="right",
+        fontsize=9,
+    )
 
 
 def draw_waves(record: Record, sheet: Quarter, path: Path) -> None:
