@@ -230,7 +230,7 @@ class Custom(Effect):
     def arrays(self, setting) -> Mapping[str, int]:
         return {}
 
-    def damping_rate(self) -> float:
+    def damping_rate(self, bodies) -> float:
         return 0.0
 
     def stiffness_rate(self, bodies) -> float:

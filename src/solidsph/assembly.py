@@ -300,7 +300,7 @@ class Assembly:
         frequency = sqrt(
             (2.0 / wave_time) ** 2 + sum(e.stiffness_rate(bodies) ** 2 for e in effects.values())
         )
-        rate = sum(e.damping_rate() for e in effects.values())
+        rate = sum(e.damping_rate(bodies) for e in effects.values())
         largest = integrator.stability_limit / (frequency + rate)
         if scene.time_step is not None and scene.time_step > largest:
             raise SceneError(

@@ -86,6 +86,15 @@ def transpose(A: Tensor) -> Tensor:
     )
 
 
+def dot(v: Vector, w: Vector) -> Scalar:
+    """v . w."""
+    if len(v) == 1:
+        return v[0] * w[0]
+    if len(v) == 2:
+        return v[0] * w[0] + v[1] * w[1]
+    return v[0] * w[0] + v[1] * w[1] + v[2] * w[2]
+
+
 def scaled(a: Scalar, v: Vector) -> Vector:
     """a v."""
     if len(v) == 1:

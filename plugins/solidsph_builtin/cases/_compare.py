@@ -9,6 +9,9 @@ from solidsph.results.record import Record
 
 FINISHED = "finished"
 
+# Sums of a few dozen terms on spacings of 1e-2, differentiated twice: rounding is below 1e-11.
+ROUNDING = 1e-9
+
 
 def compared(
     record: Record,
@@ -42,4 +45,33 @@ def compared(
         error=error,
         verdict=verdict if complete else record.outcome,
         passed=within and complete,
+    )
+
+
+def closed_form(
+    quantity: str,
+    value: float,
+    reference: float,
+    *,
+    source: str,
+    paper: str,
+    allowed: float = ROUNDING,
+) -> Measurement:
+    """A number [-] that no run made, beside its closed form, which it has but for rounding.
+
+    Args:
+        allowed: largest error that passes, relative to the reference or to 1 if that is smaller.
+    """
+    value, reference = float(value), float(reference)
+    error = abs(value - reference) / max(abs(reference), 1.0)
+    return Measurement(
+        quantity=quantity,
+        value=value,
+        unit="1",
+        reference=reference,
+        source=source,
+        error=error,
+        verdict="as the closed form" if error <= allowed else "NOT as the closed form",
+        passed=error <= allowed,
+        paper=paper,
     )

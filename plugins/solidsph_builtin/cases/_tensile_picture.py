@@ -1,4 +1,4 @@
-"""Figs. 13 and 14: how the particles move after the perturbation, in both forms."""
+"""Figs. 12 to 14: a bar in tension, and how its particles move after the perturbation."""
 
 from __future__ import annotations
 
@@ -9,6 +9,46 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from solidsph.results.record import Record
+
+
+def draw_configuration(record: Record, stretch: float, perturbation: float, path: Path) -> None:
+    """Fig. 12: where the particles stand at the start, and the displacement of each."""
+    particles = record.particles
+    real = np.flatnonzero(~particles.ghosts)
+    order = real[np.argsort(particles.positions[real, 0])]
+    X, x = 1e3 * particles.positions[order, 0], 1e3 * record.positions[0][order, 0]
+    middle = len(order) // 2
+    figure = Figure(figsize=(9.0, 5.5), layout="constrained")
+    bar, below = figure.subplots(2, 1, height_ratios=[1.0, 2.2])
+    for height, places, name in ((1.0, X, "unstretched"), (0.0, x, f"stretch {stretch:g}")):
+        bar.plot(places, np.full(len(places), height), "o", color="0.55", markersize=3)
+        bar.plot(places[middle], height, "o", color="black", markersize=6)
+        for end in (places[0], places[-1]):
+            bar.plot([end, end], [height - 0.3, height + 0.3], color="black", linewidth=3.0)
+        bar.text(-0.02 * x[-1], height, name, ha="right", va="center", fontsize=10)
+    bar.set_ylim(-0.6, 1.6)
+    bar.set_xlim(-0.16 * x[-1], 1.03 * x[-1])
+    bar.set_yticks([])
+    bar.spines[["left", "right", "top"]].set_visible(False)
+    bar.set_xlabel("position [mm]")
+    bar.set_title("particles; both ends (bars) are held, the centre one is displaced", fontsize=10)
+    below.plot(X, (stretch - 1.0) * X, color="0.55", linewidth=1.0, label="uniform stretch")
+    below.plot(X, x - X, "o", color="black", markersize=3, label="at the start")
+    below.annotate(
+        f"centre particle, {100 * perturbation:+g} %",
+        (X[middle], x[middle] - X[middle]),
+        (0.28 * X[-1], 0.75 * (x[-1] - X[-1])),
+        arrowprops={"arrowstyle": "->"},
+        fontsize=10,
+    )
+    below.set_xlabel("reference position X [mm]")
+    below.set_ylabel("displacement [mm]")
+    below.legend(loc="lower right", fontsize=9, frameon=False)
+    figure.suptitle(
+        "A bar stretched uniformly and perturbed (Ismail & Reddy, Fig. 12)", fontsize=11
+    )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=150)
 
 
 def draw_forms(

@@ -13,14 +13,14 @@ import numpy as np
 from solidsph.arrays import Array
 from solidsph.builder import Builder
 from solidsph.errors import SceneError
-from solidsph.interfaces.case import Case, Measurement
+from solidsph.interfaces.case import Case, Curves, Measurement
 from solidsph.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene import Scene
+from solidsph.studies.ellipticity import least_stiffness
 from solidsph.studies.spectrum import spectrum
+from solidsph_builtin.cases._stability_map import FORMS, UPDATED, StabilityMap, onset, stability_map
 from solidsph_builtin.materials.neo_hookean import NeoHookean
-
-FORMS = ("total-lagrangian", "updated-lagrangian")
 
 # How long the growth is watched, in e-foldings of the rate that the spectrum predicts for the
 # updated form: from the smallest deviation that rounding leaves clean to the edge of linearity.
@@ -38,6 +38,16 @@ _LAST_DECADES = 1e-2
 # to little more than the start, growth at any rate worth the name passes it within the watch.
 _NO_GROWTH = 1.5
 
+# The map: from strong compression to the stretch of section 5.3, past 1 without touching it, and
+# from a support that just holds the nearest neighbours to the paper's largest.
+_MAP_STRETCHES = tuple(float(s) for s in np.linspace(0.3, 6.0, 39))
+_MAP_COVERS = tuple(float(c) for c in np.linspace(1.2, 5.5, 22))
+
+_PAPER = {
+    FORMS[0]: "behaves as expected: all particles track the centre one",
+    UPDATED: "particles under increasing tension move closer together at times",
+}
+
 
 @final
 @attrs.frozen
@@ -47,7 +57,8 @@ class TensileInstability(Case):
     In truth the disturbance spreads as waves. The total Lagrangian form does so; in the updated
     form neighbouring particles attract each other, and the disturbance grows where it started.
     Beside the paper's finite perturbation, one small enough for linear theory is run at several
-    stretches, and its growth compared with the spectrum of the discrete system.
+    stretches, and its growth compared with the spectrum of the discrete system. A map shows, for
+    either form, at which stretch and cover the uniform state of an endless bar is unstable.
     """
 
     title: ClassVar[str] = "A bar in tension, perturbed: total against updated Lagrangian"
@@ -123,20 +134,63 @@ class TensileInstability(Case):
                 for stretch in self.stretches
                 for form in FORMS
             ),
+            *self._of_the_maps(),
         ]
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_builtin.cases._tensile_picture import draw_forms
+    def maps(self) -> Mapping[str, StabilityMap]:
+        """Growth over stretch and cover, by form."""
+        return {
+            form: stability_map(form, self.poissons_ratio, _MAP_STRETCHES, _MAP_COVERS)
+            for form in FORMS
+        }
 
-        path = folder / "fig-13-14-tensile-instability.png"
+    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
+        from solidsph_builtin.cases._stability_picture import draw_maps
+        from solidsph_builtin.cases._tensile_picture import draw_configuration, draw_forms
+
+        paths = [
+            folder / "fig-12-configuration.png",
+            folder / "fig-13-14-tensile-instability.png",
+            folder / "fig-13-14-stability-map.png",
+        ]
+        draw_configuration(records[FORMS[0]], self.stretch, self.perturbation, paths[0])
         draw_forms(
             {form: records[form] for form in FORMS},
             stretch=self.stretch,
             perturbation=self.perturbation,
             transit=self.transit,
-            path=path,
+            path=paths[1],
         )
-        return [path]
+        draw_maps(self.maps(), self.cover, self.poissons_ratio, paths[2])
+        return paths
+
+    def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
+        X, start = displacements(records[FORMS[0]])
+        curves: dict[str, Curves] = {
+            "fig-12-configuration": {
+                "X [mm]": 1e3 * X,
+                "uniform displacement [mm]": 1e3 * (self.stretch - 1.0) * X,
+                "displacement at the start [mm]": 1e3 * start[0],
+            }
+        }
+        for figure, form in zip(("fig-13", "fig-14"), FORMS, strict=True):
+            X, u = displacements(records[form])
+            curves[f"{figure}-{form}"] = {
+                "time [transits]": records[form].times / self.transit,
+                **{f"u at X = {1e3 * x:g} mm [mm]": 1e3 * u[:, k] for k, x in enumerate(X)},
+            }
+        total, updated = self.maps().values()
+        covers, stretches = np.meshgrid(total.covers, total.stretches, indexing="ij")
+        curves["fig-13-14-stability-map"] = {
+            "cover [spacings]": covers.ravel(),
+            "stretch [1]": stretches.ravel(),
+            **{
+                f"{form}: growth rate [1/transit of a spacing]": one.rates.ravel()
+                for form, one in self.maps().items()
+            },
+            f"{UPDATED}: has neighbours [1]": updated.connected.ravel().astype(np.float64),
+        }
+        return curves
 
     def _scene(self, form: str, stretch: float, perturbation: float, duration: float) -> Scene:
         half = 0.5 * self.length
@@ -190,6 +244,7 @@ class TensileInstability(Case):
             source="section 5.2: the total form's disturbance spreads, the updated form's clumps",
             verdict=f"{'grew' if ratio > 1.0 else 'spread'}, closest pair {gap:.2f} spacings",
             passed=(ratio > 1.0) == should_grow,
+            paper=_PAPER[form],
         )
 
     def _growth(self, form: str, stretch: float, record: Record) -> Measurement:
@@ -217,6 +272,54 @@ class TensileInstability(Case):
             and (error is None or error < 0.1),
         )
 
+    def _of_the_maps(self) -> Sequence[Measurement]:
+        total, updated = self.maps().values()
+        elliptic = np.array(
+            [
+                [least_stiffness(self.material, np.array([[s]])).value > 0.0 for s in row]
+                for row in total.seen
+            ]
+        )
+        spacings = self.length / self.spacing  # in a transit
+        fastest = float(total.rates[elliptic].max()) * spacings
+        stable = not total.grows[elliptic].any()
+        begins = onset(UPDATED, self.poissons_ratio, self.cover, 1.0 / spacings)
+        tension = updated.connected & (updated.stretches > 1.0)
+        squeezed = np.broadcast_to(updated.stretches < 1.0, tension.shape)
+        over = f"stretch {_MAP_STRETCHES[0]:g} to {_MAP_STRETCHES[-1]:g}, cover " + (
+            f"{_MAP_COVERS[0]:g} to {_MAP_COVERS[-1]:g}"
+        )
+        return [
+            Measurement(
+                quantity=f"{FORMS[0]}, {over}: fastest growth where the material is stable",
+                value=fastest,
+                unit="1/transit",
+                reference=0.0,
+                source="constant operators: s^2 = -P'(stretch) |g(k)|^2 / rho",
+                verdict="stable" if stable else "unstable",
+                passed=stable,
+                paper="the configuration should be totally stable",
+            ),
+            Measurement(
+                quantity=f"{UPDATED}, cover {self.cover:g}: stretch from which a transit is an "
+                "e-folding",
+                value=begins,
+                unit="1",
+                verdict="unstable in tension" if begins > 1.0 else "no such stretch up to 2",
+                passed=begins > 1.0,
+                paper="adjacent particles move out of phase with each other",
+            ),
+            *(
+                Measurement(
+                    quantity=f"{UPDATED}: unstable part of the map in {name}",
+                    value=float(updated.grows[where].mean()),
+                    unit="1",
+                    verdict="where particles still have neighbours",
+                )
+                for name, where in (("tension", tension), ("compression", squeezed))
+            ),
+        ]
+
 
 def _rate_name(form: str, stretch: float) -> str:
     return f"{form}-rate-{stretch:g}"
@@ -231,11 +334,17 @@ def _bar_positions(record: Record) -> Array:
     return positions
 
 
-def deviation(record: Record, stretch: float) -> Array:
-    """Displacement from the uniform stretch at every time [m], left to right, (t, n)."""
+def displacements(record: Record) -> tuple[Array, Array]:
+    """X (n,) and the displacements u (t, n) of the bar's particles, left to right [m]."""
     particles = record.particles
     X = np.sort(particles.positions[~particles.ghosts, 0])
-    return _bar_positions(record) - stretch * X
+    return X, _bar_positions(record) - X
+
+
+def deviation(record: Record, stretch: float) -> Array:
+    """Displacement from the uniform stretch at every time [m], left to right, (t, n)."""
+    X, u = displacements(record)
+    return u - (stretch - 1.0) * X
 
 
 def growth_rate(times: Array, amplitudes: Array, end: float) -> float:

@@ -42,7 +42,7 @@ class BodyForce(Effect):
         d = setting.particles.dimension
         return {"chosen particles": 8 * count, "positions": 8 * count * d, "masses": 8 * count}
 
-    def damping_rate(self) -> float:
+    def damping_rate(self, bodies: Sequence[Body]) -> float:
         return 0.0
 
     def stiffness_rate(self, bodies: Sequence[Body]) -> float:

@@ -78,7 +78,7 @@ class HourglassControl(Effect):
             for body in setting.bodies
         }
 
-    def damping_rate(self) -> float:
+    def damping_rate(self, bodies: Sequence[Body]) -> float:
         return 0.0
 
     def stiffness_rate(self, bodies: Sequence[Body]) -> float:

@@ -37,7 +37,7 @@ class MassDamping(Effect):
         count = len(setting.select(self.where))
         return {"chosen particles": 8 * count, "drag": 8 * count}
 
-    def damping_rate(self) -> float:
+    def damping_rate(self, bodies: Sequence[Body]) -> float:
         return self.rate
 
     def stiffness_rate(self, bodies: Sequence[Body]) -> float:

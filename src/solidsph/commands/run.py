@@ -129,11 +129,15 @@ def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bo
                 for m in result.measurements
             ],
         )
-        show_table(
-            "runs",
-            ["scene", "outcome", "wall time [s]", "steps", "particles", "pairs"],
-            [[r.name, r.outcome, r.seconds, r.steps, r.particles, r.pairs] for r in result.runs],
-        )
+        if result.runs:
+            show_table(
+                "runs",
+                ["scene", "outcome", "wall time [s]", "steps", "particles", "pairs"],
+                [
+                    [r.name, r.outcome, r.seconds, r.steps, r.particles, r.pairs]
+                    for r in result.runs
+                ],
+            )
         sources = {m.source for m in result.measurements if m.source}
         for source in sorted(sources):
             say(f"reference: {source}")
@@ -141,7 +145,8 @@ def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bo
             say(f"picture: {path}")
         for path in result.tables:
             say(f"data: {path}")
-        say(f"records: {folder}/*.h5 (ParaView opens them; so does: solidsph plot FILE)")
+        if result.runs:
+            say(f"records: {folder}/*.h5 (ParaView opens them; so does: solidsph plot FILE)")
         say("verdict: " + ("as the source predicts" if result.passed else "NOT as predicted"))
     if not result.passed:
         raise SystemExit(1)

@@ -11,10 +11,12 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
 
+import attrs
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_array, kron
 
-from solidsph.arrays import Array, Indices, Mask, Vector
+from solidsph.arrays import Array, Indices, Mask, Scalar, Vector
 from solidsph.interfaces.condition import (
     ExtensionCondition,
     ForceCondition,
@@ -135,6 +137,55 @@ class PointwiseForce(ForceCondition):
         x, v = positions[self.particles], velocities[self.particles]
         found = self.force(x.T, v.T, self.values.T)
         return np.column_stack([np.broadcast_to(one, len(x)) for one in found])
+
+
+@attrs.frozen(eq=False)
+class PairTable:
+    """Pairs of particles, each both ways, and numbers that belong to them."""
+
+    starts: Indices  # (n + 1,) those of particle p stand at starts[p] : starts[p + 1]
+    columns: NDArray[np.int32]  # (m,) q
+    values: Array  # (m, k) the same for (p, q) and (q, p)
+
+    @property
+    def rows(self) -> Indices:
+        """(m,) p."""
+        return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
+
+
+class PairForce(ForceCondition):
+    """Forces along the line between two particles, opposite at its ends.
+
+    They keep momentum and angular momentum to rounding whatever the formula is.
+    """
+
+    @property
+    @abstractmethod
+    def pairs(self) -> PairTable:
+        """Which pairs, of all n particles."""
+
+    @staticmethod
+    @abstractmethod
+    def pull(offset: Vector, velocity: Vector, values: Vector) -> Scalar:
+        """Force on p over the offset x_q - x_p that it is along [N/m]; pointwise.
+
+        Args:
+            offset: x_q - x_p [m].
+            velocity: v_q - v_p [m/s].
+            values: the pair's numbers.
+        """
+
+    @property
+    def particles(self) -> Indices:
+        return np.arange(len(self.pairs.starts) - 1)
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        p, q = self.pairs.rows, self.pairs.columns
+        offsets = positions[q] - positions[p]
+        pulls = self.pull(offsets.T, (velocities[q] - velocities[p]).T, self.pairs.values.T)
+        count = len(positions)
+        along = (np.bincount(p, pulls * one, count) for one in offsets.T)
+        return np.column_stack(list(along))
 
 
 class MismatchForce(ForceCondition):

@@ -29,7 +29,7 @@ class Effect(ABC):
         """Arrays that it keeps, by name, in bytes."""
 
     @abstractmethod
-    def damping_rate(self) -> float:
+    def damping_rate(self, bodies: Sequence[Body]) -> float:
         """Largest rate at which it damps velocities [1/s], for the stable step; 0 if none."""
 
     @abstractmethod

@@ -93,7 +93,9 @@ def critical_step(simulation: Simulation, state: State | None = None) -> StableS
     spacing, for which this is the true margin.
     """
     frequency = highest_frequency(simulation, state)
-    rate = sum(effect.damping_rate() for effect in simulation.effects.values())
+    rate = sum(
+        effect.damping_rate(simulation.setting.bodies) for effect in simulation.effects.values()
+    )
     limit = simulation.integrator.stability_limit
     total = frequency + rate
     return StableStep(

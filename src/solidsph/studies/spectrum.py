@@ -17,7 +17,7 @@ from solidsph.particles import State
 
 # Differences over this part of a spacing: the fourth order formula's error, (step / spacing)^4,
 # then stands near the rounding of the accelerations.
-_RELATIVE_STEP = 1e-3
+RELATIVE_STEP = 1e-3
 
 MOST_FREEDOMS = 4000
 """Degrees of freedom beyond which the dense eigenvalue problem would take minutes."""
@@ -68,7 +68,7 @@ def stiffness(dynamics: Dynamics, state: State) -> tuple[Array, Mask]:
 
     columns = []
     for particle, axis in np.argwhere(free):
-        h = _RELATIVE_STEP * particles.spacings[particle]
+        h = RELATIVE_STEP * particles.spacings[particle]
         values = []
         for k in (-2, -1, 1, 2):
             moved = state.positions.copy()

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
+from numpy.typing import NDArray
 
 from solidsph.arrays import Array, Indices
 from solidsph.engines.compiled.chain import chain
@@ -22,6 +23,7 @@ from solidsph.engines.compiled.vectors import ROW, moved
 from solidsph.interfaces.condition import ForceCondition
 from solidsph.interfaces.declared import (
     MismatchForce,
+    PairForce,
     PointwiseForce,
     ScheduledForce,
 )
@@ -48,6 +50,15 @@ class Pointwise(NamedTuple):
 
     reference: Array  # (n, d) X [m]
     values: Array  # (k, m)
+
+
+class Paired(NamedTuple):
+    """Forces by a formula of pairs."""
+
+    reference: Array  # (n, d) X [m]
+    starts: Indices
+    columns: NDArray[np.int32]
+    values: Array  # (m, k)
 
 
 class Mismatched(NamedTuple):
@@ -85,6 +96,13 @@ def load_pass(load: ForceCondition, reference: Array, threaded: bool) -> LoadPas
             each = chain(tuple(body_sweep(one.sweep) for one in sweeps))
             account = _accounted(_scheduled(d), d, threaded)
             return LoadPass(_mismatch(each, account), lambda times: own)
+        case PairForce():
+            table = load.pairs
+            count = table.values.shape[1]
+            vector = numbers_type(d)
+            pull = compiled_function(load.pull, vector, vector, numbers_type(count))
+            paired = Paired(reference, table.starts, table.columns, table.values)
+            return LoadPass(_accounted(_paired(pull, d, count), d, threaded), lambda times: paired)
         case PointwiseForce():
             values = np.ascontiguousarray(load.values)
             count = values.shape[1]
@@ -141,6 +159,27 @@ def _mismatch(each: Any, account: Any) -> Any:
         account(Load(load.particles, load.before, load.work, own.now), 0, u, v, path, total)
 
     return apply
+
+
+@cache
+def _paired(pull: Any, dimension: int, count: int) -> Any:
+    row = ROW[dimension]
+
+    @njit
+    def fill(own, step, m, p, u, v, force):
+        X_p, u_p, v_p = row(own.reference, p), row(u, p), row(v, p)
+        force[:] = 0.0
+        for k in range(own.starts[p], own.starts[p + 1]):
+            q = own.columns[k]
+            # Differences first: the offset of q from p is then minus that of p from q to the bit.
+            apart = moved(row(own.reference, q), -1.0, X_p)
+            offset = moved(apart, 1.0, moved(row(u, q), -1.0, u_p))
+            velocity = moved(row(v, q), -1.0, v_p)
+            s = pull(offset, velocity, to_fixed_tuple(own.values[k], count))
+            for i in range(dimension):
+                force[i] += s * offset[i]
+
+    return fill
 
 
 def _sweeps(operator: MismatchOperator) -> MismatchSweeps:
