@@ -11,8 +11,11 @@ import numpy as np
 from solidsph.arrays import Array
 from solidsph.builder import Builder
 from solidsph.errors import SceneError
+from solidsph.interfaces.case import Measurement
+from solidsph.results.pictures import largest_principal
 from solidsph.results.record import Record
 from solidsph.scene import PartLike
+from solidsph_builtin.cases._compare import FINISHED
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 
 MATERIAL = NeoHookean(youngs_modulus=70e6, poissons_ratio=0.49, density=1000.0)
@@ -23,6 +26,7 @@ MATERIAL = NeoHookean(youngs_modulus=70e6, poissons_ratio=0.49, density=1000.0)
 _RATIO, _TRACTION = 0.2, 5e6
 EXTENSION = 0.065058  # mean u_x of the loaded edge over W, at rest
 PEAK = 16.74e6  # largest principal Cauchy stress, at (0, a), at rest [Pa]
+NEAR_PEAK = 1.5  # [spacings]: the particle at (0, a), or one beside it
 SOURCE = "finite elements of a quarter of the sheet, the same law and dead traction"
 
 
@@ -127,6 +131,25 @@ def at_hole(record: Record, radius: float, degrees: float) -> int:
     angle = np.radians(degrees)
     place = radius * np.array([np.cos(angle), np.sin(angle)])
     return int(np.argmin(np.linalg.norm(record.particles.positions - place, axis=1)))
+
+
+def peak_distance(record: Record, radius: float, known: bool) -> Measurement:
+    """How far from (0, a), where theory has it, the largest stress of the end is.
+
+    Args:
+        known: whether it is known to be there; if not, every distance passes.
+    """
+    stress = largest_principal(record.field("cauchy_stress")[-1])
+    place = record.particles.positions[np.argmax(stress)] - [0.0, radius]
+    away = float(np.linalg.norm(place) / record.particles.spacings[0])
+    near = away <= NEAR_PEAK
+    return Measurement(
+        quantity="largest stress at rest: distance from (0, a)",
+        value=away,
+        unit="spacings",
+        verdict=f"{'within' if near else 'NOT within'} {NEAR_PEAK:g} spacings",
+        passed=record.outcome == FINISHED and (near or not known),
+    )
 
 
 def crossing_time(width: float) -> float:

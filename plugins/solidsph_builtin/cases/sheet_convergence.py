@@ -25,12 +25,10 @@ from solidsph_builtin.cases._sheet import (
     check_hole,
     extensions,
     is_known,
+    peak_distance,
     quarter,
     rows_along,
 )
-
-# Where the peak may be: the particle at (0, a), or one beside it.
-_NEAR_PEAK = 1.5  # [spacings]
 
 
 @final
@@ -134,8 +132,7 @@ class SheetConvergence(Case):
     def _peak(self, record: Record, name: str, known: bool) -> Measurement:
         """The largest stress, and whether it is where it must be."""
         stress = largest_principal(record.field("cauchy_stress")[-1])
-        place = record.particles.positions[np.argmax(stress)] - [0.0, self.radius]
-        away = float(np.linalg.norm(place) / record.particles.spacings[0])
+        distance = peak_distance(record, self.radius, known)
         found = compared(
             record,
             f"{name}: largest principal Cauchy stress",
@@ -145,11 +142,11 @@ class SheetConvergence(Case):
             SOURCE,
             self.peak_tolerance,
         )
-        words = (found.verdict, f"{away:.1f} spacings from (0, a)")
+        words = (found.verdict, f"{distance.value:.1f} spacings from (0, a)")
         return attrs.evolve(
             found,
             verdict=", ".join(word for word in words if word),
-            passed=found.passed and (away <= _NEAR_PEAK or not known),
+            passed=found.passed and distance.passed,
         )
 
     def errors(self, records: Mapping[str, Record], name: str) -> Array:

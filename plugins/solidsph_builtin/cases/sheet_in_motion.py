@@ -29,24 +29,28 @@ from solidsph_builtin.cases._sheet import (
     crossing_time,
     extensions,
     is_known,
+    peak_distance,
     quarter,
 )
 
 SUDDEN, RAMPED, REST = "sudden", "ramped", "rest"
 
-# Of the same sheet suddenly loaded and undamped, by finite elements and by spectral ones.
-_FIRST_MAXIMUM = 0.1152  # mean u_x of the loaded edge over W
-_ITS_TIME = 9.61  # [W / c_p]
-# Largest principal Cauchy stress in 20 W / c_p [Pa]: 41.78 and 41.70 MPa on 80 and 168 elements.
-_LARGEST = 41.7e6
+# Of the same sheet suddenly loaded and undamped, by finite elements and by spectral ones
+# (tests/spectral_sheet.py).
+FIRST_MAXIMUM = 0.1152  # mean u_x of the loaded edge over W
+ITS_TIME = 9.61  # [W / c_p]
+# Largest principal Cauchy stress in 20 W / c_p [Pa]. Fronts are jumps, and what they add at the
+# hole depends on the mesh: 43.6, 42.0, 42.8 and 42.4 MPa on 72, 128, 200 and 288 elements.
+LARGEST = 42.5e6
 _SPECTRAL = "spectral elements of the fourth order, the same law and load, undamped"
 _WATCHED = 20.0  # [W / c_p]
 
 _KIRSCH = "Kirsch (1898): 3 at a small hole under a small load; twice that in one undamped mode"
+_NEWTON = "equilibrium of the same particles by Newton's method"
 _PAPER = "60 MPa"
 _STRESS = "cauchy_stress"
 
-# Of largest stresses at twenty particles to the width; half of it at forty.
+# Of largest stresses at twenty particles to the width.
 _PEAK_TOLERANCE = 0.15
 
 # At rest the motion that is left is exp(-damping / 2 * settling), some 1e-6, of the extension.
@@ -92,6 +96,7 @@ class SheetInMotion(Case):
     integrator: str = "central-difference"
     time_step_factor: float = number(default=0.3)  # of the CFL step; particles crowd as they move
     tolerance: float = number(default=0.02)  # largest error that passes [-]
+    peak_tolerance: float = number(default=0.1)  # of the stress at rest, as in `sheet-convergence`
 
     def __attrs_post_init__(self) -> None:
         for name, unit in (
@@ -162,7 +167,7 @@ class SheetInMotion(Case):
                 "sudden: first maximum of the loaded edge's mean u_x over W",
                 maximum / self.width,
                 "1",
-                _FIRST_MAXIMUM if known else None,
+                FIRST_MAXIMUM if known else None,
                 SOURCE,
                 tolerance,
             ),
@@ -171,7 +176,7 @@ class SheetInMotion(Case):
                 "sudden: time of it",
                 time,
                 "W/c_p",
-                _ITS_TIME if known else None,
+                ITS_TIME if known else None,
                 SOURCE,
                 tolerance,
             ),
@@ -189,7 +194,7 @@ class SheetInMotion(Case):
                 value=float(miss),
                 unit="1",
                 reference=0.0,
-                source="equilibrium of the same particles by Newton's method",
+                source=_NEWTON,
                 error=float(miss),
                 verdict="at rest" if miss <= _AT_REST else "NOT at rest",
                 passed=bool(miss <= _AT_REST) and _finished(ramped, rest),
@@ -199,7 +204,7 @@ class SheetInMotion(Case):
                 "overshoot: first maximum of u_x over that at rest",
                 maximum / still,
                 "1",
-                _FIRST_MAXIMUM / EXTENSION if known else None,
+                FIRST_MAXIMUM / EXTENSION if known else None,
                 SOURCE,
                 tolerance,
             ),
@@ -212,6 +217,7 @@ class SheetInMotion(Case):
         final = float(largest_principal(ramped.field(_STRESS)[-1])[top])
         watched = sudden.times <= (_WATCHED + 1e-6) * self.crossing
         largest = float(self.largest_stresses(sudden)[watched].max())
+        still = largest_principal(records[REST].field(_STRESS)[-1])
         at_rest = compared(
             ramped,
             "ramped and damped: principal Cauchy stress at (0, a)",
@@ -219,6 +225,15 @@ class SheetInMotion(Case):
             "MPa",
             1e-6 * PEAK if known else None,
             SOURCE,
+            self.peak_tolerance,
+        )
+        quasi_static = compared(
+            ramped,
+            "that over the same at equilibrium",
+            final / float(still[top]),
+            "1",
+            1.0,
+            _NEWTON,
             self.tolerance,
         )
         ever = compared(
@@ -226,12 +241,14 @@ class SheetInMotion(Case):
             f"sudden: largest principal Cauchy stress in {_WATCHED:g} W/c_p",
             1e-6 * largest,
             "MPa",
-            1e-6 * _LARGEST if known else None,
+            1e-6 * LARGEST if known else None,
             _SPECTRAL,
             _PEAK_TOLERANCE,
         )
         return [
             _said(at_rest, final),
+            quasi_static,
+            peak_distance(ramped, self.radius, known),
             _said(ever, largest),
             _beside_kirsch("at rest", final / self.traction, 3.0, ramped),
             _beside_kirsch("suddenly loaded", largest / self.traction, 6.0, sudden),
