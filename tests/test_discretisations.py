@@ -665,28 +665,28 @@ QUARTER = Difference(of=Box([1.0, 1.0]), minus=Disc(0.3))
 
 
 def test_jittered_moves_what_is_inside_within_the_amplitude_and_nothing_else() -> None:
-    given = ConformingLattice().particles(QUARTER, 0.05)
+    regular = ConformingLattice().particles(QUARTER, 0.05)
     one, same, other = (
         Jittered(ConformingLattice(), 0.25, seed).particles(QUARTER, 0.05) for seed in (3, 3, 4)
     )
     np.testing.assert_array_equal(one.positions, same.positions)
-    inside = given.tags["interior"]
-    np.testing.assert_array_equal(one.positions[~inside], given.positions[~inside])
+    inside = regular.tags["interior"]
+    np.testing.assert_array_equal(one.positions[~inside], regular.positions[~inside])
     assert (one.positions[inside] != other.positions[inside]).all()
-    moved = (one.positions - given.positions)[inside] / given.spacings[inside, None]
-    # Uniform: the extremes are nearly reached, the variance is that of the distribution; 638
+    moved = (one.positions - regular.positions)[inside] / regular.spacings[inside, None]
+    # Uniform: the extremes are nearly reached, the variance is that of the distribution; 666
     # numbers give it to some 3 per cent.
     assert 0.24 < np.abs(moved).max() <= 0.25
     assert moved.std() == pytest.approx(0.25 / math.sqrt(3.0), rel=0.1)
-    for name, tag in given.tags.items():
+    for name, tag in regular.tags.items():
         np.testing.assert_array_equal(one.tags[name], tag)
-    np.testing.assert_array_equal(one.area_vectors, given.area_vectors)
+    np.testing.assert_array_equal(one.area_vectors, regular.area_vectors)
 
 
 def test_jittered_by_nothing_is_what_it_was_given() -> None:
-    for given in (ConformingLattice(), Lattice(on_boundary=True)):
-        regular = given.particles(QUARTER, 0.1)
-        still = Jittered(given, 0.0, seed=1).particles(QUARTER, 0.1)
+    for arrangement in (ConformingLattice(), Lattice(on_boundary=True)):
+        regular = arrangement.particles(QUARTER, 0.1)
+        still = Jittered(arrangement, 0.0, seed=1).particles(QUARTER, 0.1)
         np.testing.assert_array_equal(still.positions, regular.positions)
         assert still.volumes.sum() == pytest.approx(regular.volumes.sum(), rel=1e-12)
 
@@ -706,10 +706,10 @@ def test_volumes_of_jittered_particles_follow_them() -> None:
 def test_jittered_particles_stay_inside_curved_shapes(seed: int) -> None:
     """Also where those next to the boundary, which own no surface, would cross it."""
     for shape in (QUARTER, Annulus(0.5, 1.0), Ball(0.6)):
-        given = ConformingLattice().particles(shape, 0.11)
+        regular = ConformingLattice().particles(shape, 0.11)
         particles = Jittered(ConformingLattice(), 0.49, seed).particles(shape, 0.11)
         inside = particles.tags["interior"]
-        assert (particles.positions[inside] != given.positions[inside]).any(axis=1).all()
+        assert (particles.positions[inside] != regular.positions[inside]).any(axis=1).all()
         assert (shape.signed_distance(particles.positions[inside]) <= 0.0).all()
         assert (particles.volumes > 0.0).all()
 
