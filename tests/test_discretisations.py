@@ -18,6 +18,7 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
 from solidsph.particles import Particles
+from solidsph_builtin.discretisations._noise import moved_inside
 from solidsph_builtin.discretisations.conforming_lattice import ConformingLattice
 from solidsph_builtin.discretisations.jittered import Jittered
 from solidsph_builtin.discretisations.jittered_lattice import JitteredLattice
@@ -712,6 +713,14 @@ def test_jittered_particles_stay_inside_curved_shapes(seed: int) -> None:
         assert (particles.positions[inside] != regular.positions[inside]).any(axis=1).all()
         assert (shape.signed_distance(particles.positions[inside]) <= 0.0).all()
         assert (particles.volumes > 0.0).all()
+
+
+def test_a_jitter_that_would_leave_the_shape_is_halved_until_it_does_not() -> None:
+    given = np.array([[0.25], [0.5], [0.75], [0.0]])
+    wanted = np.array([[-0.5], [0.25], [1.5], [-0.125]])
+    # Halved once to touch the end, not at all, three times; no part of the last stays inside.
+    expected = [[0.0], [0.75], [0.9375], [0.0]]
+    np.testing.assert_array_equal(moved_inside(Interval(1.0), given, wanted), expected)
 
 
 # Input -------------------------------------------------------------------------------------------

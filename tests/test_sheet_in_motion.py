@@ -194,8 +194,9 @@ def test_first_maximum_sees_through_short_waves() -> None:
     assert time == pytest.approx(np.pi / 0.4, rel=0.01)
     assert value == pytest.approx(2.0, abs=0.003)
     # A second swing that goes further is none of its business.
-    further = smooth * (1.0 + 0.5 * (times > 11.0)) * (1.0 - 0.9 * (abs(times - 11.0) < 1.0))
-    assert first_maximum(times, further)[0] == pytest.approx(np.pi / 0.4, rel=1e-2)
+    times = np.linspace(0.0, 30.0, 3001)
+    further = (1.0 - np.cos(0.4 * times)) * (1.0 + 0.5 * (times > 2.0 * np.pi / 0.4))
+    assert first_maximum(times, further)[0] == pytest.approx(np.pi / 0.4, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -241,11 +242,11 @@ def test_spectral_elements_give_the_references_of_the_swing() -> None:
 
 @pytest.mark.validation
 def test_spectral_elements_give_the_references_at_rest() -> None:
-    # Nearly critically damped: what is left after 40 crossings is exp(-0.325 40) = 2e-6.
-    one = swing(8, 50.0, ramp=10.0, damping=0.65)
+    # What is left after 50 crossings is exp(-0.25 50) = 4e-6 of it.
+    one = swing(6, 60.0, ramp=10.0, damping=0.5)
     assert one.extensions[-1] == pytest.approx(EXTENSION, abs=1e-6)
     # Stresses at nodes converge more slowly: 16.82 MPa on 72 elements, 16.76 on 128.
-    assert one.at_top[-1] == pytest.approx(PEAK, rel=2e-3)
+    assert one.at_top[-1] == pytest.approx(PEAK, rel=6e-3)
     assert one.largest[-1] == one.at_top[-1]
 
 

@@ -49,8 +49,8 @@ def draw_problem(record: Record, sheet: Quarter, path: Path) -> None:
         )
     words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 10}
     axes.text(1.24, 0.5, f"traction {1e-6 * sheet.traction:g} MPa", rotation=90, **words)
-    axes.text(-0.06, 0.6, "symmetry", rotation=90, **words)
-    axes.text(0.6, -0.06, "symmetry", **words)
+    axes.text(-0.06, 0.5 * (1.0 + a), "symmetry", rotation=90, **words)
+    axes.text(0.5 * (1.0 + a), -0.06, "symmetry", **words)
     axes.text(0.5, 1.05, "free", **words)
     axes.text(0.5 * a, -0.06, f"a = {a:g} W", **words)
     axes.annotate("", (a, 0.0), (0.0, 0.0), arrowprops={"arrowstyle": "<->", "color": "0.3"})
