@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 EXAMPLE := plugins/examples/solidsph-wendland
 
-.PHONY: demo test validate bench bench-page lint format clean
+.PHONY: demo test validate gallery bench bench-page lint format clean
 
 demo: $(STAMP)  ## the paper's headline experiment: table, record and picture
 	$(BIN)/solidsph run tensile-instability
@@ -22,6 +22,9 @@ bench: $(STAMP)  ## against a plain C loop, whole steps, memory, throughput alon
 
 bench-page: $(STAMP)  ## the same, written to the documentation
 	$(BIN)/python benchmarks/bench.py --write docs/benchmarks.md
+
+gallery: $(STAMP)  ## the figures of the paper, written to the documentation
+	$(BIN)/solidsph reproduce --page docs/gallery.md
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -51,6 +51,18 @@ def test_the_readmes_python_runs(tmp_path, monkeypatch) -> None:
     assert (tmp_path / "results/plate/record.h5").exists()
 
 
+def test_what_the_reading_of_the_paper_names_is_there() -> None:
+    text = (ROOT / "docs/reading-the-paper.md").read_text()
+    folder = ROOT
+    for name in re.findall(r"`([\w/.-]+\.py)`", text):
+        path = ROOT / name if "/" in name else folder / name
+        assert path.exists(), name
+        folder = path.parent  # a name without a folder is beside the one before
+    cases = re.findall(r"the case `([\w-]+)`|solidsph run ([\w-]+)", text)
+    assert cases
+    assert {one or other for one, other in cases} <= set(registry.names("cases"))
+
+
 def test_every_verb_is_in_the_readme() -> None:
     from solidsph.cli import VERBS
 

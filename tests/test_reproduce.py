@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import ClassVar
 
@@ -13,6 +14,7 @@ from matplotlib.figure import Figure
 
 from solidsph import SceneError, registry
 from solidsph.interfaces.case import Case, Measurement
+from solidsph.studies.gallery import write_gallery
 from solidsph.studies.reproduce import figures, reproduce
 from tests.test_cli import solidsph
 
@@ -23,7 +25,7 @@ class Straight(Case):
 
     title: ClassVar[str] = "a straight line"
     source: ClassVar[str] = "by eye"
-    figures: ClassVar[tuple[str, ...]] = ("fig-3", "fig-12")
+    figures: ClassVar[tuple[str, ...]] = ("fig-3", "fig-12", "section-6-line")
 
     def scenes(self):
         return {}
@@ -32,7 +34,8 @@ class Straight(Case):
         return [Measurement("slope", 1.0, "1", 1.0, paper="one", error=0.0)]
 
     def draw(self, records, folder: Path):
-        paths = [folder / "fig-3-line.png", folder / "fig-12-line.png", folder / "extra.png"]
+        names = "fig-3-line", "section-6-line", "fig-12-line", "section-6-lines", "extra"
+        paths = [folder / f"{name}.png" for name in names]
         for path in paths:
             folder.mkdir(parents=True, exist_ok=True)
             Figure(figsize=(1.0, 1.0)).savefig(path)
@@ -60,10 +63,21 @@ def test_pictures_of_the_figures_asked_for_and_all_data(tmp_path: Path) -> None:
     assert made.sheet is not None
     assert made.sheet.exists()
     every = reproduce([], tmp_path, silent)
-    assert [path.name for path in every.pictures] == ["fig-3-line.png", "fig-12-line.png"]
+    assert [path.stem for path in every.pictures] == ["fig-3-line", "fig-12-line", "section-6-line"]
     (table,) = every.results["straight"].tables
     assert table.read_text().splitlines()[0] == "x [m],y [m]"
     assert np.loadtxt(table, delimiter=",", skiprows=1)[:, 1] == pytest.approx([0, 1 / 3, 2 / 3])
+
+
+@pytest.mark.usefixtures("only_straight")
+def test_the_gallery_shows_pictures_and_numbers(tmp_path: Path) -> None:
+    page = tmp_path / "docs" / "gallery.md"
+    write_gallery(reproduce([], tmp_path, silent), page)
+    text = page.read_text()
+    for path in re.findall(r"\]\((.*?)\)", text):
+        assert (page.parent / path).exists()
+    assert text.count("![") == 5
+    assert "| slope | one | 1 | 1 | 1 | 0 % |" in text
 
 
 @pytest.mark.usefixtures("only_straight")
@@ -74,7 +88,9 @@ def test_an_unknown_figure_names_the_nearest(tmp_path: Path) -> None:
 
 def test_every_figure_has_one_case_and_the_list_shows_it(tmp_path: Path) -> None:
     known = figures()
-    assert list(known) == sorted(known, key=lambda name: int(name.removeprefix("fig-")))
+    numbered = [name for name in known if name.startswith("fig-")]
+    assert numbered == sorted(numbered, key=lambda name: int(name.removeprefix("fig-")))
+    assert [*numbered, *sorted(set(known) - set(numbered))] == list(known)
     listed = json.loads(solidsph("reproduce", "--list", "--json", cwd=tmp_path).stdout)
     assert {row["figure"]: row["case"] for row in listed["figures"]} == known
     wrong = solidsph("reproduce", "fig-99", cwd=tmp_path)

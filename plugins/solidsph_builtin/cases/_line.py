@@ -10,10 +10,11 @@ import attrs
 import numpy as np
 from scipy.sparse import csr_array
 
-from solidsph.arrays import Array, Mask
+from solidsph.arrays import Array, Indices, Mask
 from solidsph.builder import Builder
 from solidsph.engines.matrix import operators
 from solidsph.errors import SceneError
+from solidsph.setting import Setting
 from solidsph.smoothing import SmoothingKernel
 
 LENGTH = 1.0  # of the range that is looked at [m]
@@ -31,18 +32,26 @@ class Line:
     kernel: SmoothingKernel
     smoothing: csr_array  # (n, n), <f> = W f
     gradient: csr_array  # (n, n), <df/dX> = X_1 f [1/m]
+    setting: Setting  # of the same particles, in its own order
+    order: Indices  # (n,) where they are in it
 
 
-def complete_line(kernel: str, cover: float, cells: int, *, gradient: str = "standard") -> Line:
-    """Particles from 0 to 1, on both ends, with ghosts enough for a gradient of a gradient."""
-    ghosts = 2 * ceil(cover)
+def complete_line(
+    kernel: str, cover: float, cells: int, *, gradient: str = "standard", supports: int = 2
+) -> Line:
+    """Particles from 0 to 1, on both ends, with ghosts beyond as far as so many supports.
+
+    By default they are enough for a gradient of a gradient.
+    """
+    ghosts = supports * ceil(cover)
     arrangement = {"type": "lattice", "on_boundary": True, "ghosts": ghosts}
     return line(kernel, cover, LENGTH / cells, arrangement, gradient=gradient)
 
 
-def bare_line(kernel: str, cover: float, cells: int) -> Line:
+def bare_line(kernel: str, cover: float, cells: int, *, gradient: str = "standard") -> Line:
     """The same without extra particles; the first and the last have half a cell each."""
-    return line(kernel, cover, LENGTH / cells, {"type": "lattice", "on_boundary": True})
+    arrangement = {"type": "lattice", "on_boundary": True}
+    return line(kernel, cover, LENGTH / cells, arrangement, gradient=gradient)
 
 
 def whole_line(kernel: str, cover: float, cells: int) -> Line:
@@ -106,7 +115,20 @@ def line(
         kernel=body.smoothing,
         smoothing=csr_array(setting.smoothing_matrix()[order][:, order]),
         gradient=csr_array(operators(body, body.pairs()).gradient[order][:, order]),
+        setting=setting,
+        order=order,
     )
+
+
+def left_by_the_cut(line: Line) -> tuple[float, float]:
+    """How much <x'> and <1> hang on whether neighbours at just the support radius count.
+
+    That is decided by rounding, and shows only if the kernel is cut where it is not zero.
+    """
+    H = line.kernel.support_radius
+    within = np.array([np.nextafter(H, 0.0)])
+    slope = 2.0 * H * line.spacing * abs(float(line.kernel.slope(within)[0]))
+    return slope, 2.0 * line.spacing * float(line.kernel.value(within)[0])
 
 
 def check_covers(case: str, covers: object) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import ceil, cos, cosh, nan, pi, sin, sinh, sqrt
 from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -55,6 +55,11 @@ class CantileverPlate(Case):
 
     title: ClassVar[str] = "An oscillating cantilever plate"
     source: ClassVar[str] = "Landau & Lifshitz, Theory of Elasticity; Gray, Monaghan & Swift (2001)"
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "across": (5, 7, 11, 15),
+        "gradient": ("consistent", "quadratic", "corrected"),
+        "cover": (1.8, 2.2, 2.6),
+    }
 
     across: int = 20  # particles across the plate
     poissons_ratio: float = number(default=0.3975)

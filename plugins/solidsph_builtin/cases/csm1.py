@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 
@@ -28,6 +28,11 @@ class Csm1(Case):
 
     title: ClassVar[str] = "Turek and Hron's beam at rest (CSM1)"
     source: ClassVar[str] = "Turek & Hron (2006)"
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "across": (5, 9, 13, 17),
+        "gradient": ("consistent", "quadratic", "corrected"),
+        "cover": (2.2, 2.6, 3.0),
+    }
 
     clamp: str = "arc"  # or "straight", whose reference is our own
     across: int = 9  # particles across the beam

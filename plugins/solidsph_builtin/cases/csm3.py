@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -41,6 +41,11 @@ class Csm3(Case):
 
     title: ClassVar[str] = "Turek and Hron's beam in motion (CSM3)"
     source: ClassVar[str] = "Turek & Hron (2006)"
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "across": (3, 5, 7, 9),
+        "gradient": ("consistent", "quadratic", "corrected"),
+        "cover": (2.2, 2.6, 3.0),
+    }
 
     clamp: str = "arc"  # or "straight", whose reference is our own
     across: int = 5  # particles across the beam
@@ -51,7 +56,7 @@ class Csm3(Case):
     hourglass: float = number(default=0.0)  # strength [-]; 0 names none
     engine: str = "auto"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.7)  # of the CFL step
+    time_step_factor: float = number(default=0.6)  # of the CFL step
     tolerance: float = number(default=0.01)  # largest error that passes [-]
 
     def __attrs_post_init__(self) -> None:

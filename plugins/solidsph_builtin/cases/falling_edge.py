@@ -19,6 +19,7 @@ from solidsph_builtin.cases._compare import closed_form
 from solidsph_builtin.cases._line import LENGTH, Line, check_covers, complete_line
 from solidsph_builtin.cases._moments import Moments, of_lattice
 from solidsph_builtin.cases._scheme import check_count
+from solidsph_builtin.cases._slopes import SlopeOfEdge
 
 GRADIENTS = ("standard", "corrected")
 
@@ -71,6 +72,10 @@ class FallingEdge(Case):
                     f"case 'falling-edge': a width must be odd and at most cells = {self.cells}, "
                     f"got {width}; then the kinks are at particles"
                 )
+
+    def priced(self) -> Case:
+        """One slope by one cover."""
+        return SlopeOfEdge(kernel=self.kernel)
 
     def scenes(self) -> Mapping[str, Scene]:
         return {}

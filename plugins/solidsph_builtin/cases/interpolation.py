@@ -22,10 +22,12 @@ from solidsph_builtin.cases._line import (
     bare_line,
     check_covers,
     complete_line,
+    left_by_the_cut,
     whole_line,
 )
 from solidsph_builtin.cases._moments import Moments, of_lattice
 from solidsph_builtin.cases._scheme import check_count
+from solidsph_builtin.cases._slopes import SlopeOfQuartic
 
 # Ismail & Reddy, section 3, after Zhang & Batra (2004).
 F = Polynomial([-0.5, 1.0]) ** 4
@@ -51,7 +53,7 @@ class Interpolation(Case):
 
     title: ClassVar[str] = "Interpolation of a quartic and its derivatives"
     source: ClassVar[str] = "Ismail & Reddy, section 3, Figs. 3 to 5, eq. 13"
-    figures: ClassVar[tuple[str, ...]] = ("fig-3", "fig-4", "fig-5")
+    figures: ClassVar[tuple[str, ...]] = ("fig-3", "fig-4", "fig-5", "eq-13")
 
     kernel: str = "modified-mollifier"
     covers: Sequence[float] = (1.5, 2.5, 3.5, 4.5, 5.5)  # [spacings]
@@ -67,6 +69,10 @@ class Interpolation(Case):
                 f"case 'interpolation': fine must be at least the largest cover, so that a support "
                 f"leaves one end only, got fine = {self.fine} and a cover of {max(self.covers):g}"
             )
+
+    def priced(self) -> Case:
+        """One slope by one cover."""
+        return SlopeOfQuartic(kernel=self.kernel)
 
     def scenes(self) -> Mapping[str, Scene]:
         return {}
@@ -199,7 +205,7 @@ class Interpolation(Case):
             x = plain.X - plain.X[middle]
             slope = (plain.gradient @ x)[middle]
             mass = (plain.smoothing @ np.ones(len(plain.X)))[middle]
-            cut_slope, cut_mass = _left_by_the_cut(plain)
+            cut_slope, cut_mass = left_by_the_cut(plain)
             cut_slope /= abs(moments.slope[1])
             says = "1.5 spacings under-predict the gradient" if cover < 2.0 else ""
             for label, value, reference, allowed in (
@@ -220,17 +226,6 @@ class Interpolation(Case):
                     paper="" if label == "corrected" else says,
                     allowed=ROUNDING + allowed,
                 )
-
-
-def _left_by_the_cut(line: Line) -> tuple[float, float]:
-    """How much <x'> and <1> hang on whether neighbours at just the support radius count.
-
-    That is decided by rounding, and shows only if the kernel is cut where it is not zero.
-    """
-    H = line.kernel.support_radius
-    within = np.array([np.nextafter(H, 0.0)])
-    slope = 2.0 * H * line.spacing * abs(float(line.kernel.slope(within)[0]))
-    return slope, 2.0 * line.spacing * float(line.kernel.value(within)[0])
 
 
 def approximated(line: Line, order: int) -> Array:

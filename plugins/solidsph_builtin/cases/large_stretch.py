@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf
 from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -63,6 +63,11 @@ class LargeStretch(Case):
     title: ClassVar[str] = "A bar and strips pulled to six times their length"
     source: ClassVar[str] = "Ismail & Reddy, section 5.3, Fig. 15"
     figures: ClassVar[tuple[str, ...]] = ("fig-15",)
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "particles": (16, 31, 61),
+        "gradient": ("consistent", "quadratic"),
+        "cover": (2.2, 2.5, 3.5),
+    }
 
     stretch: float = number(default=6.0)  # at the end [-]
     across: Sequence[float] = (0.75, 1.25, 1.5)  # stretches held across the pull of strips [-]
@@ -108,6 +113,10 @@ class LargeStretch(Case):
     def speed(self) -> float:
         """Of the pulled end [m/s]."""
         return (self.stretch - 1.0) * self.length / (self.transits * self.transit)
+
+    def priced(self) -> Case:
+        """The bar, without the strips."""
+        return attrs.evolve(self, across=())
 
     def scenes(self) -> Mapping[str, Scene]:
         moving = {"x": f"{self.speed / self.length!r}*X"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import nan
 from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -55,6 +55,12 @@ class NonlinearBar(Case):
 
     title: ClassVar[str] = "Waves of finite amplitude in a bar"
     source: ClassVar[str] = "Rankine-Hugoniot conditions and simple waves of Ismail & Reddy's law"
+    figures: ClassVar[tuple[str, ...]] = ("section-6-viscosity",)
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "particles": (51, 101, 201, 401),
+        "linear": (0.25, 0.5, 1.0),
+        "cover": (1.6, 2.2, 3.0),
+    }
 
     velocities: Sequence[float] = (0.1, 0.3, 0.5)  # of pushes and of pulls [confined wave speeds]
     particles: int = 201
@@ -98,6 +104,16 @@ class NonlinearBar(Case):
         signed = [v for velocity in self.velocities for v in (velocity, -velocity)]
         return {_name(v): self.wave(v) for v in signed}
 
+    def priced(self) -> Case:
+        """The shock and the fan of 0.3 c_p."""
+        return attrs.evolve(self, velocities=(0.3,))
+
+    def accuracy(self, measurements: Sequence[Measurement]) -> Measurement:
+        """The largest error of a profile."""
+        profiles = [m for m in measurements if "of the profile" in m.quantity]
+        worst = max(profiles, key=lambda m: m.value)
+        return attrs.evolve(worst, error=worst.value)
+
     def scenes(self) -> Mapping[str, Scene]:
         scenes = {}
         for name, wave in self.waves.items():
@@ -134,7 +150,9 @@ class NonlinearBar(Case):
     def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
         from solidsph_builtin.cases._nonlinear_picture import draw_profiles, draw_speeds
 
-        profiles, speeds = folder / "nonlinear-bar.png", folder / "nonlinear-bar-speeds.png"
+        profiles, speeds = (
+            folder / f"section-6-viscosity-{name}.png" for name in ("profiles", "speeds")
+        )
         draw_profiles(self.waves, records, self.law, self.title, profiles)
         measured = {
             wave.velocity: half_speed(records[name], wave) for name, wave in self.waves.items()

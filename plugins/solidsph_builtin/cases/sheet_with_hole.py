@@ -56,6 +56,11 @@ class SheetWithHole(Case):
 
     title: ClassVar[str] = "A sheet with a hole, pulled"
     source: ClassVar[str] = "Ismail & Reddy, section 5.4, at rest; Kirsch (1898) for small loads"
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "spacing": (0.2, 0.1, 0.05, 1.0 / 30.0),
+        "gradient": ("consistent", "quadratic", "corrected"),
+        "cover": (2.2, 2.6, 3.0),
+    }
 
     hole_ratio: float = number(default=0.2)  # radius of the hole over W
     spacing: float = number(default=0.05)  # of particles [m]

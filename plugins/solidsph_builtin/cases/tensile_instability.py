@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf
 from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -64,6 +64,10 @@ class TensileInstability(Case):
     title: ClassVar[str] = "A bar in tension, perturbed: total against updated Lagrangian"
     source: ClassVar[str] = "Ismail & Reddy, section 5.2, Figs. 12 to 14"
     figures: ClassVar[tuple[str, ...]] = ("fig-12", "fig-13", "fig-14")
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "spacing": (5e-3, 2.5e-3, 1.25e-3),
+        "cover": (3.5, 5.5),
+    }
 
     stretch: float = number(default=1.2)  # of the finite perturbation [-]
     perturbation: float = number(default=0.05)  # of the displacement [-]
@@ -106,6 +110,10 @@ class TensileInstability(Case):
     def transit(self) -> float:
         """Time in which a small confined wave crosses the bar [s]."""
         return self.length / self.material.wave_speed
+
+    def priced(self) -> Case:
+        """At one stretch."""
+        return attrs.evolve(self, stretches=self.stretches[:1])
 
     def scenes(self) -> Mapping[str, Scene]:
         scenes = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import pi
 from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -49,6 +49,11 @@ class Upwinding(Case):
 
     title: ClassVar[str] = "Upwinding by a kernel that is not symmetric"
     source: ClassVar[str] = "Ismail & Reddy, section 6; the spectrum of the discrete bar"
+    figures: ClassVar[tuple[str, ...]] = ("section-6-upwinding",)
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "particles": (30, 60, 120),
+        "cover": (2.5, 3.5, 5.5),
+    }
 
     skews: Sequence[float] = (0.0, 0.25, 0.5, 0.75)
     particles: int = 60
@@ -63,6 +68,15 @@ class Upwinding(Case):
                 f"case 'upwinding': skews must hold 0, to compare with, and another, got "
                 f"{list(self.skews)}"
             )
+
+    def accuracy(self, measurements: Sequence[Measurement]) -> Measurement:
+        """How far the fastest wave is from what it should be, at the largest skew."""
+        return [m for m in measurements if m.error is not None][-1]
+
+    @property
+    def resolution(self) -> float:
+        """Over the length of the bar."""
+        return 1.0 / self.particles
 
     def scenes(self) -> Mapping[str, Scene]:
         return {}
@@ -114,7 +128,7 @@ class Upwinding(Case):
     def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
         from solidsph_builtin.cases._upwinding_picture import draw_modes
 
-        path = folder / "upwinding.png"
+        path = folder / "section-6-upwinding.png"
         draw_modes(self.curves(records)["upwinding"], _ALTERNATING, self.title, path)
         return [path]
 

@@ -135,20 +135,26 @@ class WaveBar(Case):
         """The solution of one scene; `left` tells what the left end is after the pulse."""
         return BarWaves(LENGTH, reading.speed, DENSITY, self.stress, pulse, left)
 
+    def priced(self) -> Case:
+        """The smooth pulse alone."""
+        from solidsph_builtin.cases._smooth_pulse import SmoothPulse  # which is made of this one
+
+        return SmoothPulse.of(self)
+
     def scenes(self) -> Mapping[str, Scene]:
         scenes = {}
         for reading in READINGS:
             for pulse in self.pulses:
-                loaded = self._loaded(reading, pulse, self.particles)
+                loaded = self.loaded(reading, pulse, self.particles)
                 scenes[f"{reading.name}-{pulse.name}"] = loaded.scene()
             viscous = with_viscosity(
-                self._loaded(reading, self.pulses[1], self.particles), self.linear, self.quadratic
+                self.loaded(reading, self.pulses[1], self.particles), self.linear, self.quadratic
             )
             scenes[f"{reading.name}-square-viscous"] = viscous.scene()
         scenes[_MOVED] = self._moved(self.pulses[0]).scene()
         scenes[_PAPER_SUMS] = self._paper_sums(self.pulses[1]).scene()
         for count in self.convergence:
-            scenes[_convergence_name(count)] = self._loaded(STRAIN, self.pulses[0], count).scene()
+            scenes[_convergence_name(count)] = self.loaded(STRAIN, self.pulses[0], count).scene()
         return scenes
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
@@ -195,7 +201,7 @@ class WaveBar(Case):
             return [histories, noise]
         converging = folder / "wave-bar-convergence.png"
         counts = list(self.convergence)
-        errors = [self._error(records[_convergence_name(count)]) for count in counts]
+        errors = [self.error(records[_convergence_name(count)]) for count in counts]
         draw_convergence(counts, errors, converging)
         return [histories, noise, converging]
 
@@ -213,7 +219,7 @@ class WaveBar(Case):
             tables[f"histories-{name}"] = _table(records[name], self.exact(reading, pulse, HELD))
         return tables
 
-    def _loaded(self, reading: Reading, pulse: Pulse, particles: int) -> Builder:
+    def loaded(self, reading: Reading, pulse: Pulse, particles: int) -> Builder:
         """The pulse as a traction: the normal of the left end points to the left."""
         return self._bar(reading, pulse, particles).boundary(
             "traction", where="left", traction={"x": f"{-self.stress!r}*{pulse.formula}"}
@@ -386,7 +392,7 @@ class WaveBar(Case):
     def _order(self, records: Mapping[str, Record]) -> list[Measurement]:
         counts = np.array(self.convergence)
         runs = [records[_convergence_name(count)] for count in self.convergence]
-        errors = np.array([self._error(record) for record in runs])
+        errors = np.array([self.error(record) for record in runs])
         found = [
             compared(
                 record,
@@ -418,7 +424,7 @@ class WaveBar(Case):
             ),
         ]
 
-    def _error(self, record: Record) -> float:
+    def error(self, record: Record) -> float:
         """Root mean square error of the smooth pulse's stress over all particles and times,
         relative to the root mean square of the exact."""
         exact = self.exact(STRAIN, self.pulses[0])

@@ -15,7 +15,9 @@ from solidsph.commands.console import ProgressObserver, progress, say, show_json
 
 @click.command()
 @click.argument("wanted", metavar="[FIGURE]...", nargs=-1)
-@click.option("--list", "listed", is_flag=True, help="List the figures and what shows them.")
+@click.option(
+    "--list", "listed", is_flag=True, help="List figures and passages, and what shows them."
+)
 @click.option(
     "--output",
     type=click.Path(path_type=Path),
@@ -23,12 +25,23 @@ from solidsph.commands.console import ProgressObserver, progress, say, show_json
     show_default=True,
     help="Folder for pictures, data and records.",
 )
+@click.option(
+    "--page",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write a page of text and pictures to this file too.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def reproduce(
-    wanted: tuple[str, ...], listed: bool, output: Path, as_json: bool, quiet: bool
+    wanted: tuple[str, ...],
+    listed: bool,
+    output: Path,
+    page: Path | None,
+    as_json: bool,
+    quiet: bool,
 ) -> None:
-    """Reproduce the figures of Ismail & Reddy: all of them, or those named, such as fig-11."""
+    """Reproduce the figures of Ismail & Reddy, and answer what they ask for: all, or those named,
+    such as fig-11."""
     from solidsph.studies.reproduce import figures
     from solidsph.studies.reproduce import reproduce as carry_out
 
@@ -43,6 +56,10 @@ def reproduce(
 
         made = carry_out(wanted, output, begin)
     seconds = clock.perf_counter() - begun
+    if page is not None:
+        from solidsph.studies.gallery import write_gallery
+
+        write_gallery(made, page)
     rows = [
         {
             "case": case,

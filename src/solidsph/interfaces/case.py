@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import attrs
 
@@ -43,8 +43,13 @@ class Case(ABC):
     source: ClassVar[str]
 
     figures: ClassVar[tuple[str, ...]] = ()
-    """Figures of the paper that it reproduces, such as "fig-11". The name of a picture begins with
-    that of its figure; one that shows several begins with all their numbers, "fig-13-14"."""
+    """Figures of the paper that it reproduces, such as "fig-11", and passages that it answers, such
+    as "section-6-viscosity". The name of a picture begins with that of its figure or passage; one
+    that shows several figures begins with all their numbers, "fig-13-14"."""
+
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {}
+    """Parameters to vary where accuracy is held against cost, each with the values to try. The
+    first one refines: its values go from coarse to fine."""
 
     @abstractmethod
     def scenes(self) -> Mapping[str, Scene]:
@@ -57,6 +62,21 @@ class Case(ABC):
     @abstractmethod
     def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
         """Write the case's pictures into `folder`; returns their paths."""
+
+    def priced(self) -> Case:
+        """What is run where accuracy is held against cost: itself, or what of it that takes."""
+        return self
+
+    def accuracy(self, measurements: Sequence[Measurement]) -> Measurement:
+        """The one of its measurements whose error is held against cost."""
+        return next(m for m in measurements if m.error is not None)
+
+    @property
+    def resolution(self) -> float:
+        """The smallest spacing of its particles [m], against which errors are held."""
+        return min(
+            body.spacing for scene in self.scenes().values() for body in scene.bodies.values()
+        )
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         """The data of its pictures, to be written as tables, by name."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import resource
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
@@ -18,6 +19,8 @@ from solidsph.interfaces.case import Case, Curves, Measurement
 from solidsph.results.record import Record
 from solidsph.simulation import Simulation
 
+FINISHED = "finished"
+
 
 @attrs.frozen
 class SceneRun:
@@ -25,8 +28,9 @@ class SceneRun:
 
     name: str
     record: Path
-    seconds: float
+    seconds: float  # wall time, building included [s]
     steps: int  # recorded steps in time, or load steps
+    evaluations: int  # of the forces, or of the tangent
     particles: int
     pairs: int
     outcome: str
@@ -48,27 +52,41 @@ class CaseResult:
         return all(m.passed for m in self.measurements)
 
 
-def run_case(
-    case: Case,
-    folder: Path,
-    *,
-    begin: Callable[[str, Simulation], Sequence[object]] = lambda name, simulation: (),
-) -> CaseResult:
-    """Run every scene of `case`, record it in `folder`, measure and draw.
+Begin = Callable[[str, Simulation], Sequence[object]]
+"""Called before each scene with its name; returns observers of its run."""
+
+
+def _unobserved(name: str, simulation: Simulation) -> Sequence[object]:
+    return ()
+
+
+def run_case(case: Case, folder: Path, *, begin: Begin = _unobserved) -> CaseResult:
+    """Run every scene of `case`, record it in `folder`, measure and draw."""
+    runs = run_scenes(case, folder, begin=begin)
+    with opened(runs) as records:
+        measurements = case.measure(records)
+        pictures = case.draw(records, folder)
+        tables = [
+            _written(folder / f"{name}.csv", curves)
+            for name, curves in case.curves(records).items()
+        ]
+    return CaseResult(measurements, runs, pictures, tables, peak_memory())
+
+
+def run_scenes(case: Case, folder: Path, *, begin: Begin = _unobserved) -> Sequence[SceneRun]:
+    """Run every scene of `case` and record it in `folder`.
 
     A scene that diverges, or finds no equilibrium, does not end the case: what it recorded is
     measured, because for some combinations of parts to diverge is the result.
-
-    Args:
-        begin: called before each scene; returns observers of its run.
     """
     runs = []
     for name, scene in case.scenes().items():
-        simulation = Builder(scene).build()
         path = folder / f"{name}.h5"
-        outcome, begun = "finished", clock.perf_counter()
+        outcome, begun = FINISHED, clock.perf_counter()
+        simulation = Builder(scene).build()
+        effort: Mapping[str, Any] = {}
         try:
-            carry_out(simulation, record=path, observers=begin(name, simulation))
+            effort = carry_out(simulation, record=path, observers=begin(name, simulation)).effort
         except (DivergedError, ConvergenceError) as cause:
             if not path.exists():  # it failed before there was anything to measure
                 raise
@@ -82,22 +100,20 @@ def run_case(
                 record=path,
                 seconds=seconds,
                 steps=steps,
+                evaluations=effort.get("iterations", steps),
                 particles=simulation.particles.count,
                 pairs=simulation.dynamics.internal.pair_count,
                 outcome=outcome,
             )
         )
+    return runs
+
+
+@contextmanager
+def opened(runs: Sequence[SceneRun]) -> Iterator[Mapping[str, Record]]:
+    """The records of `runs`, by scene."""
     with ExitStack() as stack:
-        records: Mapping[str, Record] = {
-            run.name: stack.enter_context(Record(run.record)) for run in runs
-        }
-        measurements = case.measure(records)
-        pictures = case.draw(records, folder)
-        tables = [
-            _written(folder / f"{name}.csv", curves)
-            for name, curves in case.curves(records).items()
-        ]
-    return CaseResult(measurements, runs, pictures, tables, peak_memory())
+        yield {run.name: stack.enter_context(Record(run.record)) for run in runs}
 
 
 def _written(path: Path, curves: Curves) -> Path:

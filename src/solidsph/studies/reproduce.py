@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
 
@@ -15,12 +15,9 @@ from matplotlib.image import imread
 from solidsph import registry
 from solidsph.errors import SceneError
 from solidsph.interfaces.case import Case
-from solidsph.simulation import Simulation
-from solidsph.studies.case_run import CaseResult, run_case
+from solidsph.studies.case_run import Begin, CaseResult, run_case
 
 _COLUMNS = 3  # of the contact sheet
-
-Begin = Callable[[str, Simulation], Sequence[object]]
 
 
 @attrs.frozen
@@ -38,7 +35,7 @@ class Reproduction:
 
 
 def figures() -> Mapping[str, str]:
-    """The case that reproduces each figure of the paper, in the order of the figures.
+    """The case that reproduces each figure or passage of the paper, figures first.
 
     Raises:
         SceneError: two cases claim one figure.
@@ -51,14 +48,14 @@ def figures() -> Mapping[str, str]:
                     f"cases {found[figure]!r} and {name!r} both reproduce {figure!r}; uninstall one"
                 )
             found[figure] = name
-    return dict(sorted(found.items(), key=lambda pair: _number(pair[0])))
+    return dict(sorted(found.items(), key=lambda pair: _place(pair[0])))
 
 
 def reproduce(wanted: Sequence[str], folder: Path, begin: Begin) -> Reproduction:
     """Run every case that shows one of the `wanted` figures, or any figure if there are none.
 
     Args:
-        wanted: names of figures, such as "fig-11".
+        wanted: names of figures or passages, such as "fig-11" or "section-6-viscosity".
         folder: where each case gets a folder of its own.
         begin: as in `run_case`.
 
@@ -77,20 +74,23 @@ def reproduce(wanted: Sequence[str], folder: Path, begin: Begin) -> Reproduction
         case: Case = registry.load("cases", name)()
         results[name] = run_case(case, folder / name, begin=begin)
     every = [path for result in results.values() for path in result.pictures]
-    shown = {path: numbers for path in every if (numbers := _numbers(path, chosen))}
-    pictures = sorted(shown, key=lambda path: (min(shown[path]), path.name))
+    shown = {path: names for path in every if (names := _shown(path, chosen))}
+    pictures = sorted(shown, key=lambda path: (min(map(_place, shown[path])), path.name))
     return Reproduction(results, pictures, _contact_sheet(pictures, folder) if pictures else None)
 
 
-def _number(figure: str) -> int:
-    return int(re.sub(r"\D", "", figure) or 0)
+def _place(name: str) -> tuple[bool, int, str]:
+    """Figures by their number, then the rest by name."""
+    figure = re.fullmatch(r"fig-(\d+)", name)
+    return figure is None, int(figure[1]) if figure else 0, name
 
 
-def _numbers(path: Path, chosen: Sequence[str]) -> set[int]:
-    """Numbers of the chosen figures that a picture shows: "fig-13-14-..." shows two."""
-    match = re.match(r"fig((?:-\d+)+)", path.name)
-    shown = {int(number) for number in match[1].split("-")[1:]} if match else set()
-    return shown & {_number(figure) for figure in chosen}
+def _shown(path: Path, chosen: Sequence[str]) -> set[str]:
+    """Those of the chosen that a picture shows: "fig-13-14-map.png" shows two figures."""
+    figures = re.match(r"fig((?:-\d+)+)(?:-|$)", path.stem)
+    if figures:
+        return {f"fig-{number}" for number in figures[1].split("-")[1:]} & set(chosen)
+    return {name for name in chosen if f"{path.stem}-".startswith(f"{name}-")}
 
 
 def _contact_sheet(pictures: Sequence[Path], folder: Path) -> Path:

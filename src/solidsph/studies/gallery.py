@@ -1,0 +1,44 @@
+"""The gallery: a page of what cases measured, with their pictures."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from solidsph import registry
+from solidsph.studies.case_run import CaseResult
+from solidsph.studies.reproduce import Reproduction
+
+
+def write_gallery(made: Reproduction, page: Path) -> None:
+    """Write a Markdown `page`, its pictures in a folder of the same name beside it."""
+    pictures = page.with_suffix("")
+    pictures.mkdir(parents=True, exist_ok=True)
+    for old in pictures.glob("*.png"):
+        old.unlink()
+    parts = [
+        "# Gallery\n\nThe figures of Ismail & Reddy, *Smoothed Particle Hydrodynamics for "
+        "Nonlinear Solid Mechanics*, as `solidsph reproduce` makes them, beside what theory says. "
+        "Written by `make gallery`; nothing here is edited by hand.\n"
+    ]
+    for name, result in made.results.items():
+        parts.append(_section(name, result, pictures))
+    page.write_text("\n".join(parts), encoding="utf-8")
+
+
+def _section(name: str, result: CaseResult, pictures: Path) -> str:
+    case = registry.load("cases", name)
+    lines = [f"## {case.title}", "", f"{case.source}. `solidsph run {name}`", ""]
+    for path in result.pictures:
+        shutil.copy(path, pictures / path.name)
+        lines += [f"![{path.stem}]({pictures.name}/{path.name})", ""]
+    lines += [
+        "| quantity | the paper | theory | measured | unit | error |",
+        "| --- | --- | ---: | ---: | --- | ---: |",
+    ]
+    for m in result.measurements:
+        theory = "" if m.reference is None else f"{m.reference:.5g}"
+        error = "" if m.error is None else f"{100.0 * m.error:.2g} %"
+        cells = (m.quantity, m.paper, theory, f"{m.value:.5g}", m.unit, error)
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join([*lines, ""])
