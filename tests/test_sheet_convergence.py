@@ -100,9 +100,16 @@ def test_arrangements_are_what_they_are_called() -> None:
     assert along.tags["rim"].sum() == 9  # half the side of the square before, four, twice, and one
 
 
+def test_what_is_held_against_cost_is_the_finest(
+    outcome: CaseResult, records: Mapping[str, Record]
+) -> None:
+    error = COARSE.accuracy(outcome.measurements).error
+    assert error == pytest.approx(COARSE.errors(records, NAMES[0])[-1])
+
+
 def test_pictures_and_tables(outcome: CaseResult, records: Mapping[str, Record]) -> None:
     (picture,) = outcome.pictures
-    assert picture.name == "sheet-convergence.png"
+    assert picture.name == "section-5.4-convergence.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
     (table,) = COARSE.curves(records).values()
     assert len(table) == 1 + 2 * len(NAMES)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -45,6 +45,11 @@ class SheetConvergence(Case):
     source: ClassVar[str] = (
         "Ismail & Reddy, section 5.4: a convergence analysis should be completed"
     )
+    figures: ClassVar[tuple[str, ...]] = ("section-5.4-convergence",)
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "across": ((5, 10), (10, 15), (15, 20), (20, 30)),
+        "gradient": ("consistent", "quadratic", "corrected"),
+    }
 
     hole_ratio: float = number(default=0.2)  # radius of the hole over W
     across: Sequence[int] = (20, 30, 40)  # spacings along W, growing
@@ -129,6 +134,11 @@ class SheetConvergence(Case):
                 measured.append(self._order(records, name))
         return measured
 
+    def accuracy(self, measurements: Sequence[Measurement]) -> Measurement:
+        """The displacement in rows along the hole, the finest ones."""
+        name, finest = next(iter(self.arrangements)), self.across[-1]
+        return next(m for m in measurements if m.quantity.startswith(f"{name}, W/{finest}: mean"))
+
     def _peak(self, record: Record, name: str, known: bool) -> Measurement:
         """The largest stress, and whether it is where it must be."""
         stress = largest_principal(record.field("cauchy_stress")[-1])
@@ -174,7 +184,7 @@ class SheetConvergence(Case):
     def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
         from solidsph_builtin.cases._convergence_picture import draw_convergence
 
-        path = folder / "sheet-convergence.png"
+        path = folder / "section-5.4-convergence.png"
         names = list(self.arrangements)
         known = is_known(self.hole_ratio, self.traction)
         draw_convergence(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -80,6 +80,10 @@ class SheetInMotion(Case):
     title: ClassVar[str] = "A sheet with a hole, in motion"
     source: ClassVar[str] = "Ismail & Reddy, section 5.4, Figs. 16 to 18"
     figures: ClassVar[tuple[str, ...]] = ("fig-16", "fig-17", "fig-18")
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "spacing": (0.2, 0.1, 1.0 / 15.0, 0.05),
+        "gradient": ("consistent", "quadratic", "corrected"),
+    }
 
     hole_ratio: float = number(default=0.2)  # radius of the hole over W
     spacing: float = number(default=0.05)  # of particles [m]
