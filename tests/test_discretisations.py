@@ -18,7 +18,9 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
 from solidsph.particles import Particles
+from solidsph_builtin.discretisations._noise import moved_inside
 from solidsph_builtin.discretisations.conforming_lattice import ConformingLattice
+from solidsph_builtin.discretisations.jittered import Jittered
 from solidsph_builtin.discretisations.jittered_lattice import JitteredLattice
 from solidsph_builtin.discretisations.lattice import Lattice
 from solidsph_builtin.discretisations.points import Points
@@ -53,6 +55,7 @@ ARRANGEMENTS: list[Discretisation] = [
     Lattice(on_boundary=True, ghosts=2),
     JitteredLattice(amplitude=0.3, seed=5, ghosts=1),
     ConformingLattice(),
+    Jittered(of=ConformingLattice(), amplitude=0.3, seed=5),
 ]
 
 
@@ -138,7 +141,14 @@ def test_same_input_gives_the_same_bits(shape: Shape, arrangement: Discretisatio
 
 
 @pytest.mark.parametrize(
-    "arrangement", [Lattice(), Lattice(True), JitteredLattice(0.4, 1), ConformingLattice()]
+    "arrangement",
+    [
+        Lattice(),
+        Lattice(True),
+        JitteredLattice(0.4, 1),
+        ConformingLattice(),
+        Jittered(ConformingLattice(), 0.4, 1),
+    ],
 )
 @pytest.mark.parametrize("shape", SHAPES, ids=name_of)
 @pytest.mark.parametrize("spacing", [0.1, 0.037])
@@ -650,6 +660,69 @@ def test_points_do_not_change_with_the_array_they_came_from() -> None:
     assert np.isfinite(points.particles(Interval(1.0), 0.5).positions).all()
 
 
+# Jittered ----------------------------------------------------------------------------------------
+
+QUARTER = Difference(of=Box([1.0, 1.0]), minus=Disc(0.3))
+
+
+def test_jittered_moves_what_is_inside_within_the_amplitude_and_nothing_else() -> None:
+    regular = ConformingLattice().particles(QUARTER, 0.05)
+    one, same, other = (
+        Jittered(ConformingLattice(), 0.25, seed).particles(QUARTER, 0.05) for seed in (3, 3, 4)
+    )
+    np.testing.assert_array_equal(one.positions, same.positions)
+    inside = regular.tags["interior"]
+    np.testing.assert_array_equal(one.positions[~inside], regular.positions[~inside])
+    assert (one.positions[inside] != other.positions[inside]).all()
+    moved = (one.positions - regular.positions)[inside] / regular.spacings[inside, None]
+    # Uniform: the extremes are nearly reached, the variance is that of the distribution; 666
+    # numbers give it to some 3 per cent.
+    assert 0.24 < np.abs(moved).max() <= 0.25
+    assert moved.std() == pytest.approx(0.25 / math.sqrt(3.0), rel=0.1)
+    for name, tag in regular.tags.items():
+        np.testing.assert_array_equal(one.tags[name], tag)
+    np.testing.assert_array_equal(one.area_vectors, regular.area_vectors)
+
+
+def test_jittered_by_nothing_is_what_it_was_given() -> None:
+    for arrangement in (ConformingLattice(), Lattice(on_boundary=True)):
+        regular = arrangement.particles(QUARTER, 0.1)
+        still = Jittered(arrangement, 0.0, seed=1).particles(QUARTER, 0.1)
+        np.testing.assert_array_equal(still.positions, regular.positions)
+        assert still.volumes.sum() == pytest.approx(regular.volumes.sum(), rel=1e-12)
+
+
+def test_volumes_of_jittered_particles_follow_them() -> None:
+    """In one dimension by hand: cells end half way to the neighbours."""
+    particles = Jittered(Lattice(on_boundary=True), 0.4, seed=2).particles(Interval(1.0), 0.1)
+    x = np.sort(particles.positions[:, 0])
+    borders = np.concatenate([[0.0], 0.5 * (x[1:] + x[:-1]), [1.0]])
+    # At most a sample, of which a spacing has dozens, is on the wrong side of either border.
+    expected = np.diff(borders)[np.argsort(np.argsort(particles.positions[:, 0]))]
+    np.testing.assert_allclose(particles.volumes, expected, atol=0.1 / 32)
+    assert np.ptp(particles.volumes[particles.tags["interior"]]) > 0.02
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_jittered_particles_stay_inside_curved_shapes(seed: int) -> None:
+    """Also where those next to the boundary, which own no surface, would cross it."""
+    for shape in (QUARTER, Annulus(0.5, 1.0), Ball(0.6)):
+        regular = ConformingLattice().particles(shape, 0.11)
+        particles = Jittered(ConformingLattice(), 0.49, seed).particles(shape, 0.11)
+        inside = particles.tags["interior"]
+        assert (particles.positions[inside] != regular.positions[inside]).any(axis=1).all()
+        assert (shape.signed_distance(particles.positions[inside]) <= 0.0).all()
+        assert (particles.volumes > 0.0).all()
+
+
+def test_a_jitter_that_would_leave_the_shape_is_halved_until_it_does_not() -> None:
+    given = np.array([[0.25], [0.5], [0.75], [0.0]])
+    wanted = np.array([[-0.5], [0.25], [1.5], [-0.125]])
+    # Halved once to touch the end, not at all, three times; no part of the last stays inside.
+    expected = [[0.0], [0.75], [0.9375], [0.0]]
+    np.testing.assert_array_equal(moved_inside(Interval(1.0), given, wanted), expected)
+
+
 # Input -------------------------------------------------------------------------------------------
 
 SQUARE = Box([1.0, 1.0])
@@ -681,6 +754,9 @@ def on(
         (on(JitteredLattice, math.nan, 1), "amplitude must be in"),
         (on(JitteredLattice, 0.1, -1), "seed must be a whole number"),
         (on(JitteredLattice, 0.1, 1.0), "seed must be a whole number"),
+        (on(Jittered, Lattice(), 0.5, 1), r"'jittered': amplitude must be in \[0, 0.5\)"),
+        (on(Jittered, Lattice(), 0.1, -1), "'jittered': seed must be a whole number"),
+        (on(Jittered, Lattice(ghosts=1), 0.1, 1), "`of` makes 12 ghosts; set its ghosts to 0"),
         (on(JitteredLattice, 0.1, 1, True), "ghosts must be a whole number"),
         (on(Points), "'points': give one of positions and file, got neither"),
         (on(Points, [[0, 0]], "points.txt"), "give one of positions and file, got both"),

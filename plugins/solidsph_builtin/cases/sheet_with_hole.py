@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isclose
 from pathlib import Path
 from typing import Any, ClassVar, final
 
@@ -12,7 +11,6 @@ import numpy as np
 
 from solidsph.arrays import Array
 from solidsph.builder import Builder
-from solidsph.errors import SceneError
 from solidsph.interfaces.case import Case, Measurement
 from solidsph.parameters import check_positive, number
 from solidsph.results.pictures import largest_principal
@@ -20,16 +18,19 @@ from solidsph.results.record import Record
 from solidsph.scene import Scene
 from solidsph_builtin.cases._compare import FINISHED, compared
 from solidsph_builtin.cases._scheme import check_count, with_scheme
-
-YOUNGS_MODULUS = 70e6  # [Pa]
-POISSONS_RATIO = 0.49
-DENSITY = 1000.0  # [kg/m^3]; plays no part at rest
-
-# What finite elements give, where they were asked.
-_RATIO, _TRACTION = 0.2, 5e6
-_EXTENSION = 0.06506  # mean u_x of the loaded edge over W
-_PEAK = 16.74e6  # largest principal Cauchy stress, at (0, a) [Pa]
-_OURS = "finite elements of a quarter of the sheet, the same law and dead traction"
+from solidsph_builtin.cases._sheet import (
+    EXTENSION,
+    MATERIAL,
+    PEAK,
+    SOURCE,
+    at_hole,
+    cells,
+    check_hole,
+    extensions,
+    half_square,
+    is_known,
+    pushed,
+)
 
 # So small is a load under which the sheet is linear, and a hole to which its edges are far.
 _SMALL_LOAD = 1e-3  # of Young's modulus
@@ -78,35 +79,12 @@ class SheetWithHole(Case):
         check_count("sheet-with-hole", "load_steps", self.load_steps, 1)
         for name, unit in (("width", "m"), ("spacing", "m"), ("traction", "Pa")):
             check_positive("sheet-with-hole", name, getattr(self, name), unit)
-        if not 0.0 < self.hole_ratio <= 0.7:
-            raise SceneError(
-                "case 'sheet-with-hole': hole_ratio must lie between 0 and 0.7, got "
-                f"{self.hole_ratio}: it is the radius of the hole over half the side of the sheet"
-            )
-        if self._half_square < 1:
-            raise SceneError(
-                f"case 'sheet-with-hole': a hole of radius {self.radius:.6g} m needs a spacing "
-                f"below it, got {self.spacing:.6g} m; a third of it or less is sensible"
-            )
+        check_hole("sheet-with-hole", self.hole_ratio, self.width, self.spacing)
 
     @property
     def radius(self) -> float:
         """Of the hole [m]."""
         return self.hole_ratio * self.width
-
-    @property
-    def _cells(self) -> int:
-        """Of the lattice, from the middle to an edge."""
-        return max(1, round(self.width / self.spacing))
-
-    @property
-    def _half_square(self) -> int:
-        """Half the side of the square hole, in cells of the lattice.
-
-        It goes around the round one: rows along its sides then keep their spacing at the middle,
-        where the stresses are read, and come closer at its corners.
-        """
-        return round(self.hole_ratio * self._cells)
 
     def scenes(self) -> Mapping[str, Scene]:
         W = self.width
@@ -120,14 +98,14 @@ class SheetWithHole(Case):
                     "of": _square(W),
                     "minus": {"type": "disc", "radius": self.radius},
                 },
-                spacing=W / self._cells,
+                spacing=W / cells(W, self.spacing),
                 discretisation={"type": "fitted-moments", "of": self._rows()},
             )
             .material(
                 "neo-hookean",
-                youngs_modulus=YOUNGS_MODULUS,
-                poissons_ratio=POISSONS_RATIO,
-                density=DENSITY,
+                youngs_modulus=MATERIAL.youngs_modulus,
+                poissons_ratio=MATERIAL.poissons_ratio,
+                density=MATERIAL.density,
             )
             .boundary("symmetry", axis="x")
             .boundary("symmetry", axis="y")
@@ -141,25 +119,21 @@ class SheetWithHole(Case):
 
     def _rows(self) -> Mapping[str, Any]:
         """The lattice around a square hole, its rows moved outwards or inwards to the round one."""
-        W, half = self.width, self._half_square * self.width / self._cells
-        size, distance = "max(abs(X), abs(Y))", "hypot(X, Y)"
-        fading = f"({W!r} - {size})/{W - half!r}"
-        factor = f"(1 + {fading}*({self.radius / half!r}*{size}/{distance} - 1))"
+        W, count = self.width, cells(self.width, self.spacing)
+        half = half_square(self.hole_ratio, count) * W / count
         return {
             "type": "mapped",
             "of": {"type": "lattice", "on_boundary": True},
             "before": {"type": "difference", "of": _square(W), "minus": _square(half)},
-            "to": {"x": f"X*{factor}", "y": f"Y*{factor}"},
+            "to": pushed(W, self.radius, half),
         }
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["sheet"]
-        particles, W, S = record.particles, self.width, self.traction
-        edge = particles.faces["right"]
-        u = record.positions[-1] - particles.positions
-        extension = float(edge.areas @ u[edge.particles, 0] / edge.areas.sum()) / W
+        W, S = self.width, self.traction
+        extension = float(extensions(record)[-1]) / W
         stress = largest_principal(record.field("cauchy_stress")[-1])
-        known = isclose(self.hole_ratio, _RATIO) and isclose(S, _TRACTION)
+        known = is_known(self.hole_ratio, S)
         top = at_hole(record, self.radius, 90.0)
         measured = [
             compared(
@@ -167,8 +141,8 @@ class SheetWithHole(Case):
                 "mean u_x of the loaded edge over W",
                 extension,
                 "1",
-                _EXTENSION if known else None,
-                _OURS,
+                EXTENSION if known else None,
+                SOURCE,
                 self.tolerance,
             ),
             compared(
@@ -176,8 +150,8 @@ class SheetWithHole(Case):
                 "largest principal Cauchy stress at (0, a)",
                 1e-6 * stress[top],
                 "MPa",
-                1e-6 * _PEAK if known else None,
-                _OURS,
+                1e-6 * PEAK if known else None,
+                SOURCE,
                 self.peak_tolerance,
             ),
             compared(
@@ -190,7 +164,8 @@ class SheetWithHole(Case):
                 self.peak_tolerance,
             ),
         ]
-        if self.hole_ratio <= _SMALL_HOLE and S <= _SMALL_LOAD * YOUNGS_MODULUS:
+        small_load = _SMALL_LOAD * MATERIAL.youngs_modulus
+        if self.hole_ratio <= _SMALL_HOLE and small_load >= S:
             stresses, theory = around_hole(record, S)
             measured.append(
                 compared(
@@ -230,13 +205,6 @@ class SheetWithHole(Case):
 def _square(half: float) -> Mapping[str, Any]:
     """A square around the origin."""
     return {"type": "box", "lengths": [2.0 * half, 2.0 * half], "origin": [-half, -half]}
-
-
-def at_hole(record: Record, radius: float, degrees: float) -> int:
-    """The particle nearest to that angle from the load's axis, on the hole."""
-    angle = np.radians(degrees)
-    place = radius * np.array([np.cos(angle), np.sin(angle)])
-    return int(np.argmin(np.linalg.norm(record.particles.positions - place, axis=1)))
 
 
 def around_hole(record: Record, traction: float) -> tuple[Array, Array]:

@@ -7,17 +7,14 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
 from solidsph.particles import Particles
 from solidsph_builtin.discretisations._cells import lattice_particles
-from solidsph_builtin.discretisations._checks import check_ghosts, check_spacing, refusal
+from solidsph_builtin.discretisations._checks import check_ghosts, check_spacing
 from solidsph_builtin.discretisations._grid import grid_over
+from solidsph_builtin.discretisations._noise import check_noise, moved_inside
 from solidsph_builtin.shapes._checks import as_number
-
-# How often a displacement that leaves the shape is halved before the particle stays in place.
-_ATTEMPTS = 8
 
 
 @attrs.frozen
@@ -39,10 +36,7 @@ class JitteredLattice(Discretisation):
     ghost_faces: Sequence[str] | None = None  # where there are ghosts; behind every face if None
 
     def __attrs_post_init__(self) -> None:
-        if not (isinstance(self.amplitude, float) and 0.0 <= self.amplitude < 0.5):
-            raise refusal(self, f"amplitude must be in [0, 0.5) cells, got {self.amplitude!r}")
-        if not isinstance(self.seed, int) or isinstance(self.seed, bool) or self.seed < 0:
-            raise refusal(self, f"seed must be a whole number of at least 0, got {self.seed!r}")
+        check_noise(self, self.amplitude, self.seed)
         check_ghosts(self, self.ghosts)
 
     def particles(self, shape: Shape, spacing: float) -> Particles:
@@ -64,20 +58,7 @@ class JitteredLattice(Discretisation):
         )
         real = np.flatnonzero(~regular.ghosts)
         noise = np.random.default_rng(self.seed).uniform(-1.0, 1.0, (real.size, shape.dimension))
-        moved = _moved(shape, regular.positions[real], self.amplitude * grid.steps * noise)
+        moved = moved_inside(shape, regular.positions[real], self.amplitude * grid.steps * noise)
         positions, images = regular.positions.copy(), regular.images.copy()
         positions[real] = images[real] = moved
         return attrs.evolve(regular, positions=positions, images=images)
-
-
-def _moved(shape: Shape, points: Array, displacements: Array) -> Array:
-    """`points` (n, d) after as much of their `displacements` (n, d) as keeps them inside [m]."""
-    moved = points + displacements
-    scale = 1.0
-    for attempt in range(_ATTEMPTS + 1):
-        outside = np.flatnonzero(shape.signed_distance(moved) > 0.0)
-        if not outside.size:
-            break
-        scale = 0.0 if attempt == _ATTEMPTS else 0.5 * scale
-        moved[outside] = points[outside] + scale * displacements[outside]
-    return moved

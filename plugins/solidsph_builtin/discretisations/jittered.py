@@ -1,0 +1,61 @@
+"""Jittered: the particles of another discretisation, those inside the body a little off."""
+
+from __future__ import annotations
+
+from typing import final
+
+import attrs
+import numpy as np
+
+from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.shape import Shape
+from solidsph.particles import Particles
+from solidsph_builtin.discretisations._checks import refusal
+from solidsph_builtin.discretisations._noise import check_noise, moved_inside
+from solidsph_builtin.discretisations.points import Points
+from solidsph_builtin.shapes._checks import as_number
+
+
+@final
+@attrs.frozen
+class Jittered(Discretisation):
+    """The particles that `of` gives, each that owns no surface moved by a random displacement.
+
+    So an arrangement without rows, that follows the boundary all the same: about
+    `conforming-lattice` for one. Along each axis the displacement is uniform in
+    [-amplitude, amplitude] spacings. One that would leave the shape is halved until it does not.
+    The volume of a particle is what part of the shape is nearest to it now, scaled to the volume
+    of all before; areas and tags stay.
+
+    Raises:
+        SceneError: a parameter is of the wrong kind or out of range.
+    """
+
+    of: Discretisation = attrs.field(metadata={"part": "discretisations"})
+    amplitude: float = attrs.field(converter=as_number)  # in spacings, 0 <= amplitude < 1/2 [-]
+    seed: int  # of the random numbers: the same seed gives the same particles
+
+    def __attrs_post_init__(self) -> None:
+        check_noise(self, self.amplitude, self.seed)
+
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        """As in the interface.
+
+        Raises:
+            SceneError: `of` has ghosts, which would no longer be images of particles.
+        """
+        given = self.of.particles(shape, spacing)
+        if given.ghosts.any():
+            raise refusal(self, f"`of` makes {given.ghosts.sum()} ghosts; set its ghosts to 0")
+        inside = np.ones(given.count, dtype=np.bool_)
+        for face in given.faces.values():
+            inside[face.particles] = False
+        noise = np.random.default_rng(self.seed).uniform(-1.0, 1.0, given.positions.shape)
+        steps = self.amplitude * given.spacings[inside, None] * noise[inside]
+        positions = given.positions.copy()
+        positions[inside] = moved_inside(shape, positions[inside], steps)
+        volumes = Points(positions=positions).particles(shape, spacing).volumes
+        volumes *= given.volumes.sum() / volumes.sum()
+        return attrs.evolve(
+            given, positions=positions, images=positions.copy(), volumes=volumes, cells=volumes
+        )
