@@ -7,9 +7,10 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from solidsph.studies.frontier import Frontier
-from solidsph.studies.point import Point
+from solidsph.studies.point import Point, shown
 
 _MARKERS = "osD^vP*X<>"
 
@@ -38,7 +39,7 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
         _points(by_time, mine, marker, "black", scheme)
     for point in front:
         by_time.annotate(
-            f"{frontier.refining} {point.settings.get(frontier.refining, '')}",
+            shown(point.settings.get(frontier.refining, "")),
             (point.time, 100.0 * point.error),
             xytext=(6, 5),
             textcoords="offset points",
@@ -46,10 +47,17 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
         )
     by_time.set_xscale("log")
     by_time.set_yscale("log")
+    by_time.margins(x=0.12)
     by_time.set_xlabel("wall time [s]")
     quantity = next((point.quantity for point in frontier.points if point.quantity), "result")
     by_time.set_ylabel(f"error [%] of: {quantity}")
-    by_time.legend(frameon=False, fontsize=8, loc="best")
+    by_time.legend(
+        frameon=False,
+        fontsize=8,
+        loc="best",
+        title=f"numbers: {frontier.refining}",
+        title_fontsize=8,
+    )
 
     for scheme, points in frontier.schemes().items():
         on_front = scheme in markers
@@ -64,6 +72,10 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
         )
     _draw_order(by_spacing, frontier.finished())
     by_spacing.set_xlabel("particle spacing [m]")
+    for axis in (by_time.xaxis, by_spacing.xaxis, by_time.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter("")
     for axes in (by_time, by_spacing):
         axes.grid(color="0.92", which="both", linewidth=0.6)
         axes.set_axisbelow(True)

@@ -47,7 +47,7 @@ class Point:
 
     def label(self) -> str:
         """Its settings in one line."""
-        return ", ".join(f"{name} {_shown(value)}" for name, value in self.settings.items())
+        return ", ".join(f"{name} {shown(value)}" for name, value in self.settings.items())
 
 
 def measured(case: Case, settings: Mapping[str, Any]) -> Point:
@@ -91,5 +91,6 @@ def together(repeats: Sequence[Point]) -> Point:
     )
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """A setting as a person would write it."""
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -216,8 +216,8 @@ class _Book:
     def predicted(self, scheme: int, level: int) -> tuple[float, float]:
         """Error and time of a scheme at a level: measured, or by the powers of what is."""
         if (scheme, level) in self.points:
-            point = self.points[scheme, level]
-            return point.error, point.time
+            here = self.points[scheme, level]
+            return here.error, here.time
         known = self._known(scheme)
         if any(one == scheme for one, _ in self.points) and not known:
             return inf, inf  # it failed
