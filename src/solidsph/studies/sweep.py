@@ -16,7 +16,7 @@ from solidsph.studies.task import Task
 
 
 @attrs.frozen
-class Progress:
+class Standing:
     """How far a sweep is."""
 
     total: int  # tasks asked for
@@ -31,12 +31,19 @@ class Progress:
         """Tasks that have not ended."""
         return self.total - self.kept - self.done
 
+    @property
+    def point(self) -> Point | None:
+        """What came of that task as a point, a failed one if it was lost."""
+        if isinstance(self.outcome, Lost):
+            return None if self.task is None else self.outcome.point(self.task)
+        return self.outcome
 
-Watch = Callable[[Progress], None]
+
+Watch = Callable[[Standing], None]
 """Called before the first task begins, and whenever one has ended."""
 
 
-def _unwatched(progress: Progress) -> None:
+def _unwatched(standing: Standing) -> None:
     pass
 
 
@@ -65,7 +72,7 @@ def sweep(
         for key, point in points.items():
             estimate.learn(wanted[key], point)
         done: list[Task] = []
-        watch(Progress(len(wanted), kept, 0, estimate.left(0.0, done, list(remaining.values()))))
+        watch(Standing(len(wanted), kept, 0, estimate.left(0.0, done, list(remaining.values()))))
         begun = clock.perf_counter()
         with closing(runner.run(list(remaining.values()))) as outcomes:
             for task, outcome in outcomes:
@@ -79,7 +86,7 @@ def sweep(
                 del remaining[task.key]
                 elapsed = clock.perf_counter() - begun
                 left = estimate.left(elapsed, done, list(remaining.values()))
-                watch(Progress(len(wanted), kept, len(done), left, task, outcome))
+                watch(Standing(len(wanted), kept, len(done), left, task, outcome))
     return _merged(list(wanted.values()), points, lost)
 
 

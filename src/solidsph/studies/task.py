@@ -103,11 +103,12 @@ def _texts(described: Any) -> Iterator[str]:
 
 def _versions(texts: set[str]) -> dict[str, str]:
     """Of solidsph, and of who provides a part whose name or class is among `texts`."""
-    found = {"solidsph": version("solidsph")}
-    for entry in _installed(os.environ.get(registry.RESTRICT)):
-        if entry.distribution and (entry.name in texts or entry.target in texts):
-            found[entry.distribution] = entry.version
-    return found
+    used = {
+        entry.distribution: entry.version
+        for entry in _installed(os.environ.get(registry.RESTRICT))
+        if entry.distribution and (entry.name in texts or entry.target in texts)
+    }
+    return {**used, "solidsph": version("solidsph")}
 
 
 @cache
