@@ -19,6 +19,7 @@ from solidsph.hooks import implementation
 if TYPE_CHECKING:
     from solidsph.interfaces.condition import Observation
     from solidsph.simulation import Simulation
+    from solidsph.studies.sweep import Standing, Watch
 
 # Where no terminal gives a width, a file or a pipe has room for the widest table.
 out = Console(highlight=False, width=None if sys.stdout.isatty() else 170)
@@ -72,6 +73,48 @@ class ProgressObserver:
         # By time, and not by counting: load steps are halved and doubled on the way.
         part = observation.state.time / simulation.scene.duration
         self._display.update(self._task, completed=round(part * self._steps))
+
+
+@contextmanager
+def sweep_progress(description: str, shown: bool) -> Iterator[Watch]:
+    """Shows how far a sweep is, on the standard error, if it is wanted and someone watches."""
+    if not (shown and err.is_terminal):
+        yield lambda standing: None
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, TextColumn("{task.fields[note]}"), console=err, transient=True) as bar:
+        yield SweepObserver(bar, description)
+
+
+class SweepObserver:
+    """Moves a progress bar on whenever a task of a sweep has ended; shows those that failed."""
+
+    def __init__(self, display: Progress, description: str) -> None:
+        self._display = display
+        self._task = display.add_task(escape(description), total=None, note="")
+
+    def __call__(self, standing: Standing) -> None:
+        point = standing.point
+        if point is not None and not point.finished:
+            self._display.console.print(escape(f"{point.label()}: {point.outcome}"))
+        kept = f", {standing.kept} from before" if standing.kept else ""
+        self._display.update(
+            self._task,
+            total=standing.total,
+            completed=standing.total - standing.remaining,
+            note=f"{time_left(standing.seconds_left)}{kept}",
+        )
+
+
+def time_left(seconds: float | None) -> str:
+    """An estimate as a person would say it."""
+    if seconds is None:
+        return "time left not known yet"
+    if seconds < 90.0:
+        return f"about {seconds:.0f} s left"
+    if seconds < 5400.0:
+        return f"about {seconds / 60.0:.0f} min left"
+    return f"about {seconds / 3600.0:.1f} h left"
 
 
 def _is_number(cell: Any) -> bool:

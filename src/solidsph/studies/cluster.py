@@ -1,0 +1,105 @@
+"""Cluster: tasks on the workers of a Dask scheduler, each there in a process of its own."""
+
+from __future__ import annotations
+
+import selectors
+import uuid
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any, final
+
+import attrs
+
+from solidsph.errors import SceneError
+from solidsph.studies.fresh_process import FreshProcess
+from solidsph.studies.packing import heard, packed, told
+from solidsph.studies.point import Point
+from solidsph.studies.runner import Lost, Outcomes, Runner
+from solidsph.studies.task import Task
+
+_LOOK = 0.5  # how often a worker looks whether a task is still wanted [s]
+
+
+@final
+@attrs.frozen
+class Cluster(Runner):
+    """The workers of a scheduler that runs already; solidsph must be installed on each.
+
+    A worker carries out as many tasks at a time as it has threads: start it with one where times
+    are to be measured. What a worker that dies has not finished, another does.
+    """
+
+    address: str  # of the scheduler, such as "tcp://host:8786"
+    patience: float = 10.0  # to wait for it to answer [s]
+
+    def run(self, tasks: Sequence[Task]) -> Outcomes:
+        distributed = _distributed()
+        lines = [packed(task) for task in tasks]  # refused before any begins
+        client = self._client(distributed)
+        try:
+            # A name of its own each time: nobody else's task is taken for ours.
+            futures = {
+                client.submit(_on_worker, line, key=f"solidsph-{task.key}-{uuid.uuid4()}"): task
+                for task, line in zip(tasks, lines, strict=True)
+            }
+            for future in distributed.as_completed(list(futures), loop=client.loop):
+                if future.status not in ("finished", "error"):
+                    raise SceneError(
+                        f"the Dask scheduler at {self.address!r} is gone; what is finished is "
+                        "kept: start it anew and give the same command"
+                    )
+                yield futures[future], _outcome(future, futures[future])
+        finally:
+            client.close()  # the scheduler forgets what is not finished, and workers end it
+
+    def _client(self, distributed: Any) -> Any:
+        try:
+            return distributed.Client(
+                self.address, timeout=self.patience, set_as_default=False, name="solidsph"
+            )
+        except (OSError, ValueError) as cause:
+            raise SceneError(
+                f"no Dask scheduler answers at {self.address!r} within {self.patience:g} s "
+                f"({cause}); start one with 'dask scheduler', or correct the address"
+            ) from None
+
+
+def _distributed() -> Any:
+    try:
+        return import_module("distributed")
+    except ImportError as cause:
+        raise SceneError(
+            f"a cluster needs Dask, which cannot be imported here ({cause}); install it with "
+            "pip install 'solidsph[cluster]', here and on every worker"
+        ) from None
+
+
+def _outcome(future: Any, task: Task) -> Point | Lost:
+    if future.status == "finished":
+        return heard(future.result(), task)
+    cause = future.exception()
+    return Lost(f"on the cluster: {type(cause).__name__}: {cause}")
+
+
+def _on_worker(line: str) -> str:
+    """Carry out a packed task in a fresh process on the machine of this worker."""
+    process = FreshProcess(line)
+    try:
+        with selectors.DefaultSelector() as ready:
+            ready.register(process, selectors.EVENT_READ)
+            while not (ready.select(_LOOK) and process.is_over()):
+                if not _is_wanted():
+                    return told(Lost("nobody waits for it any more"))
+        return process.reply()
+    finally:
+        process.close()
+
+
+def _is_wanted() -> bool:
+    """Whether the sweep that asked for the task of this thread still waits for it.
+
+    A worker lets a task that has begun go on when its client is gone, and only marks it.
+    """
+    worker = _distributed().get_worker()
+    task = worker.state.tasks.get(worker.get_current_task())
+    return task is not None and task.state != "cancelled"

@@ -1,0 +1,107 @@
+"""Journal: what a sweep has finished, a line each, safe from being killed at any point."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import attrs
+
+from solidsph.errors import RecordError
+from solidsph.studies.point import Point
+from solidsph.studies.point_json import from_json, to_json
+from solidsph.studies.task import Task
+
+VERSION = 1
+"""Of the lines. Lines of another version are left where they are, and passed over."""
+
+Append = Callable[[Task, Point], None]
+"""Write down that a task has given a point; once it returns, the line is on the disk."""
+
+
+@attrs.frozen
+class Journal:
+    """A file of JSON lines, each of one finished task. Only whole lines count.
+
+    A line that was torn when its writer was killed is passed over, and ended by whoever appends
+    next. Nothing that the file holds is ever changed.
+    """
+
+    path: Path
+
+    def points(self, tasks: Sequence[Task]) -> Mapping[str, Point]:
+        """What it holds of these tasks, by their keys."""
+        if not self.path.exists():
+            return {}
+        wanted = {task.key: task for task in tasks}
+        found: dict[str, Point] = {}
+        for line in self.path.read_bytes().split(b"\n"):
+            try:
+                entry = json.loads(line)
+                if entry["journal"] == VERSION and entry["key"] in wanted:
+                    key = entry["key"]
+                    found[key] = from_json(entry["point"], wanted[key].settings)
+            except (ValueError, KeyError, TypeError):
+                continue
+        return found
+
+    @contextmanager
+    def writer(self) -> Iterator[Append]:
+        """The right to append, which one process has at a time.
+
+        Raises:
+            RecordError: another sweep has it.
+        """
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+        try:
+            _lock(file, self.path)  # the system takes it back from whoever dies
+            _sync_folder(self.path.parent)  # so that the file itself outlasts a loss of power
+
+            def append(task: Task, point: Point) -> None:
+                entry = {
+                    "journal": VERSION,
+                    "key": task.key,
+                    "case": task.case.title,
+                    "repeat": task.repeat,
+                    "point": to_json(point),
+                }
+                line = json.dumps(entry, allow_nan=False).encode("ascii") + b"\n"
+                _write(file, line if _is_whole(file) else b"\n" + line)
+                os.fsync(file)
+
+            yield append
+        finally:
+            os.close(file)
+
+
+def _lock(file: int, path: Path) -> None:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise RecordError(
+            f"another sweep is writing to {path}; wait until it ends, or name another folder"
+        ) from None
+
+
+def _sync_folder(folder: Path) -> None:
+    file = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(file)
+    finally:
+        os.close(file)
+
+
+def _is_whole(file: int) -> bool:
+    """Whether the last line has its end."""
+    size = os.fstat(file).st_size
+    return size == 0 or os.pread(file, 1, size - 1) == b"\n"
+
+
+def _write(file: int, data: bytes) -> None:
+    while data:
+        data = data[os.write(file, data) :]

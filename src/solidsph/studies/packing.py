@@ -1,0 +1,98 @@
+"""Tasks and outcomes as lines of text, to be handed from one process to another."""
+
+from __future__ import annotations
+
+import base64
+import json
+import pickle
+import sys
+from pathlib import Path
+from typing import Any
+
+from solidsph.errors import SceneError, SolidsphError
+from solidsph.parts import construct, describe
+from solidsph.studies.point import Point
+from solidsph.studies.point_json import from_json, to_json
+from solidsph.studies.runner import Lost
+from solidsph.studies.task import Task
+
+
+def packed(task: Task) -> str:
+    """One line that `unpacked` makes the task of, in any process with the same software.
+
+    A registered case goes by its name and parameters; any other is pickled, with the places where
+    this process looks for modules.
+
+    Raises:
+        SceneError: the class of the case belongs to no module, so no other process can find it.
+    """
+    return json.dumps({"key": task.key, **(_by_name(task) or _pickled(task))})
+
+
+def unpacked(line: str | bytes) -> Task:
+    """The task of that line.
+
+    Raises:
+        SceneError: it is another task here, because the software is not the same.
+    """
+    table = json.loads(line)
+    if "pickle" in table:
+        sys.path += [place for place in table["path"] if place not in sys.path]
+        task: Task = pickle.loads(base64.b64decode(table["pickle"]))
+    else:
+        task = _named(table["named"])
+    if task.key != table["key"]:
+        raise SceneError(
+            f"{task.case.title!r} is another case where it was to run: solidsph or a plugin is "
+            "there in another version; install the same on both sides"
+        )
+    return task
+
+
+def told(outcome: Point | Lost) -> str:
+    """One line that `heard` understands."""
+    if isinstance(outcome, Lost):
+        return json.dumps({"lost": outcome.cause})
+    return json.dumps({"point": to_json(outcome)})
+
+
+def heard(line: str, task: Task) -> Point | Lost:
+    """What came of `task`, from the line that `told` made of it."""
+    table = json.loads(line)
+    if "lost" in table:
+        return Lost(str(table["lost"]))
+    return from_json(table["point"], task.settings)
+
+
+def _by_name(task: Task) -> dict[str, Any] | None:
+    """None where something would come back as something else."""
+    try:
+        table = {
+            "case": describe("cases", task.case),
+            "settings": dict(task.settings),
+            "repeat": task.repeat,
+        }
+        return {"named": table} if _named(json.loads(json.dumps(table))) == task else None
+    except (SolidsphError, TypeError, ValueError):
+        return None
+
+
+def _named(table: dict[str, Any]) -> Task:
+    return Task(construct("cases", table["case"]), table["settings"], table["repeat"])
+
+
+def _pickled(task: Task) -> dict[str, Any]:
+    cls = type(task.case)
+    if cls.__module__ == "__main__" or "<" in cls.__qualname__:
+        raise SceneError(
+            f"no other process can find {cls.__module__}.{cls.__qualname__}; put the class at the "
+            "top of a module that can be imported, or register it as a case"
+        )
+    try:
+        content = base64.b64encode(pickle.dumps(task)).decode("ascii")
+    except (pickle.PicklingError, TypeError, AttributeError) as cause:
+        raise SceneError(
+            f"{task.case.title!r} cannot be handed to another process: {cause}; leave such "
+            "values out of its parameters"
+        ) from cause
+    return {"pickle": content, "path": [place or str(Path.cwd()) for place in sys.path]}

@@ -1,0 +1,105 @@
+"""Sweeping over the configurations of a case: what is finished stays finished."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Sequence
+from contextlib import closing
+
+import attrs
+
+from solidsph.studies.estimate import Estimate
+from solidsph.studies.journal import Journal
+from solidsph.studies.point import Point, together
+from solidsph.studies.runner import Lost, Runner
+from solidsph.studies.task import Task
+
+
+@attrs.frozen
+class Standing:
+    """How far a sweep is."""
+
+    total: int  # tasks asked for
+    kept: int  # of them finished by earlier sweeps
+    done: int  # of them ended in this one
+    seconds_left: float | None  # wall time [s]; None as long as nothing tells it
+    task: Task | None = None  # the one that has just ended
+    outcome: Point | Lost | None = None  # what came of it
+
+    @property
+    def remaining(self) -> int:
+        """Tasks that have not ended."""
+        return self.total - self.kept - self.done
+
+    @property
+    def point(self) -> Point | None:
+        """What came of that task as a point, a failed one if it was lost."""
+        if isinstance(self.outcome, Lost):
+            return None if self.task is None else self.outcome.point(self.task)
+        return self.outcome
+
+
+Watch = Callable[[Standing], None]
+"""Called before the first task begins, and whenever one has ended."""
+
+
+def _unwatched(standing: Standing) -> None:
+    pass
+
+
+def sweep(
+    tasks: Sequence[Task], runner: Runner, journal: Journal, watch: Watch = _unwatched
+) -> Sequence[Point]:
+    """Carry out `tasks`, but for those that the journal holds, and write each down as it ends.
+
+    It may be killed at any point: the same call goes on from there. A task that was lost, with its
+    process or by a fault of its code, is a failed point, and is tried again by the next sweep.
+
+    Returns:
+        One point of all repeats of a configuration, in the order in which the tasks name them.
+
+    Raises:
+        RecordError: another sweep is writing to the journal.
+        SceneError: a task cannot be handed to where the runner would carry it out.
+    """
+    wanted = {task.key: task for task in tasks}
+    lost: dict[str, Lost] = {}
+    with journal.writer() as append:
+        points = dict(journal.points(tasks))
+        kept = len(points)
+        remaining = {key: task for key, task in wanted.items() if key not in points}
+        estimate = Estimate.of(tasks)
+        for key, point in points.items():
+            estimate.learn(wanted[key], point)
+        done: list[Task] = []
+        watch(Standing(len(wanted), kept, 0, estimate.left(0.0, done, list(remaining.values()))))
+        begun = clock.perf_counter()
+        with closing(runner.run(list(remaining.values()))) as outcomes:
+            for task, outcome in outcomes:
+                if isinstance(outcome, Point):
+                    append(task, outcome)
+                    points[task.key] = outcome
+                    estimate.learn(task, outcome)
+                else:
+                    lost[task.key] = outcome
+                done.append(task)
+                del remaining[task.key]
+                elapsed = clock.perf_counter() - begun
+                left = estimate.left(elapsed, done, list(remaining.values()))
+                watch(Standing(len(wanted), kept, len(done), left, task, outcome))
+    return _merged(list(wanted.values()), points, lost)
+
+
+def _merged(
+    tasks: Sequence[Task], points: dict[str, Point], lost: dict[str, Lost]
+) -> Sequence[Point]:
+    repeats: dict[str, list[Task]] = {}
+    for task in tasks:
+        repeats.setdefault(task.configuration, []).append(task)
+    return [
+        # A repeat that was lost is missing, as long as another was not.
+        together([points[task.key] for task in same if task.key in points])
+        if any(task.key in points for task in same)
+        else lost[same[0].key].point(same[0])
+        for same in repeats.values()
+    ]

@@ -1,0 +1,117 @@
+"""Task: one run of one configuration of a case, under a key that every process finds the same."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import cache, cached_property
+from importlib.metadata import version
+from pathlib import Path
+from types import BuiltinFunctionType, FunctionType
+from typing import Any, final
+
+import attrs
+import numpy as np
+
+from solidsph import registry
+from solidsph.errors import SceneError, SolidsphError
+from solidsph.interfaces.case import Case
+from solidsph.studies.varied import varied
+
+
+@final
+@attrs.frozen
+class Task:
+    """A case to be run with these settings, and which of its repeats it is."""
+
+    case: Case
+    settings: Mapping[str, Any] = attrs.field(factory=dict)  # as `varied` takes them
+    repeat: int = 0
+
+    @cached_property
+    def configuration(self) -> str:
+        """Hash of all that decides the outcome, but for which repeat it is.
+
+        That is the case with its parameters, the settings, the scenes that follow from them, and
+        the versions of solidsph and of every distribution that a part in them comes from. A change
+        of code without a change of version is seen only as far as it changes the scenes.
+
+        Raises:
+            SceneError: something in the case or in the settings has no lasting description.
+        """
+        described = {"case": plain(self.case), "settings": plain(self.settings)}
+        with suppress(SolidsphError):  # of refused settings, or scenes with functions in them
+            described["scenes"] = plain(varied(self.case, self.settings).scenes())
+        described["versions"] = _versions(set(_texts(described)))
+        return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()[:32]
+
+    @property
+    def key(self) -> str:
+        """Its name in journals and between processes."""
+        return f"{self.configuration}-{self.repeat}"
+
+
+def plain(value: Any) -> Any:
+    """`value` as JSON knows it, the same in every process.
+
+    Raises:
+        SceneError: it holds an object that only this process can tell from others.
+    """
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if isinstance(value, float):
+        return repr(float(value))  # digit by digit, and infinity too
+    if isinstance(value, (np.ndarray, np.generic)):
+        return plain(value.tolist())
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {str(name): plain(one) for name, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(one) for one in value]
+    if isinstance(value, (type, FunctionType, BuiltinFunctionType)) and "<" not in _path(value):
+        return _path(value)
+    if attrs.has(type(value)):
+        fields = attrs.fields(type(value))
+        return {
+            "": _path(type(value)),
+            **{field.name: plain(getattr(value, field.name)) for field in fields},
+        }
+    raise SceneError(
+        f"a sweep cannot name {value!r} in its journal; state it as a number, a text, a registered "
+        "part, or a function of a module"
+    )
+
+
+def _path(named: Any) -> str:
+    return f"{named.__module__}:{named.__qualname__}"
+
+
+def _texts(described: Any) -> Iterator[str]:
+    if isinstance(described, str):
+        yield described
+    elif isinstance(described, Mapping):
+        for one in described.values():
+            yield from _texts(one)
+    elif isinstance(described, Sequence):
+        for one in described:
+            yield from _texts(one)
+
+
+def _versions(texts: set[str]) -> dict[str, str]:
+    """Of solidsph, and of who provides a part whose name or class is among `texts`."""
+    used = {
+        entry.distribution: entry.version
+        for entry in _installed(os.environ.get(registry.RESTRICT))
+        if entry.distribution and (entry.name in texts or entry.target in texts)
+    }
+    return {**used, "solidsph": version("solidsph")}
+
+
+@cache
+def _installed(restriction: str | None) -> Sequence[registry.Entry]:
+    """Every part there is, read from the disk once a process and restriction."""
+    return [entry for kind in registry.INTERFACES for entry in registry.available(kind)]
