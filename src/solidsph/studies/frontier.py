@@ -166,5 +166,5 @@ def power(costs: Sequence[float], errors: Sequence[float]) -> float:
 
 def _time(seconds: float) -> str:
     if seconds < 0.995:
-        return f"{1e3 * seconds:.2g} ms"
-    return f"{seconds:.2g} s" if seconds < 100.0 else f"{seconds / 60.0:.2g} min"
+        return f"{1e3 * seconds:.0f} ms"
+    return f"{seconds:.2g} s" if seconds < 99.5 else f"{seconds / 60.0:.2g} min"

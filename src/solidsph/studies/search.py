@@ -321,8 +321,6 @@ def _split(axes: Axes) -> tuple[str, list[Any], Sequence[Settings]]:
     if not axes:
         raise SceneError("nothing to search: no axis; give --axis name=values")
     refining, *others = axes
-    if not axes[refining]:
-        raise SceneError(f"axis {refining!r} has no values; give some, from coarse to fine")
     schemes = [
         dict(zip(others, values, strict=True)) for values in product(*(axes[o] for o in others))
     ]

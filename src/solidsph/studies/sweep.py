@@ -43,12 +43,12 @@ Watch = Callable[[Standing], None]
 """Called before the first task begins, and whenever one has ended."""
 
 
-def _unwatched(standing: Standing) -> None:
+def unwatched(standing: Standing) -> None:
     pass
 
 
 def sweep(
-    tasks: Sequence[Task], runner: Runner, journal: Journal, watch: Watch = _unwatched
+    tasks: Sequence[Task], runner: Runner, journal: Journal, watch: Watch = unwatched
 ) -> Sequence[Point]:
     """Carry out `tasks`, but for those that the journal holds, and write each down as it ends.
 
