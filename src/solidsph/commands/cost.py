@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from solidsph.commands.console import say, show_json, show_table, sweep_progress
-from solidsph.commands.target import resolve
+from solidsph.commands.target import parameters, resolve
 from solidsph.errors import SceneError
 from solidsph.interfaces.case import Case
 
@@ -331,7 +331,8 @@ def _axis(text: str) -> tuple[str, Sequence[Any]]:
     try:
         parsed = tomllib.loads(f"values = [{values}]")["values"]
     except tomllib.TOMLDecodeError:
-        parsed = [value.strip() for value in values.split(",")]
+        several = (parameters([f"value={value.strip()}"]) for value in values.split(","))
+        parsed = [one["value"] for one in several]
     parsed = [tuple(value) if isinstance(value, list) else value for value in parsed]
     if len({repr(value) for value in parsed}) < len(parsed):
         raise SceneError(f"--axis {text!r} has a value twice; give each once")

@@ -19,6 +19,7 @@ def to_json(point: Point) -> dict[str, Any]:
         **table,
         "settings": plain(point.settings),
         "error": _number(point.error),
+        "value": None if point.value is None else _number(point.value),
         "spacing": _number(point.spacing),
         "seconds": [_number(one) for one in point.seconds],
     }
@@ -35,6 +36,8 @@ def from_json(table: Mapping[str, Any], settings: Mapping[str, Any]) -> Point:
         error=float(table["error"]),
         outcome=str(table["outcome"]),
         quantity=str(table["quantity"]),
+        value=_optional(table["value"]),
+        reference=_optional(table["reference"]),
         spacing=float(table["spacing"]),
         particles=int(table["particles"]),
         steps=int(table["steps"]),
@@ -42,6 +45,10 @@ def from_json(table: Mapping[str, Any], settings: Mapping[str, Any]) -> Point:
         seconds=tuple(float(one) for one in table["seconds"]),
         peak_memory=int(table["peak_memory"]),
     )
+
+
+def _optional(value: Any) -> float | None:
+    return None if value is None else float(value)
 
 
 def _number(value: float) -> float | str:
