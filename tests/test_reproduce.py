@@ -31,7 +31,7 @@ class Straight(Case):
         return {}
 
     def measure(self, records):
-        return [Measurement("slope", 1.0, "1", 1.0, paper="one", error=0.0)]
+        return [Measurement("slope of <f>", 1.0, "1", 1.0, paper="one", error=0.0)]
 
     def draw(self, records, folder: Path):
         names = "fig-3-line", "section-6-line", "fig-12-line", "section-6-lines", "extra"
@@ -77,7 +77,7 @@ def test_the_gallery_shows_pictures_and_numbers(tmp_path: Path) -> None:
     for path in re.findall(r"\]\((.*?)\)", text):
         assert (page.parent / path).exists()
     assert text.count("![") == 5
-    assert "| slope | one | 1 | 1 | 1 | 0 % |" in text
+    assert "| slope of &lt;f> | one | 1 | 1 | 1 | 0 % |" in text
 
 
 @pytest.mark.usefixtures("only_straight")

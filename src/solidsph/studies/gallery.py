@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
+
+from PIL import Image
 
 from solidsph import registry
 from solidsph.studies.case_run import CaseResult
 from solidsph.studies.reproduce import Reproduction
+
+_COLOURS = 128
 
 
 def write_gallery(made: Reproduction, page: Path) -> None:
@@ -30,7 +33,7 @@ def _section(name: str, result: CaseResult, pictures: Path) -> str:
     case = registry.load("cases", name)
     lines = [f"## {case.title}", "", f"{case.source}. `solidsph run {name}`", ""]
     for path in result.pictures:
-        shutil.copy(path, pictures / path.name)
+        copied(path, pictures / path.name)
         lines += [f"![{path.stem}]({pictures.name}/{path.name})", ""]
     lines += [
         "| quantity | the paper | theory | measured | unit | error |",
@@ -40,5 +43,16 @@ def _section(name: str, result: CaseResult, pictures: Path) -> str:
         theory = "" if m.reference is None else f"{m.reference:.5g}"
         error = "" if m.error is None else f"{100.0 * m.error:.2g} %"
         cells = (m.quantity, m.paper, theory, f"{m.value:.5g}", m.unit, error)
-        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+        lines.append("| " + " | ".join(map(_cell, cells)) + " |")
     return "\n".join([*lines, ""])
+
+
+def _cell(text: str) -> str:
+    """`text` in a table of Markdown, where "<f>" would be a tag of HTML."""
+    return text.replace("|", "\\|").replace("<", "&lt;")
+
+
+def copied(picture: Path, path: Path) -> None:
+    """Write a copy in few colours, a third of the size: pages are kept beside the code."""
+    with Image.open(picture) as image:
+        image.convert("RGB").quantize(_COLOURS).save(path, optimize=True)
