@@ -555,19 +555,29 @@ def local_cluster() -> Iterator[Any]:
 
 
 def test_a_worker_killed_in_mid_sweep(tmp_path: Path) -> None:
-    tasks, journal = swinging(), Journal(tmp_path / "journal")
-    killed: list[int] = []
+    # First those that write down how often they are run, then those that have costs.
+    tasks = [*several(tmp_path, 0.1, 0.2, 0.3, 0.4), *swinging()[1:]]
+    journal = Journal(tmp_path / "journal")
     with local_cluster() as cluster:
         workers = [nanny.pid for nanny in cluster.workers.values()]
+        ended: list[str] = []
+        finished_before: list[str] = []
 
         def kill_one(standing: Standing) -> None:
-            if standing.done == 2:
+            if standing.task is not None and isinstance(standing.task.case, Odd):
+                ended.append(str(standing.task.case.error))
+            if standing.done == 4:
+                finished_before.extend(ended)
                 os.kill(workers[0], signal.SIGKILL)
-                killed.append(workers[0])
+                wait_for(lambda: workers[0] not in [n.pid for n in cluster.workers.values()])
 
         points = sweep(tasks, Cluster(cluster.scheduler_address), journal, kill_one)
-    assert killed
+    assert sorted(journal.points(tasks)) == sorted(task.key for task in tasks)
     assert len(lines(journal.path)) == len(tasks)
+    runs_of = [error for _, error, _ in log(tmp_path)]
+    # Nothing that had ended when the worker died is run again.
+    assert [runs_of.count(error) for error in finished_before] == [1] * len(finished_before)
+    assert len(finished_before) >= 2
     for one, other in zip(points, sweep(tasks, Inline(), Journal(tmp_path / "here")), strict=True):
         # Dask lets linear algebra use one thread, which sums in another order.
         assert one.error == pytest.approx(other.error, rel=1e-9)
