@@ -68,7 +68,8 @@ class Cluster(Runner):
         except Exception as cause:  # of any kind: what answers there may be no scheduler at all
             raise SceneError(
                 f"no Dask scheduler answers at {self.address!r} within {self.patience:g} s "
-                f"({type(cause).__name__}: {cause}); start one with 'dask scheduler', or correct the address"
+                f"({type(cause).__name__}: {cause}); start one with 'dask scheduler', or correct "
+                "the address"
             ) from None
 
 
