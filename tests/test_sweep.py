@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import io
 import json
 import os
@@ -9,6 +10,7 @@ import random
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -34,6 +36,7 @@ from solidsph.studies.packing import heard, packed, told, unpacked
 from solidsph.studies.point import Point
 from solidsph.studies.processes import Processes
 from solidsph.studies.runner import Inline, Lost, Outcomes, Runner
+from solidsph.studies.scratch import Scratch
 from solidsph.studies.sweep import Standing, sweep
 from solidsph.studies.task import Task, plain
 from solidsph_builtin.cases.csm3 import Csm3
@@ -457,6 +460,29 @@ def test_no_process_outlives_its_sweep(tmp_path: Path, how: signal.Signals) -> N
         process.communicate()
         assert process.returncode == -how
         wait_for(lambda: not any(runs(child) for child in children), 5.0)
+
+
+def test_what_a_killed_sweep_left_is_removed_by_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    folders = [tmp_path / f"solidsph-scratch-{name}" for name in ("old", "young", "held")]
+    hour_ago = time.time() - 3600.0
+    for folder in (*folders, tmp_path / "foreign"):
+        folder.mkdir()
+        (folder / "record.h5").touch()
+        os.utime(folder, (hour_ago, hour_ago))
+    os.utime(folders[1])
+    held = os.open(folders[2], os.O_RDONLY)
+    fcntl.flock(held, fcntl.LOCK_EX)
+    scratch = Scratch()
+    os.close(held)
+    left = {"foreign", "solidsph-scratch-young", "solidsph-scratch-held"}
+    assert {path.name for path in tmp_path.iterdir()} == {*left, scratch.path.name}
+    scratch.close()
+    assert {path.name for path in tmp_path.iterdir()} == left
+    Scratch().close()
+    assert not folders[2].exists()
 
 
 # --- estimates
