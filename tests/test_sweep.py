@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import io
 import json
 import os
@@ -9,6 +10,7 @@ import random
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -34,6 +36,7 @@ from solidsph.studies.packing import heard, packed, told, unpacked
 from solidsph.studies.point import Point
 from solidsph.studies.processes import Processes
 from solidsph.studies.runner import Inline, Lost, Outcomes, Runner
+from solidsph.studies.scratch import Scratch
 from solidsph.studies.sweep import Standing, sweep
 from solidsph.studies.task import Task, plain
 from solidsph_builtin.cases.csm3 import Csm3
@@ -342,7 +345,7 @@ def test_peaks_of_memory_do_not_mix(tmp_path: Path) -> None:
 
 
 def test_costs_that_hang_on_no_machine_are_identical_on_every_run(tmp_path: Path) -> None:
-    tasks = swinging()
+    tasks = swinging()[::2]
     inline = sweep(tasks, Inline(), Journal(tmp_path / "inline"))
     side_by_side = sweep(tasks, Processes(2), Journal(tmp_path / "processes"))
     assert bare(inline) == bare(side_by_side)
@@ -459,6 +462,29 @@ def test_no_process_outlives_its_sweep(tmp_path: Path, how: signal.Signals) -> N
         wait_for(lambda: not any(runs(child) for child in children), 5.0)
 
 
+def test_what_a_killed_sweep_left_is_removed_by_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    folders = [tmp_path / f"solidsph-scratch-{name}" for name in ("old", "young", "held")]
+    hour_ago = time.time() - 3600.0
+    for folder in (*folders, tmp_path / "foreign"):
+        folder.mkdir()
+        (folder / "record.h5").touch()
+        os.utime(folder, (hour_ago, hour_ago))
+    os.utime(folders[1])
+    held = os.open(folders[2], os.O_RDONLY)
+    fcntl.flock(held, fcntl.LOCK_EX)
+    scratch = Scratch()
+    os.close(held)
+    left = {"foreign", "solidsph-scratch-young", "solidsph-scratch-held"}
+    assert {path.name for path in tmp_path.iterdir()} == {*left, scratch.path.name}
+    scratch.close()
+    assert {path.name for path in tmp_path.iterdir()} == left
+    Scratch().close()
+    assert not folders[2].exists()
+
+
 # --- estimates
 
 
@@ -555,19 +581,29 @@ def local_cluster() -> Iterator[Any]:
 
 
 def test_a_worker_killed_in_mid_sweep(tmp_path: Path) -> None:
-    tasks, journal = swinging(), Journal(tmp_path / "journal")
-    killed: list[int] = []
+    # First those that write down how often they are run, then those that have costs.
+    tasks = [*several(tmp_path, 0.1, 0.2, 0.3), *swinging()[::2]]
+    journal = Journal(tmp_path / "journal")
     with local_cluster() as cluster:
         workers = [nanny.pid for nanny in cluster.workers.values()]
+        ended: list[str] = []
+        finished_before: list[str] = []
 
         def kill_one(standing: Standing) -> None:
-            if standing.done == 2:
+            if standing.task is not None and isinstance(standing.task.case, Odd):
+                ended.append(str(standing.task.case.error))
+            if standing.done == 3:
+                finished_before.extend(ended)
                 os.kill(workers[0], signal.SIGKILL)
-                killed.append(workers[0])
+                wait_for(lambda: workers[0] not in [n.pid for n in cluster.workers.values()])
 
         points = sweep(tasks, Cluster(cluster.scheduler_address), journal, kill_one)
-    assert killed
+    assert sorted(journal.points(tasks)) == sorted(task.key for task in tasks)
     assert len(lines(journal.path)) == len(tasks)
+    runs_of = [error for _, error, _ in log(tmp_path)]
+    # Nothing that had ended when the worker died is run again.
+    assert [runs_of.count(error) for error in finished_before] == [1] * len(finished_before)
+    assert len(finished_before) >= 2
     for one, other in zip(points, sweep(tasks, Inline(), Journal(tmp_path / "here")), strict=True):
         # Dask lets linear algebra use one thread, which sums in another order.
         assert one.error == pytest.approx(other.error, rel=1e-9)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import selectors
+import socket
+import time as clock
 import uuid
 from collections.abc import Sequence
 from importlib import import_module
@@ -48,20 +50,44 @@ class Cluster(Runner):
                         f"the Dask scheduler at {self.address!r} is gone; what is finished is "
                         "kept: start it anew and give the same command"
                     )
-                yield futures[future], _outcome(future, futures[future])
+                task = futures.pop(future)
+                outcome = _outcome(future, task)
+                future.release()  # or its worker's death would have it run again
+                yield task, outcome
         finally:
             client.close()  # the scheduler forgets what is not finished, and workers end it
 
     def _client(self, distributed: Any) -> Any:
         try:
+            if self.address.startswith(("tcp://", "tls://")) or "://" not in self.address:
+                # A client that finds nobody is never closed; its thread would stay behind.
+                _knock(distributed.comm.get_address_host_port(self.address), self.patience)
             return distributed.Client(
                 self.address, timeout=self.patience, set_as_default=False, name="solidsph"
             )
-        except (OSError, ValueError) as cause:
+        except Exception as cause:  # of any kind: what answers there may be no scheduler at all
             raise SceneError(
                 f"no Dask scheduler answers at {self.address!r} within {self.patience:g} s "
-                f"({cause}); start one with 'dask scheduler', or correct the address"
+                f"({type(cause).__name__}: {cause}); start one with 'dask scheduler', or correct "
+                "the address"
             ) from None
+
+
+def _knock(door: tuple[str, int], patience: float) -> None:
+    """Wait until somebody listens at a host and port.
+
+    Raises:
+        OSError: nobody does.
+    """
+    end = clock.monotonic() + patience
+    while True:
+        try:
+            socket.create_connection(door, timeout=patience).close()
+            return
+        except OSError:
+            if clock.monotonic() > end:
+                raise
+            clock.sleep(0.1)
 
 
 def _distributed() -> Any:

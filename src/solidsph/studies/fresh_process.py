@@ -11,6 +11,7 @@ from typing import IO
 
 from solidsph.studies.packing import told
 from solidsph.studies.runner import Lost
+from solidsph.studies.scratch import Scratch
 
 _CHUNK = 65536
 
@@ -21,15 +22,14 @@ class FreshProcess:
     def __init__(self, line: str) -> None:
         self._answer = b""
         self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  # closed by close()
-        # Records of a run that is killed are removed with the folder.
-        self._folder = tempfile.TemporaryDirectory(prefix="solidsph-")
+        self._scratch = Scratch()  # for records, which a run that is killed leaves behind
         self._process = subprocess.Popen(
             # -P: no module of the current folder stands in for one that is installed.
             [sys.executable, "-P", "-m", "solidsph.studies.one_point"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
-            env={**os.environ, "TMPDIR": self._folder.name},
+            env={**os.environ, "TMPDIR": str(self._scratch.path)},
             start_new_session=True,  # an interrupt from the terminal is for the sweep alone
         )
         assert self._process.stdin is not None
@@ -68,7 +68,7 @@ class FreshProcess:
             assert pipe is not None
             with suppress(BrokenPipeError):
                 pipe.close()
-        self._folder.cleanup()
+        self._scratch.close()
 
     def _last_words(self) -> str:
         self._errors.seek(0)
