@@ -32,6 +32,15 @@ class Measurement:
     paper: str = ""  # what the paper says of it, where it says something
 
 
+@attrs.frozen
+class Trial:
+    """A case at hard settings. It is passed if everything that the case measures passes."""
+
+    settings: Mapping[str, Any] = attrs.field(factory=dict)  # parameters of the case
+    brief: Mapping[str, Any] = attrs.field(factory=dict)  # others, for a short form of it
+    must_fail: str = ""  # of a negative control: why nothing may come through
+
+
 class Case(ABC):
     """One object behind reproduction, tests, cost, stability and the gallery.
 
@@ -50,6 +59,9 @@ class Case(ABC):
     sweep: ClassVar[Mapping[str, Sequence[Any]]] = {}
     """Parameters to vary where accuracy is held against cost, each with the values to try. The
     first one refines: its values go from coarse to fine."""
+
+    trials: ClassVar[Mapping[str, Trial]] = {}
+    """Hard settings that `solidsph stability` puts it to, by name."""
 
     @abstractmethod
     def scenes(self) -> Mapping[str, Scene]:
