@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 
 from solidsph.arrays import Array
 from solidsph.builder import Builder
-from solidsph.interfaces.case import Case, Measurement
+from solidsph.interfaces.case import Case, Measurement, Trial
 from solidsph.parameters import check_positive, number
 from solidsph.results.record import Record
 from solidsph.scene import Scene
@@ -59,6 +59,11 @@ class CantileverPlate(Case):
         "across": (5, 7, 11, 15),
         "gradient": ("consistent", "quadratic", "corrected"),
         "cover": (1.8, 2.2, 2.6),
+    }
+    trials: ClassVar[Mapping[str, Trial]] = {
+        "Poisson's ratio 0.4999": Trial(
+            {"poissons_ratio": 0.4999, "across": 7, "tolerance": 0.05}, {"across": 5}
+        ),
     }
 
     across: int = 20  # particles across the plate

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from solidsph.arrays import Array
 from solidsph.builder import Builder
-from solidsph.interfaces.case import Case, Measurement
+from solidsph.interfaces.case import Case, Measurement, Trial
 from solidsph.parameters import check_positive, number
 from solidsph.results.record import Record
 from solidsph.scene import Scene
@@ -48,6 +48,9 @@ class ElasticSpin(Case):
         "across": (11, 21),
         "time_step_factor": (0.1, 0.2, 0.4),
         "gradient": ("quadratic", "corrected"),
+    }
+    trials: ClassVar[Mapping[str, Trial]] = {
+        "1000 turns": Trial({"turns": 1000.0, "across": 11}, {"turns": 5.0}),
     }
 
     turns: float = number(default=10.0)  # duration, in turns of the rigid square

@@ -13,7 +13,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from solidsph.arrays import Array
 from solidsph.builder import Builder
-from solidsph.interfaces.case import Case, Curves, Measurement
+from solidsph.interfaces.case import Case, Curves, Measurement, Trial
 from solidsph.parameters import check_positive, number
 from solidsph.results.record import Record
 from solidsph.scene import Scene
@@ -67,6 +67,9 @@ class LargeStretch(Case):
         "particles": (16, 31, 61),
         "gradient": ("consistent", "quadratic"),
         "cover": (2.2, 2.5, 3.5),
+    }
+    trials: ClassVar[Mapping[str, Trial]] = {
+        "to six times the length": Trial({"across": ()}, {"particles": 16}),
     }
 
     stretch: float = number(default=6.0)  # at the end [-]

@@ -116,10 +116,7 @@ class TensileInstability(Case):
         return attrs.evolve(self, stretches=self.stretches[:1])
 
     def scenes(self) -> Mapping[str, Scene]:
-        scenes = {
-            form: self._scene(form, self.stretch, self.perturbation, self.transits * self.transit)
-            for form in FORMS
-        }
+        scenes = {form: self.scene(form, self.transits * self.transit) for form in FORMS}
         for stretch in self.stretches:
             rate = self.predicted_rate("updated-lagrangian", stretch)
             # Where nothing grows, compression for one, ten transits show it.
@@ -128,6 +125,10 @@ class TensileInstability(Case):
             for form in FORMS:
                 scenes[_rate_name(form, stretch)] = self._scene(form, stretch, small, watch)
         return scenes
+
+    def scene(self, form: str, duration: float) -> Scene:
+        """One form with the finite perturbation, for some time [s]."""
+        return self._scene(form, self.stretch, self.perturbation, duration)
 
     def predicted_rate(self, form: str, stretch: float) -> float:
         """Growth rate of the fastest mode about the uniform stretch [1/s]."""

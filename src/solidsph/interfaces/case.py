@@ -39,6 +39,7 @@ class Trial:
     settings: Mapping[str, Any] = attrs.field(factory=dict)  # parameters of the case
     brief: Mapping[str, Any] = attrs.field(factory=dict)  # others, for a short form of it
     must_fail: str = ""  # of a negative control: why nothing may come through
+    known: str = ""  # of a trial that the defaults do not pass: why, and what does
 
 
 class Case(ABC):
