@@ -152,8 +152,14 @@ def _sweep(target: str, case: Case, axes: Axes, means: Means, folder: Path, as_j
 def _show(target: str, made: Frontier, default: Point | None, bars: Sequence[Any]) -> None:
     show_table(
         f"{target}: the front, of {len(made)} configurations",
-        ["configuration", "error [%]", "time [s]", "steps", "pair evaluations", "memory [MiB]"],
-        [_row(point) for point in made.front()],
+        [
+            *("configuration", "error [%]", "trusted [%]", "time [s]"),
+            *("steps", "pair evaluations", "memory [MiB]"),
+        ],
+        [
+            [*_row(point)[:2], 100.0 * made.trusted(point), *_row(point)[2:]]
+            for point in made.front()
+        ],
     )
     show_table(
         "orders, by scheme",
