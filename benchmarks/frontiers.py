@@ -59,9 +59,11 @@ here is edited by hand. Measured on {day} with {versions}.
 
 A point is on the front if none is both quicker and nearer; dominated points are grey in the
 pictures. How near it is says its trusted error: the largest of its scheme at its spacing or any
-finer one. What crosses the reference on its way past it is near by chance, and gets no credit. Times are medians of {repeats} runs, each in a process of its own, building and compiling
-included, on a shared machine: read them as ratios. `solidsph cost CASE` makes the same for any
-case, `solidsph cost CASE --accuracy 1%` searches for the cheapest configuration by few runs.
+finer one. What crosses the reference on its way past it is near by chance, and gets no credit.
+
+Times are medians of {repeats} runs, each in a process of its own, building and compiling included,
+on a shared machine: read them as ratios. `solidsph cost CASE` makes the same for any case,
+`solidsph cost CASE --accuracy 1%` searches for the cheapest configuration by few runs.
 """
 
 
