@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
@@ -13,6 +12,7 @@ import numpy as np
 
 from solidsph.builder import Builder
 from solidsph.carry_out import carry_out
+from solidsph.costs.process import peak_memory
 from solidsph.errors import ConvergenceError, DivergedError
 from solidsph.interfaces.case import Case, Curves, Measurement
 from solidsph.results.record import Record
@@ -66,9 +66,10 @@ def run_case(
     for name, scene in case.scenes().items():
         simulation = Builder(scene).build()
         path = folder / f"{name}.h5"
+        observers = begin(name, simulation)
         outcome, begun = "finished", clock.perf_counter()
         try:
-            carry_out(simulation, record=path, observers=begin(name, simulation))
+            carry_out(simulation, record=path, observers=observers)
         except (DivergedError, ConvergenceError) as cause:
             if not path.exists():  # it failed before there was anything to measure
                 raise
@@ -111,8 +112,3 @@ def _told(cause: DivergedError | ConvergenceError) -> str:
     if isinstance(cause, DivergedError):
         return f"diverged at step {cause.step}: {cause.cause}"
     return f"no equilibrium beyond load factor {cause.load_factor:g}: {cause.cause}"
-
-
-def peak_memory() -> int:
-    """Largest resident size of this process so far [bytes]."""
-    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
