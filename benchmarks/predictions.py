@@ -31,15 +31,19 @@ SOFT = {"density": 1000.0, "youngs_modulus": 2e6, "poissons_ratio": 0.3}
 
 
 def block(lengths: list[float], spacing: float, **body: Any) -> Builder:
-    """A clamped block that swings."""
+    """A clamped block."""
     return (
         Simulation.builder()
         .body("block", shape={"type": "box", "lengths": lengths}, spacing=spacing, **body)
         .kernel("cubic-spline", cover=2.6)
         .material("neo-hookean", **SOFT)
         .boundary("clamp", where="left")
-        .initial(velocity={"y": "0.5*X"})
     )
+
+
+def swinging(lengths: list[float], spacing: float, **body: Any) -> Builder:
+    """The same, thrown to the side."""
+    return block(lengths, spacing, **body).initial(velocity={"y": "0.5*X"})
 
 
 def jittered() -> dict[str, Any]:
@@ -57,37 +61,37 @@ SCENES: Mapping[str, Callable[[], Builder]] = {
         .duration(1.0)
     ),
     "2D beam, compiled": lambda: beam().engine("compiled").duration(1.0).outputs(100),
-    "3D lattice, 1e5": lambda: block([0.4, 0.4, 0.64], 0.01).duration(0.03).outputs(10),
+    "3D lattice, 1e5": lambda: swinging([0.4, 0.4, 0.64], 0.01).duration(0.03).outputs(10),
     "3D jittered, 2e4": lambda: (
-        block([0.2, 0.2, 0.5], 0.01, discretisation=jittered())
+        swinging([0.2, 0.2, 0.5], 0.01, discretisation=jittered())
         .engine("compiled")
         .duration(0.1)
         .outputs(10)
     ),
     "3D float32": lambda: (
-        block([0.3, 0.3, 0.5], 0.01).engine("compiled-float32").duration(0.1).outputs(10)
+        swinging([0.3, 0.3, 0.5], 0.01).engine("compiled-float32").duration(0.1).outputs(10)
     ),
     "updated Lagrangian": lambda: (
-        block([0.5, 0.25], 0.01).formulation("updated-lagrangian").duration(0.3).outputs(20)
+        swinging([0.5, 0.25], 0.01).formulation("updated-lagrangian").duration(0.3).outputs(20)
     ),
     "hourglass control": lambda: (
-        block([0.8, 0.4], 0.01)
+        swinging([0.8, 0.4], 0.01)
         .effect("hourglass-control")
         .engine("compiled")
         .duration(0.5)
         .outputs(20)
     ),
     "viscosity and damping": lambda: (
-        block([0.6, 0.6], 0.01)
+        swinging([0.6, 0.6], 0.01)
         .effect("artificial-viscosity")
         .effect("mass-damping", rate=2.0)
         .engine("compiled")
         .duration(1.0)
         .outputs(20)
     ),
-    "many outputs": lambda: block([1.0, 0.5], 0.02).engine("matrix").duration(0.4).outputs(2000),
+    "many outputs": lambda: swinging([1.0, 0.5], 0.02).engine("matrix").duration(0.4).outputs(2000),
     "consistent gradient": lambda: (
-        block([0.3, 0.2], 0.01, discretisation=jittered())
+        swinging([0.3, 0.2], 0.01, discretisation=jittered())
         .formulation("total-lagrangian", gradient="consistent")
         .engine("matrix")
         .duration(0.3)

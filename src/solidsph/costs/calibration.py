@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time as clock
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -120,7 +121,8 @@ def _keep(path: Path, found: Calibration) -> None:
         draft.write_text(found.to_json(), encoding="utf-8")
         draft.replace(path)
     except OSError:
-        draft.unlink(missing_ok=True)
+        with suppress(OSError):
+            draft.unlink()
 
 
 def best(task: Callable[[], Any], repeats: int) -> float:

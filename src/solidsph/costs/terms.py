@@ -74,6 +74,8 @@ def step_terms(work: Work) -> Iterator[Term]:
     if work.loop is Loop.STEPS and work.conditions and _is_large(work):
         yield Term(f"step large particle {d}D", n, Yard.SPARSE)
     for part in work.tally:
+        if part.way is Way.UNKNOWN and not part.pairs:
+            continue  # a load on particles, which is among the conditions
         if work.loop is Loop.STEPS:
             yield Term(f"{part.way.name} call", 1.0, Yard.CALLS)
         yield from _sum_terms(part, d)
