@@ -18,7 +18,7 @@ _TOGETHER = 0.95
 _WORTH_A_THREAD, _PER_PARTICLE = 200_000, 10
 
 # From this size on the C library leaves arrays to the system, which clears every page [bytes].
-_LARGE = 128 * 1024
+_LARGE = 100_000
 
 _OF_BUILD = (Piece.ENGINE, Piece.MOVING_ENGINE)
 
