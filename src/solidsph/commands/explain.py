@@ -12,7 +12,7 @@ from solidsph import registry
 from solidsph.commands import prediction as told
 from solidsph.commands.console import say, show_json, show_table
 from solidsph.commands.target import parameters, resolve
-from solidsph.costs.calibration import Calibration, this_machine
+from solidsph.costs.calibration import Calibration
 from solidsph.costs.cluster import Cluster
 from solidsph.costs.counted import compiles_steps, counted
 from solidsph.costs.estimated import estimated
@@ -53,7 +53,7 @@ def explain(
     cluster = _cluster(assumed)
     scenes = wanted.scenes() if isinstance(wanted, Case) else {target: wanted}
     explanations: dict[str, dict[str, Any]] = {}
-    machine = this_machine()
+    machine = told.calibrated()
     compiled: set[Compilation] = set()
     predictions = []
     for name, scene in scenes.items():
@@ -102,8 +102,8 @@ def _together(predictions: list[Prediction]) -> dict[str, float]:
 def _explained(
     scene: Scene, machine: Calibration, cluster: Cluster, compiled: frozenset[Compilation]
 ) -> tuple[Prediction, dict[str, Any]]:
-    on_paper = predicted(estimated(scene), machine, compiled=compiled)
-    if on_paper.memory > machine_memory():
+    on_paper = _on_paper(scene, machine, compiled)
+    if on_paper is not None and on_paper.memory > machine_memory():
         return on_paper, _too_large(scene, on_paper, machine, cluster)
     simulation, build = told.built(scene)
     found = predicted(counted(simulation), machine, built=build, compiled=compiled)
@@ -114,6 +114,16 @@ def _explained(
         "cost": told.prediction_rows(found),
         "effects": _effects(simulation.effects, simulation),
     }
+
+
+def _on_paper(
+    scene: Scene, machine: Calibration, compiled: frozenset[Compilation]
+) -> Prediction | None:
+    """A first estimate; nothing where a part is wrong or strange, which the build will tell."""
+    try:
+        return predicted(estimated(scene), machine, compiled=compiled)
+    except Exception:
+        return None
 
 
 def _too_large(

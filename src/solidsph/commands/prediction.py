@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import subprocess
 import time as clock
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import attrs
+import click
 
 from solidsph.builder import Builder
 from solidsph.costs import calibration
@@ -40,6 +42,15 @@ def built(scene: Scene) -> tuple[Simulation, Built]:
     return simulation, Built(seconds, peak_memory(), memory_now())
 
 
+def calibrated() -> Calibration:
+    """This machine; where it cannot be measured, the one that the coefficients were measured on."""
+    try:
+        return calibration.this_machine()
+    except (OSError, ValueError, subprocess.SubprocessError) as cause:
+        click.echo(f"this machine could not be calibrated ({cause}): a reference is used", err=True)
+        return REFERENCE
+
+
 def of_run(
     simulation: Simulation, build: Built | None, compiled: Collection[Compilation] = ()
 ) -> Prediction | None:
@@ -53,7 +64,7 @@ def of_run(
         known = calibration.kept()
         if known is None and about.run_seconds < _NOT_WORTH_IT:
             return about
-        machine = known or calibration.this_machine()
+        machine = known or calibrated()
         return predicted(work, machine, built=build, compiled=compiled)
     except Exception:
         return None

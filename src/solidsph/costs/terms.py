@@ -17,8 +17,8 @@ _TOGETHER = 0.95
 # particle; each is counted as so many.
 _WORTH_A_THREAD, _PER_PARTICLE = 200_000, 10
 
-# From this size on the C library leaves arrays to the system, which clears every page [bytes].
-_LARGE = 100_000
+# From this size on the C library asks the system for each array, which clears every page [bytes].
+_LARGE = 128 * 1024
 
 _OF_BUILD = (Piece.ENGINE, Piece.MOVING_ENGINE)
 
@@ -71,8 +71,6 @@ def step_terms(work: Work) -> Iterator[Term]:
     for kind, count in (("motion", work.motions), ("load", work.conditions - work.motions)):
         yield Term(f"{loop} {kind} {d}D", count, Yard.CALLS)
         yield Term(f"{loop} {kind} particle {d}D", count * n, Yard.SPARSE)
-    if work.loop is Loop.STEPS and work.conditions and _is_large(work):
-        yield Term(f"step large particle {d}D", n, Yard.SPARSE)
     for part in work.tally:
         if part.way is Way.UNKNOWN and not part.pairs:
             continue  # a load on particles, which is among the conditions
@@ -98,7 +96,7 @@ def output_terms(work: Work) -> Iterator[Term]:
     yield Term("output condition", work.conditions, Yard.CALLS)
     yield Term(f"output particle {_kind(work)} {d}D", n, Yard.SPARSE)
     yield Term("output byte", work.record_bytes / work.outputs, Yard.FILING)
-    if _is_large(work):
+    if 8 * n * d * d >= _LARGE:
         yield Term(f"output large particle {d}D", n, Yard.SPARSE)
     for part in work.tally:
         if part.way in (Way.MISMATCH_PRODUCTS, Way.MISMATCH_SWEEPS):
@@ -167,11 +165,6 @@ def _sum_terms(part: Tally, d: int) -> Iterator[Term]:
     yield Term(f"{part.way.name} {d}D{precision} pair", part.pairs, Yard.SPARSE)
     if part.way in (Way.STENCILS, Way.ROWS):  # the law, which is in double precision always
         yield Term(f"{part.way.name} {d}D particle", part.particles, Yard.SPARSE)
-
-
-def _is_large(work: Work) -> bool:
-    """Whether arrays are so large that the system is asked for each, and takes it back."""
-    return 8 * work.particles * work.dimension >= _LARGE
 
 
 def _pieces(work: Work, *, of_build: bool) -> Iterator[Term]:
