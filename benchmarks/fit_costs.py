@@ -26,10 +26,7 @@ import attrs
 import numpy as np
 from scipy.optimize import nnls
 
-import solidsph.carry_out
-import solidsph.commands.run
-import solidsph.results.recorder  # part of what importing takes
-from solidsph import Simulation
+from solidsph import Simulation, carry_out
 from solidsph.builder import Builder
 from solidsph.costs import terms
 from solidsph.costs.calibration import Calibration, calibrated
@@ -152,7 +149,7 @@ def measured(specimen: Specimen) -> tuple[Work, dict[str, float]]:
     with tempfile.TemporaryDirectory() as folder:
         if specimen.statics:
             begun = clock()
-            result = solidsph.carry_out.carry_out(simulation, record=Path(folder) / "record.h5")
+            result = carry_out(simulation, record=Path(folder) / "record.h5")
             found["iteration"] = (clock() - begun) / result.effort["iterations"]
         else:
             begun = clock()
