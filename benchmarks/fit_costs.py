@@ -59,6 +59,7 @@ class Specimen:
     steps: int = 40
     statics: bool = False
     threads: int = 1
+    outputs: int = 20
 
     def builder(self) -> Builder:
         """The scene."""
@@ -92,7 +93,7 @@ class Specimen:
             builder.initial(velocity={"x": "0.01*X"})
             .integrator("central-difference", time_step=STEP)
             .duration(self.steps * STEP)
-            .outputs(10)
+            .outputs(self.outputs)
         )
 
 
@@ -135,6 +136,8 @@ def specimens() -> Iterable[Specimen]:
     for cells in ((20, 20), (60, 10), (60, 40), (100, 60), (4, 4, 12), (7, 7, 7), (9, 9, 9)):
         yield Specimen(cells, "matrix", statics=True)
     yield Specimen((60, 20), "matrix", statics=True, cover=3.5)
+    for cells, count in (((12, 10), 1000), ((40, 25), 200), ((40, 25), 600), ((10, 10, 10), 1000)):
+        yield Specimen(cells, "matrix", steps=count, outputs=count)
 
 
 def measured(specimen: Specimen) -> tuple[Work, dict[str, float]]:
@@ -162,9 +165,9 @@ def measured(specimen: Specimen) -> tuple[Work, dict[str, float]]:
             found["compile"] = compiling - 2.0 * step - observing
             if specimen.threads == 1:
                 found["step"] = step
-            many = _run_with_outputs(simulation, 20, folder)
+            many = _run_with_outputs(simulation, specimen.outputs, folder)
             one = _run_with_outputs(simulation, 1, folder)
-            found["output"] = max(1e-5, (many - one) / 19)
+            found["output"] = max(1e-5, (many - one) / (specimen.outputs - 1))
             file = one - (specimen.steps + 1) * step - 2 * found["output"]
             if file > 1e-2:  # or else it drowns in the steps
                 found["file"] = file

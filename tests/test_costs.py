@@ -19,7 +19,7 @@ from solidsph.costs import calibration
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.cluster import Cluster, priced
 from solidsph.costs.coefficients import REFERENCE
-from solidsph.costs.counted import counted
+from solidsph.costs.counted import ITERATIONS, counted
 from solidsph.costs.dissection import dissected
 from solidsph.costs.estimated import ball, cut_off, estimated, lattice_neighbours
 from solidsph.costs.model import Built, coefficient, predicted
@@ -131,7 +131,7 @@ def test_a_statics_scene_counts_iterations_and_what_its_factors_take() -> None:
     statics = counted(simulation).statics
     assert statics is not None
     assert statics.freedoms == 2 * 90  # a hundred particles, ten of them clamped
-    assert statics.iterations == 2 * 5
+    assert statics.iterations == 2 * ITERATIONS
     linear = block(10, 2).material("linear-elastic", **SOFT).statics().build()
     assert counted(linear).statics.iterations == 1  # its forces are linear
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from enum import Enum
+from math import exp
 
 import attrs
 
@@ -16,6 +17,9 @@ _TOGETHER = 0.95
 # From so many operations of about a nanosecond the compiled loop shares what it does particle by
 # particle; each is counted as so many.
 _WORTH_A_THREAD, _PER_PARTICLE = 200_000, 10
+
+# Outputs of which the library of files remembers what it wrote, before it forgets the first.
+_REMEMBERED = 150.0
 
 # From this size on the C library asks the system for each array, which clears every page [bytes].
 _LARGE = 128 * 1024
@@ -143,6 +147,8 @@ def run_memory(work: Work) -> Iterator[Term]:
     """Bytes that a run adds to what a build leaves."""
     d = work.dimension
     yield Term("memory of a run", 1.0, Yard.BYTES)
+    # The file's library keeps what it knows of past outputs, up to a limit of its own.
+    yield Term("memory of a file", 1.0 - exp(-work.outputs / _REMEMBERED), Yard.BYTES)
     yield Term(f"memory of a run, particle {_kind(work)} {d}D", work.particles, Yard.BYTES)
     for part in work.tally:
         if part.way is Way.PRODUCTS_ANEW or part.way is Way.PAIR_ARRAYS:

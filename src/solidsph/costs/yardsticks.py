@@ -106,12 +106,22 @@ def _compiling() -> tuple[float, float]:
     return first, best(lambda: njit(total)(*arguments), 2)
 
 
+def _threads() -> int:
+    """As many as the compiled loops take."""
+    wanted = os.environ.get("NUMBA_NUM_THREADS", "")
+    if wanted.isdecimal():
+        return max(1, int(wanted))
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 def measured() -> Calibration:
     """In this process, which should be fresh."""
     bare = peak_memory()
     starting, compiling = _compiling()
     compiler = peak_memory() - bare
-    threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    threads = _threads()
     filing, appending = _filing()
     copying = _copying(1)
     return Calibration(
@@ -120,8 +130,8 @@ def measured() -> Calibration:
         compiling=compiling,
         starting=starting,
         copying=copying,
-        copying_shared=min(copying, _copying(threads or 1)),
-        threads=threads or 1,
+        copying_shared=min(copying, _copying(threads)),
+        threads=threads,
         filing=filing,
         appending=appending,
         bare=bare,
