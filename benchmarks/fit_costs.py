@@ -20,6 +20,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import attrs
@@ -240,6 +241,12 @@ def fitted(rows: Sequence[tuple[Work, dict[str, float]]], units: Calibration) ->
     return found
 
 
+def _median_calibration(count: int = 7) -> dict[str, Any]:
+    """The middle of several, yardstick by yardstick."""
+    several = [attrs.asdict(calibrated()) for _ in range(count)]
+    return {name: median(one[name] for one in several) for name in several[0]}
+
+
 def unit(units: Calibration, yard: Yard) -> float:
     """What a term is counted in, [s] or [bytes]."""
     return 1.0 if yard is Yard.BYTES else float(getattr(units, yard.value))
@@ -280,7 +287,8 @@ def main() -> None:
     kept: dict[str, Any] = {}
     if options.rows and options.rows.exists():
         kept = pickle.loads(options.rows.read_bytes())
-    kept.setdefault("units", attrs.asdict(calibrated()))
+    if "units" not in kept:
+        kept["units"] = _median_calibration()
     for k, specimen in enumerate(several):
         key = repr(specimen)
         if key in kept:

@@ -60,8 +60,9 @@ SCENES: Mapping[str, Callable[[], Builder]] = {
         bar().engine("matrix").integrator("central-difference").duration(2e-3).outputs(100)
     ),
     "2D statics": lambda: (
-        block([1.0, 0.5], 0.0125)
-        .effect("body-force", acceleration={"y": -5.0})
+        block([0.35, 0.02], 0.001)
+        .material("saint-venant-kirchhoff", youngs_modulus=1.4e6, poissons_ratio=0.4, density=1e3)
+        .effect("body-force", acceleration={"y": -2.0})
         .statics()
         .duration(1.0)
     ),
