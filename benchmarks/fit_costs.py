@@ -136,7 +136,10 @@ def specimens() -> Iterable[Specimen]:
             yield Specimen(wide, "compiled", steps=20, effects=(VISCOSITY,), threads=2)
     for cells in ((20, 20), (60, 10), (60, 40), (100, 60), (4, 4, 12), (7, 7, 7), (9, 9, 9)):
         yield Specimen(cells, "matrix", statics=True)
-    yield Specimen((60, 20), "matrix", statics=True, cover=3.5)
+    for cells in ((350, 20), (240, 12), (150, 30), (400, 6)):  # slender
+        yield Specimen(cells, "matrix", statics=True)
+    for cells in ((60, 20), (141, 9)):
+        yield Specimen(cells, "matrix", statics=True, cover=3.5)
     for cells, count in (((12, 10), 1000), ((40, 25), 200), ((40, 25), 600), ((10, 10, 10), 1000)):
         yield Specimen(cells, "matrix", steps=count, outputs=count)
 
