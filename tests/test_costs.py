@@ -170,7 +170,11 @@ def test_the_ball_and_what_a_surface_cuts_off() -> None:
     # The lattice is counted but for its surface, which is taken to be flat and continuous; a
     # jittered one is taken to be a ball's volume, in which a lattice's shells are washed out.
     ("discretisation", "share"),
-    [("lattice", 0.05), ({"type": "jittered-lattice", "amplitude": 0.2, "seed": 1}, 0.12)],
+    [
+        ("lattice", 0.05),
+        ({"type": "lattice"}, 0.05),
+        ({"type": "jittered-lattice", "amplitude": 0.2, "seed": 1}, 0.12),
+    ],
 )
 def test_the_estimate_is_near_the_count(d: int, cells: int, discretisation, share: float) -> None:
     builder = block(cells, d, discretisation=discretisation)
@@ -256,7 +260,7 @@ def test_a_faster_machine_is_predicted_to_be_faster() -> None:
     work = counted(block(10, 2).build())
     double = Calibration(
         **{
-            name: value if name in ("threads", "bare", "compiler") else 0.5 * value
+            name: value if name in ("threads", "bare") else 0.5 * value
             for name, value in attrs.asdict(REFERENCE).items()
         }
     )

@@ -39,14 +39,12 @@ class Calibration:
     sparse: float  # of an entry in a product of a sparse matrix with vectors that caches hold [s]
     calls: float  # of a call of a small array function [s]
     compiling: float  # of a small function, once the compiler is there [s]
-    starting: float  # of importing the compiler, and its first function [s]
     copying: float  # of a byte beyond the caches, read and written, by one thread [s]
     copying_shared: float  # of the same by as many threads as there are cores [s]
     threads: int  # as many
     filing: float  # of a byte appended to a file of the record's kind [s]
     appending: float  # of a small step appended to it, flushed [s]
     bare: int  # memory of the process after the imports of a run [bytes]
-    compiler: int  # what the compiler and its first function add [bytes]
 
     def to_json(self) -> str:
         """Text from which an equal one is read."""

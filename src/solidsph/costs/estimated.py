@@ -8,7 +8,7 @@ within 5 %.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from math import ceil, floor, pi
 
@@ -111,7 +111,7 @@ def _body(scene: Scene, body: BodyScene) -> BodyEstimate:
     volume = shape.volume()
     volume = _sampled_volume(shape) if volume is None else volume
     sides = np.maximum(1.0, (upper - lower) / h)
-    lattice = body.discretisation == attrs.fields(BodyScene).discretisation.default
+    lattice = _on_a_lattice(body)
     particles = max(1.0, volume / h**d)
     around = lattice_neighbours(scene.cover, d) if lattice else ball(scene.cover, d)
     cut = _surface(shape) / h ** (d - 1) * cut_off(scene.cover, d) * around / ball(scene.cover, d)
@@ -123,6 +123,13 @@ def _body(scene: Scene, body: BodyScene) -> BodyEstimate:
         cells=tuple(float(side) * share ** (1.0 / d) for side in sides),
         lattice=lattice,
     )
+
+
+def _on_a_lattice(body: BodyScene) -> bool:
+    """Whether it is arranged as bodies are by default, with whatever parameters."""
+    wanted = body.discretisation
+    name = wanted.get("type") if isinstance(wanted, Mapping) else wanted
+    return bool(name == attrs.fields(BodyScene).discretisation.default)
 
 
 def ball(cover: float, dimension: int) -> float:

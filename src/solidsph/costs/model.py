@@ -98,7 +98,9 @@ def step_seconds(work: Work, machine: Calibration, threads: int | None = None) -
     count = machine.threads if threads is None else threads
     single = _seconds(terms.step_terms(work), machine)
     shared = _seconds(terms.shared_terms(work), machine)
-    return single - shared + shared / terms.together(count)
+    # No step is faster than memory: what is touched is read, where a copy reads and writes.
+    copying = machine.copying if count == 1 else machine.copying_shared
+    return max(single - shared + shared / terms.together(count), 0.5 * copying * work.touched)
 
 
 def _stepping(work: Work, machine: Calibration) -> float:

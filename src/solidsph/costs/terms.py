@@ -128,8 +128,11 @@ def build_memory(work: Work) -> Iterator[Term]:
     """Bytes at the peak of the build, beyond imports."""
     d, kind = work.dimension, _kind(work)
     yield Term("memory of a build", 1.0, Yard.BYTES)
-    yield Term(f"memory particle {d}D", work.particles, Yard.BYTES)
-    yield Term(f"memory pair {kind} {d}D", work.pairs, Yard.BYTES)
+    yield Term(f"memory particle {kind} {d}D", work.particles, Yard.BYTES)
+    if kind == "compiled":  # pairs are listed some rows at a time: what is kept counts
+        yield Term(f"memory held {d}D", work.held, Yard.BYTES)
+    else:
+        yield Term(f"memory pair {kind} {d}D", work.pairs, Yard.BYTES)
     for one in work.compilations:
         if one.piece in _OF_BUILD:
             yield Term(f"memory of {one.piece.name}", 1.0, Yard.BYTES)

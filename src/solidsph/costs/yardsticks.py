@@ -88,9 +88,7 @@ def _filing() -> tuple[float, float]:
     return large / rows.nbytes, small
 
 
-def _compiling() -> tuple[float, float]:
-    """Of the compiler with its first function, and of another one."""
-    begun = clock.process_time()
+def _compiling() -> float:
     import numpy as np
     from numba import njit
 
@@ -102,9 +100,8 @@ def _compiling() -> tuple[float, float]:
         return result
 
     arguments = np.ones(4), np.ones((4, 3))
-    njit(total)(*arguments)
-    first = clock.process_time() - begun
-    return first, best(lambda: njit(total)(*arguments), 4)
+    njit(total)(*arguments)  # the first one wakes the compiler
+    return best(lambda: njit(total)(*arguments), 4)
 
 
 def _threads() -> int:
@@ -120,8 +117,7 @@ def _threads() -> int:
 def measured() -> Calibration:
     """In this process, which should be fresh."""
     bare = peak_memory()
-    starting, compiling = _compiling()
-    compiler = peak_memory() - bare
+    compiling = _compiling()
     threads = _threads()
     filing, appending = _filing()
     copying = _copying(1)
@@ -129,14 +125,12 @@ def measured() -> Calibration:
         sparse=_sparse(),
         calls=_calls(),
         compiling=compiling,
-        starting=starting,
         copying=copying,
         copying_shared=min(copying, _copying(threads)),
         threads=threads,
         filing=filing,
         appending=appending,
         bare=bare,
-        compiler=compiler,
     )
 
 
