@@ -154,7 +154,7 @@ def _show(target: str, made: Frontier, default: Point | None, bars: Sequence[Any
         f"{target}: the front, of {len(made)} configurations",
         [
             *("configuration", "error [%]", "trusted [%]", "time [s]"),
-            *("steps", "pair evaluations", "memory [MiB]"),
+            *("steps", "pair evaluations", "bytes touched", "memory [MiB]"),
         ],
         [
             [*_row(point)[:2], 100.0 * made.trusted(point), *_row(point)[2:]]
@@ -250,7 +250,15 @@ def _search(
     else:
         show_table(
             f"{target}: what was tried",
-            ["configuration", "error [%]", "time [s]", "steps", "pair evaluations", "memory [MiB]"],
+            [
+                "configuration",
+                "error [%]",
+                "time [s]",
+                "steps",
+                "pair evaluations",
+                "bytes touched",
+                "memory [MiB]",
+            ],
             [_row(point) for point in found.tried],
         )
         say(f"{found.sure}; {found.spent:.3g} s of runs")
@@ -291,6 +299,7 @@ def _facts(point: Point) -> Mapping[str, Any]:
         "time [s]": point.time,
         "steps": point.steps,
         "pair evaluations": point.pair_evaluations,
+        "bytes touched": point.bytes_touched,
         "peak memory [bytes]": point.peak_memory,
         "outcome": point.outcome,
     }
@@ -303,6 +312,7 @@ def _row(point: Point) -> list[Any]:
         point.time,
         point.steps,
         point.pair_evaluations,
+        float(point.bytes_touched),
         point.peak_memory / 2**20,
     ]
 

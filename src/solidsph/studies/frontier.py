@@ -64,6 +64,7 @@ class Frontier:
                 "particles": point.particles,
                 "steps": point.steps,
                 "pair evaluations": point.pair_evaluations,
+                "bytes touched": point.bytes_touched,
                 "peak memory [bytes]": point.peak_memory,
                 "on the front": point in front,
                 "outcome": point.outcome,

@@ -42,6 +42,7 @@ def from_json(table: Mapping[str, Any], settings: Mapping[str, Any]) -> Point:
         particles=int(table["particles"]),
         steps=int(table["steps"]),
         pair_evaluations=int(table["pair_evaluations"]),
+        bytes_touched=int(table["bytes_touched"]),
         seconds=tuple(float(one) for one in table["seconds"]),
         peak_memory=int(table["peak_memory"]),
     )
