@@ -9,7 +9,7 @@ EXAMPLE := plugins/examples/solidsph-wendland
 BROWSER := /usr/bin/chromium /usr/bin/chromedriver
 WITHOUT := $(filter-out $(wildcard $(BROWSER)),$(BROWSER))
 
-.PHONY: demo test validate gallery bench bench-page lint format clean
+.PHONY: demo test validate gallery frontiers bench bench-page lint format clean
 
 demo: $(STAMP)  ## the paper's headline experiment: table, record and picture
 	$(BIN)/solidsph run tensile-instability
@@ -30,6 +30,9 @@ bench-page: $(STAMP)  ## the same, written to the documentation
 
 gallery: $(STAMP)  ## the figures of the paper, written to the documentation
 	$(BIN)/solidsph reproduce --page docs/gallery.md
+
+frontiers: $(STAMP)  ## error against time of the documented cases, written to the documentation
+	$(BIN)/python benchmarks/frontiers.py --write docs/what-accuracy-costs.md
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
