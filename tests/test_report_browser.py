@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import threading
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -188,6 +189,15 @@ def test_it_cannot_ask_a_network(report: webdriver.Chrome) -> None:
     assert asked == []
 
 
+def test_nothing_offers_to_send_it_somewhere(report: webdriver.Chrome) -> None:
+    buttons = every(report, ".modebar-btn")
+    titles = {button.get_attribute("data-title") for button in buttons}
+    assert "Download plot as a PNG" in titles
+    assert [title for title in titles if re.search("share|cloud|edit", title, re.IGNORECASE)] == []
+    links = [link.get_attribute("href") for link in every(report, "a[href]")]
+    assert [link for link in links if link.startswith("http")] == []
+
+
 def test_as_many_points_are_drawn_as_finished(report: webdriver.Chrome) -> None:
     finished = len(known().finished())
     assert len(every(report, f"#by-cost {MARKS}")) == finished
@@ -245,8 +255,11 @@ def test_a_click_on_a_heading_sorts(report: webdriver.Chrome) -> None:
     assert column(report, "gradient") == ["consistent"] * 4 + ["quadratic"] * 3
     sorts = [h.get_attribute("aria-sort") for h in every(report, "#points thead th")]
     assert [one for one in sorts if one] == ["ascending"]
+    press(report, "no.")
+    press(report, "no.")
+    assert column(report, "no.") == list("7654321")
     every(report, "#points tbody tr")[0].click()  # rows keep their scenes wherever they are
-    assert known().points[int(column(report, "no.")[0]) - 1].label() in one(report, "#chosen").text
+    assert known().points[6].label() in one(report, "#chosen").text
 
 
 def test_the_box_filters(report: webdriver.Chrome) -> None:
