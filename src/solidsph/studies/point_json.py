@@ -20,6 +20,7 @@ def to_json(point: Point) -> dict[str, Any]:
         "settings": plain(point.settings),
         "error": _number(point.error),
         "value": None if point.value is None else _number(point.value),
+        "reference": None if point.reference is None else _number(point.reference),
         "spacing": _number(point.spacing),
         "seconds": [_number(one) for one in point.seconds],
     }

@@ -76,7 +76,7 @@ class Figures:
     frontier: Frontier
 
     def against(self, expense: Expense) -> Mapping[str, Any]:
-        """Error against a cost: the front in black with a line, all other points in grey."""
+        """The error to be trusted against a cost: the front in black with a line, the rest grey."""
         front = [point for point in self.frontier.front(expense.of) if drawable(point)]
         known = set(self.numbers(front))
         others = [
@@ -89,7 +89,7 @@ class Figures:
             self._dots(others, expense, "dominated", marker={"color": _GREY, "size": 8}),
             {
                 "x": [expense.of(point) for point in front],
-                "y": [100.0 * point.error for point in front],
+                "y": [100.0 * self.frontier.trusted(point) for point in front],
                 "mode": "lines",
                 "line": {"color": _BLACK, "width": 1.2},
                 "hoverinfo": "skip",
@@ -169,7 +169,7 @@ class Figures:
         bars = expense is TIME and any(len(point.seconds) > 1 for point in points)
         return {
             "x": [expense.of(point) for point in points],
-            "y": [100.0 * point.error for point in points],
+            "y": [100.0 * self.frontier.trusted(point) for point in points],
             "mode": "markers",
             "name": name,
             "text": [
