@@ -5,13 +5,18 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 EXAMPLE := plugins/examples/solidsph-wendland
 
+# Tests in a browser need Debian's chromium and chromium-driver, which .ci/run installs.
+BROWSER := /usr/bin/chromium /usr/bin/chromedriver
+WITHOUT := $(filter-out $(wildcard $(BROWSER)),$(BROWSER))
+
 .PHONY: demo test validate gallery frontiers bench bench-page lint format clean
 
 demo: $(STAMP)  ## the paper's headline experiment: table, record and picture
 	$(BIN)/solidsph run tensile-instability
 
 test: $(STAMP) lint  ## lint, types and every test but the slow physics
-	$(BIN)/pytest -n 2 -m "not validation"
+	$(if $(WITHOUT),@echo "no $(WITHOUT): tests in a browser are left out; apt-get install chromium chromium-driver")
+	$(BIN)/pytest -n 2 -m "not validation$(if $(WITHOUT), and not browser)"
 
 validate: $(STAMP)  ## the slow physics
 	$(BIN)/pytest -n 2 -m validation -rP

@@ -58,9 +58,12 @@ Error against the reference and wall time, measured together. Written by `make f
 here is edited by hand. Measured on {day} with {versions}.
 
 A point is on the front if none is both quicker and nearer; dominated points are grey in the
-pictures. Times are medians of {repeats} runs, each in a process of its own, building and compiling
-included, on a shared machine: read them as ratios. `solidsph cost CASE` makes the same for any
-case, `solidsph cost CASE --accuracy 1%` searches for the cheapest configuration by few runs.
+pictures. How near it is says its trusted error: the largest of its scheme at its spacing or any
+finer one. What crosses the reference on its way past it is near by chance, and gets no credit.
+
+Times are medians of {repeats} runs, each in a process of its own, building and compiling included,
+on a shared machine: read them as ratios. `solidsph cost CASE` makes the same for any case,
+`solidsph cost CASE --accuracy 1%` searches for the cheapest configuration by few runs.
 """
 
 
@@ -102,7 +105,7 @@ def section(name: str, repeats: int, page: Path | None) -> Iterator[str]:
         kept = page.with_suffix("") / picture.name
         copied(picture, kept)
         yield f"![{name}]({kept.parent.name}/{kept.name})\n"
-    yield table("The front", made.front(), default)
+    yield table("The front", made, default)
     yield orders(made)
     excess = made.excess(default)
     yield (
@@ -113,9 +116,15 @@ def section(name: str, repeats: int, page: Path | None) -> Iterator[str]:
     yield by_search(priced, made, CASES[name])
 
 
-def table(title: str, points: Sequence[Point], default: Point) -> str:
-    columns = ("configuration", "error, %", "time, s", "pair evaluations", "memory, MiB")
-    return Table(title, columns, tuple(row(point, default) for point in points)).markdown()[1:]
+def table(title: str, made: Frontier, default: Point) -> str:
+    columns = (
+        *("configuration", "error, %", "trusted, %", "time, s"),
+        *("pair evaluations", "memory, MiB"),
+    )
+    rows = [row(point, default) for point in made.front()]
+    trusted = [f"{100.0 * made.trusted(point):.3g}" for point in made.front()]
+    cells = tuple((*one[:2], more, *one[2:]) for one, more in zip(rows, trusted, strict=True))
+    return "#" + Table(title, columns, cells).markdown()
 
 
 def row(point: Point, default: Point) -> tuple[str, ...]:
@@ -139,7 +148,7 @@ def orders(made: Frontier) -> str:
         for one in sorted(made.orders(), key=lambda one: -one.in_spacing)
     )
     columns = ("scheme", "order in spacing", "in time", "falls at every refinement")
-    return Table("Orders", columns, rows).markdown()[1:]
+    return "#" + Table("Orders", columns, rows).markdown()
 
 
 def one_at_a_time(case: Case, default: Point, means: Means) -> str:
@@ -153,7 +162,7 @@ def one_at_a_time(case: Case, default: Point, means: Means) -> str:
             mark = " (own)" if getattr(case, choice) == value else ""
             rows.append((f"{choice} {shown(value)}{mark}", *row(point, default)[1:3]))
     columns = ("one choice changed", "error, %", "time, s")
-    return Table("One choice at a time", columns, tuple(rows)).markdown()[1:]
+    return "#" + Table("One choice at a time", columns, tuple(rows)).markdown()
 
 
 def by_search(case: Case, made: Frontier, accuracy: float) -> str:

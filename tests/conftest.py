@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -14,8 +15,15 @@ settings.register_profile(
 settings.load_profile("shared")
 
 
+@pytest.fixture(scope="session")
+def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where this session keeps what the user's cache would hold."""
+    return tmp_path_factory.mktemp("cache")
+
+
 @pytest.fixture(autouse=True)
-def _plain_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No test sees a restriction of plugins that the caller's shell may hold."""
+def _plain_environment(monkeypatch: pytest.MonkeyPatch, cache_folder: Path) -> None:
+    """No test sees a restriction of plugins that the caller's shell may hold, or its cache."""
     for name in [name for name in os.environ if name.startswith("SOLIDSPH_")]:
         monkeypatch.delenv(name)
+    monkeypatch.setenv("SOLIDSPH_CACHE", str(cache_folder))

@@ -112,6 +112,7 @@ def test_the_command_and_what_it_leaves(tmp_path: Path) -> None:
     [
         (("--accuracy", "200"), "between 0 and 100 %"),
         (("--accuracy", "1%", "--time", "1s"), "one at a time"),
+        (("--accuracy", "1%", "--report"), "a sweep, not a search"),
         (("--time", "5parsec"), "such as 60s"),
         (("--axis", "across"), "name=value,value"),
         (("--axis", "across=5,5"), "twice"),

@@ -103,6 +103,19 @@ def test_the_sentence_says_what_to_do(frontier: Frontier) -> None:
     assert "10 % was not reached" in Frontier([point(0.5, 1.0, h=1)], "h").sentence()
 
 
+def test_an_error_that_refinement_takes_back_is_not_trusted() -> None:
+    lucky = [
+        attrs.evolve(known("first", h), error=e)
+        for h, e in zip(SPACINGS, (0.03, 0.001, 0.02, 0.005), strict=True)
+    ]
+    sound = attrs.evolve(known("second", 0.05), error=0.01, seconds=(lucky[1].time,))
+    made = Frontier([*lucky, sound], "spacing")
+    assert [made.trusted(point) for point in lucky] == [0.03, 0.02, 0.02, 0.005]
+    assert made.front() == [lucky[0], sound, lucky[3]]
+    assert made.cheapest(0.001) is None
+    assert made.cheapest(0.01) == sound
+
+
 def test_refinement_that_moves_away_is_told() -> None:
     away = Frontier(
         [
@@ -120,7 +133,8 @@ def test_refinement_that_moves_away_is_told() -> None:
     )
 )
 def test_no_point_beats_the_front(pairs: list[tuple[float, float]]) -> None:
-    frontier = Frontier([point(e, t, n=n) for n, (e, t) in enumerate(pairs)], "n")
+    # Each a scheme of its own.
+    frontier = Frontier([point(e, t, n=n) for n, (e, t) in enumerate(pairs)], "h")
     front = frontier.front()
     assert front
     for one in frontier.points:

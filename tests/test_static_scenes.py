@@ -136,7 +136,10 @@ def test_the_command_line_finds_explains_and_draws_it(tmp_path: Path) -> None:
     assert numbers["free displacements"] == 2 * 28  # of 32 particles, four are clamped
     assert numbers["load steps"] == 3
     assert "time step [s]" not in numbers
-    assert numbers["predicted time of an iteration [s]"] > 0.0
+    cost = {row["quantity"]: row["value"] for row in scene["cost"]}
+    assert cost["predicted wall time [s]"] > 0.0
+    work = {row["quantity"]: row["value"] for row in scene["work"]}
+    assert work["iterations"] >= 3
 
 
 def test_failure_is_code_1_with_the_load_steps_up_to_there(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from solidsph import SceneError, registry
 from solidsph.builder import Builder
+from solidsph.costs.counted import counted
 from solidsph.interfaces.case import Case
 from solidsph.scene import Scene
 from solidsph.studies.point import measured, together
@@ -61,7 +62,7 @@ def test_a_point_counts_what_no_machine_changes() -> None:
     )
     built = Builder(varied(case, {"cover": 2.2}).scenes()["csm3"]).build()
     assert one.steps == built.steps
-    assert one.pair_evaluations == built.steps * built.dynamics.internal.pair_count
+    assert one.pair_evaluations == built.steps * counted(built).visited
     assert together([one, two]).seconds == (*one.seconds, *two.seconds)
 
 

@@ -23,6 +23,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from solidsph.arrays import Array, Indices
 from solidsph.body import Body
+from solidsph.engines.tally import Tally, Way, vectors
 from solidsph.neighbours import Pairs
 
 # Of the largest eigenvalue of K over the masses, the square of a frequency.
@@ -96,6 +97,11 @@ class MismatchOperator(ABC):
     def bytes(self) -> int:
         """Memory of the arrays kept."""
 
+    @property
+    @abstractmethod
+    def tally(self) -> Tally:
+        """What an evaluation passes over."""
+
     @abstractmethod
     def forces(self, displacements: Array) -> Array:
         """Forces (n, d) [N] from displacements (n, d) [m]."""
@@ -150,6 +156,13 @@ class MismatchProducts(MismatchOperator):
     def bytes(self) -> int:
         own = [m.data.nbytes + m.indices.nbytes + m.indptr.nbytes for m in (self.jet, self.pull)]
         return sum(own) + self.mismatch.bytes
+
+    @property
+    def tally(self) -> Tally:
+        n, d = self.mismatch.body.particles.positions.shape
+        # J stands twice, d times with the gradient's pairs; Z is of jets.
+        pairs = 2 * ((self.jet.nnz - n) // d) + self.pull.nnz // (1 + d)
+        return Tally(Way.MISMATCH_PRODUCTS, pairs, n, self.bytes + vectors(n, d), self.bytes)
 
     def forces(self, displacements: Array) -> Array:
         forces: Array = -(self.jet.T @ (self.pull @ (self.jet @ displacements)))

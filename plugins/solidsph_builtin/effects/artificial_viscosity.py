@@ -127,6 +127,9 @@ class ArtificialViscosity(Effect):
     def stiffness_rate(self, bodies: Sequence[Body]) -> float:
         return 0.0
 
+    def pair_work(self, particles: float, pairs: float) -> float:
+        return pairs - particles
+
 
 @final
 @attrs.frozen(eq=False)

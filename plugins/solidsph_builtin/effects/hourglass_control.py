@@ -84,6 +84,11 @@ class HourglassControl(Effect):
     def stiffness_rate(self, bodies: Sequence[Body]) -> float:
         return max(_operator(body, self.strength).highest_frequency() for body in bodies)
 
+    def pair_work(self, particles: float, pairs: float) -> float:
+        # The gradient's pairs for H and for the stress in return, and the nearest in between: up
+        # to 26 on a lattice.
+        return 2.0 * pairs + min(pairs, 26.0 * particles)
+
 
 def _operator(body: Body, strength: float) -> MismatchOperator:
     # The step is chosen before the term is bound: what is made for one serves the other.

@@ -61,6 +61,11 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path),
     help="Folder for points, picture and scenes.  [default: results/cost/CASE]",
 )
+@click.option(
+    "--report",
+    is_flag=True,
+    help="Write a page of HTML too, with plots to explore and the scene of every point.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def cost(
@@ -74,6 +79,7 @@ def cost(
     scheduler: str | None,
     longest: str,
     output: Path | None,
+    report: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -87,6 +93,15 @@ def cost(
         raise SceneError(f"{target!r} is a scene, which has no reference; give a case")
     if accuracy is not None and time_wanted is not None:
         raise SceneError("--accuracy and --time are two questions; ask one at a time")
+    if report and (accuracy is not None or time_wanted is not None):
+        raise SceneError(
+            "--report shows a sweep, not a search; leave out --accuracy and --time: what a search "
+            "has run, the sweep takes from the journal"
+        )
+    if report:
+        from solidsph.studies.report_figures import library
+
+        library()  # missed before anything has run
     runner: Any = Processes(workers)
     if scheduler is not None:
         from solidsph.studies.cluster import Cluster  # brings the cluster's library with it
@@ -98,14 +113,23 @@ def cost(
         means = Means(runner, folder, repeats, watch)
         goal = _goal(accuracy, time_wanted)
         if goal is None:
-            _sweep(target, case, axes, means, folder, as_json)
+            _sweep(target, case, axes, means, folder, report, as_json)
         else:
             _search(target, case, goal, axes, means, folder, seconds(longest, "--longest"), as_json)
 
 
-def _sweep(target: str, case: Case, axes: Axes, means: Means, folder: Path, as_json: bool) -> None:
+def _sweep(
+    target: str,
+    case: Case,
+    axes: Axes,
+    means: Means,
+    folder: Path,
+    report: bool,
+    as_json: bool,
+) -> None:
     from solidsph.studies.cost import frontier, own_settings
     from solidsph.studies.frontier_picture import draw_frontier
+    from solidsph.studies.report import write_report
 
     made = frontier(case, axes, means)
     rows = list(made)
@@ -118,6 +142,9 @@ def _sweep(target: str, case: Case, axes: Axes, means: Means, folder: Path, as_j
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
+    page = folder / f"{target}-report.html" if report else None
+    if page is not None:
+        write_report(made, case, page)
     bars = _bars(made)
     if as_json:
         show_json(
@@ -139,12 +166,15 @@ def _sweep(target: str, case: Case, axes: Axes, means: Means, folder: Path, as_j
                 "sentence": made.sentence(),
                 "picture": str(picture),
                 "table": str(table),
+                "report": None if page is None else str(page),
             }
         )
     else:
         _show(target, made, default, bars)
         say(f"picture: {picture}")
         say(f"all points: {table}")
+        if page is not None:
+            say(f"report: {page}")
     if not made.finished():
         raise SystemExit(1)
 
@@ -152,8 +182,14 @@ def _sweep(target: str, case: Case, axes: Axes, means: Means, folder: Path, as_j
 def _show(target: str, made: Frontier, default: Point | None, bars: Sequence[Any]) -> None:
     show_table(
         f"{target}: the front, of {len(made)} configurations",
-        ["configuration", "error [%]", "time [s]", "steps", "pair evaluations", "memory [MiB]"],
-        [_row(point) for point in made.front()],
+        [
+            *("configuration", "error [%]", "trusted [%]", "time [s]"),
+            *("steps", "pair evaluations", "bytes touched", "memory [MiB]"),
+        ],
+        [
+            [*_row(point)[:2], 100.0 * made.trusted(point), *_row(point)[2:]]
+            for point in made.front()
+        ],
     )
     show_table(
         "orders, by scheme",
@@ -244,7 +280,15 @@ def _search(
     else:
         show_table(
             f"{target}: what was tried",
-            ["configuration", "error [%]", "time [s]", "steps", "pair evaluations", "memory [MiB]"],
+            [
+                "configuration",
+                "error [%]",
+                "time [s]",
+                "steps",
+                "pair evaluations",
+                "bytes touched",
+                "memory [MiB]",
+            ],
             [_row(point) for point in found.tried],
         )
         say(f"{found.sure}; {found.spent:.3g} s of runs")
@@ -285,6 +329,7 @@ def _facts(point: Point) -> Mapping[str, Any]:
         "time [s]": point.time,
         "steps": point.steps,
         "pair evaluations": point.pair_evaluations,
+        "bytes touched": point.bytes_touched,
         "peak memory [bytes]": point.peak_memory,
         "outcome": point.outcome,
     }
@@ -297,6 +342,7 @@ def _row(point: Point) -> list[Any]:
         point.time,
         point.steps,
         point.pair_evaluations,
+        float(point.bytes_touched),
         point.peak_memory / 2**20,
     ]
 

@@ -2,72 +2,180 @@
 
 from __future__ import annotations
 
-import time as clock
+from collections.abc import Mapping
 from typing import Any
 
 import attrs
 import click
-import numpy as np
 
 from solidsph import registry
+from solidsph.commands import prediction as told
 from solidsph.commands.console import say, show_json, show_table
-from solidsph.commands.target import resolve
+from solidsph.commands.target import parameters, resolve
+from solidsph.costs.calibration import Calibration
+from solidsph.costs.cluster import Cluster
+from solidsph.costs.counted import compiles_steps, counted
+from solidsph.costs.estimated import estimated
+from solidsph.costs.model import Prediction, predicted
+from solidsph.costs.process import machine_memory
+from solidsph.costs.work import Compilation
+from solidsph.errors import SceneError
 from solidsph.interfaces.case import Case
-from solidsph.scene import BodyScene, Scene
+from solidsph.parts import construct
+from solidsph.scene import DEFAULT_INTEGRATOR, BodyScene, Scene
 from solidsph.simulation import Simulation
-from solidsph.statics import critical_step, tangent
-from solidsph.statics.factors import SingularError, factorised
-from solidsph.statics.freedoms import Freedoms, freedoms
-from solidsph.statics.tangent import is_symmetric
-from solidsph.time_loop import StepByStep, StepError
-
-_TIMED = 0.1  # [s]
+from solidsph.statics import critical_step
+from solidsph.statics.freedoms import freedoms
 
 
 @click.command()
 @click.argument("target", metavar="SCENE|CASE")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A case's parameter.")
+@click.option(
+    "--cluster",
+    "assumed",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="An assumption on the cluster by which a scene larger than this machine is priced: "
+    "cores, memory [GiB], bandwidth [GB/s], network [GB/s], latency [us], storage [GB/s], "
+    "efficiency, usable.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
-def explain(target: str, settings: tuple[str, ...], as_json: bool) -> None:
-    """Say what would be simulated, why, and at what cost. Nothing is run or written."""
+def explain(
+    target: str, settings: tuple[str, ...], assumed: tuple[str, ...], as_json: bool
+) -> None:
+    """Say what would be simulated, why, and at what cost. Nothing is run or written.
+
+    Scenes are built, to be counted; one that needs more memory than this machine has is priced
+    on paper.
+    """
     wanted = resolve(target, settings)
+    cluster = _cluster(assumed)
     scenes = wanted.scenes() if isinstance(wanted, Case) else {target: wanted}
-    explanations = {name: _explained(scene) for name, scene in scenes.items()}
+    explanations: dict[str, dict[str, Any]] = {}
+    machine = told.calibrated()
+    compiled: set[Compilation] = set()
+    predictions = []
+    for name, scene in scenes.items():
+        found, explanations[name] = _explained(scene, machine, cluster, frozenset(compiled))
+        compiled |= found.work.compilations
+        predictions.append(found)
     if as_json:
-        show_json({"scenes": explanations})
+        show_json({"scenes": explanations, "predicted": _together(predictions)})
         return
     for name, facts in explanations.items():
         say(f"\n{name}: {scenes[name].title}" if scenes[name].title else f"\n{name}")
         show_table(
             "parts", ["kind", "name", "from", "why"], [list(row.values()) for row in facts["parts"]]
         )
-        show_table(
-            "numbers", ["", "value", "why"], [list(row.values()) for row in facts["numbers"]]
-        )
+        for title in ("numbers", "work", "cost", "on a cluster"):
+            if facts.get(title):
+                rows = [list(row.values()) for row in facts[title]]
+                show_table(title, ["", "value", "why"], rows)
         show_table(
             "effects",
             ["effect", "simulated", "why", "arrays [bytes]"],
             [list(row.values()) for row in facts["effects"]],
         )
+    if len(predictions) > 1:
+        rows = [[key, value] for key, value in _together(predictions).items()]
+        show_table("all scenes, one after the other", ["", "value"], rows)
 
 
-def _explained(scene: Scene) -> dict[str, Any]:
-    from solidsph.builder import Builder
+def _cluster(assumed: tuple[str, ...]) -> Cluster:
+    values = parameters(assumed)
+    known = [field.name for field in attrs.fields(Cluster)]
+    for name in values:
+        if name not in known:
+            raise SceneError(f"--cluster: unknown {name!r}; known: {', '.join(known)}")
+    return Cluster(**values)
 
-    simulation = Builder(scene).build()
+
+def _together(predictions: list[Prediction]) -> dict[str, float]:
     return {
-        "parts": [
-            {
-                "kind": registry.singular(entry.kind),
-                "name": entry.name or entry.target,
-                "from": f"{entry.distribution} {entry.version}".strip() or "this Python session",
-                "why": _why(scene, entry),
-            }
-            for entry in simulation.parts
-        ],
-        "numbers": _numbers(simulation),
-        "effects": _effects(simulation),
+        "wall time [s]": sum(one.seconds for one in predictions),
+        "peak memory [MiB]": max(one.memory for one in predictions) / 2**20,
+        "pair evaluations": sum(one.work.pair_evaluations for one in predictions),
     }
+
+
+def _explained(
+    scene: Scene, machine: Calibration, cluster: Cluster, compiled: frozenset[Compilation]
+) -> tuple[Prediction, dict[str, Any]]:
+    on_paper = _on_paper(scene, machine, compiled)
+    if on_paper is not None and on_paper.memory > machine_memory():
+        return on_paper, _too_large(scene, on_paper, machine, cluster)
+    simulation, build = told.built(scene)
+    found = predicted(counted(simulation), machine, built=build, compiled=compiled)
+    return found, {
+        "parts": _parts(scene, simulation.parts),
+        "numbers": _numbers(simulation),
+        "work": told.work_rows(found.work),
+        "cost": told.prediction_rows(found),
+        "effects": _effects(simulation.effects, simulation),
+    }
+
+
+def _on_paper(
+    scene: Scene, machine: Calibration, compiled: frozenset[Compilation]
+) -> Prediction | None:
+    """A first estimate; nothing where a part is wrong or strange, which the build will tell."""
+    try:
+        return predicted(estimated(scene), machine, compiled=compiled)
+    except Exception:
+        return None
+
+
+def _too_large(
+    scene: Scene, found: Prediction, machine: Calibration, cluster: Cluster
+) -> dict[str, Any]:
+    work = found.work
+    rows = [
+        ("dimensions", work.dimension, "1 is uniaxial strain, 2 is plane strain"),
+        ("particles", work.particles, "about: volume over the cell, ghosts left out"),
+        ("steps", work.steps, "about: by wave speed and spacing alone"),
+    ]
+    _, priced = told.cluster_rows(found, machine, cluster)
+    effects = {
+        one.label or str(k): construct("effects", one.part) for k, one in enumerate(scene.effects)
+    }
+    return {
+        "parts": _parts(scene, _named(scene)),
+        "numbers": [{"quantity": name, "value": value, "why": why} for name, value, why in rows],
+        "work": told.work_rows(work),
+        "cost": told.prediction_rows(found),
+        "on a cluster": priced,
+        "effects": _effects(effects, None),
+    }
+
+
+def _named(scene: Scene) -> tuple[registry.Entry, ...]:
+    """The parts that a scene names, without what is inside of them."""
+    wanted: list[tuple[str, Any]] = [
+        ("kernels", scene.kernel),
+        ("formulations", scene.formulation),
+        ("integrators", scene.integrator or DEFAULT_INTEGRATOR),
+        *(("boundaries", one.part) for one in scene.boundaries),
+        *(("effects", one.part) for one in scene.effects),
+    ]
+    for body in scene.bodies.values():
+        material = body.material if body.material is not None else scene.material
+        wanted += [("shapes", body.shape), ("discretisations", body.discretisation)]
+        wanted += [("materials", material)]
+    made = [(kind, construct(kind, part)) for kind, part in wanted]
+    return tuple(dict.fromkeys(registry.entry_of(kind, part) for kind, part in made))
+
+
+def _parts(scene: Scene, entries: tuple[registry.Entry, ...]) -> list[dict[str, Any]]:
+    return [
+        {
+            "kind": registry.singular(entry.kind),
+            "name": entry.name or entry.target,
+            "from": f"{entry.distribution} {entry.version}".strip() or "this Python session",
+            "why": _why(scene, entry),
+        }
+        for entry in entries
+    ]
 
 
 _DEFAULT = "the default: the scene names no other"
@@ -113,7 +221,6 @@ def _of_motion(simulation: Simulation) -> list[tuple[str, Any, str]]:
     scene = simulation.scene
     stated = scene.time_step is not None
     margin = critical_step(simulation).margin
-    outputs = len(simulation.output_steps()) + 1
     return [
         (
             "time step [s]",
@@ -131,12 +238,6 @@ def _of_motion(simulation: Simulation) -> list[tuple[str, Any, str]]:
         ),
         ("steps", simulation.steps, f"for {scene.duration:g} s"),
         _loop(simulation),
-        (
-            "predicted wall time [s]",
-            _seconds_per_step(simulation) * simulation.steps,
-            "some steps timed here and now, without outputs and compiling",
-        ),
-        _record_size(simulation, outputs),
     ]
 
 
@@ -148,68 +249,28 @@ def _of_statics(simulation: Simulation) -> list[tuple[str, Any, str]]:
         ("free displacements", own.count, "unknowns of Newton's method"),
         ("load steps", wanted.load_steps, "to begin with: halved on failure, doubled on success"),
         ("tolerance", wanted.tolerance, "imbalance of forces over loads and reactions"),
-        (
-            "predicted time of an iteration [s]",
-            _seconds_per_iteration(simulation, own),
-            "one tangent built and factorised here and now; some five a load step",
-        ),
-        _record_size(simulation, wanted.load_steps + 1),
     ]
 
 
-def _record_size(simulation: Simulation, outputs: int) -> tuple[str, Any, str]:
-    d, count = simulation.particles.dimension, simulation.particles.count
-    return (
-        "record [MiB]",
-        outputs * count * 8 * (7 + d + d * d) / 2**20,
-        f"{outputs} outputs of position, velocity, stress and volume ratio, about",
-    )
-
-
-def _seconds_per_step(simulation: Simulation) -> float:
-    """Without what is done once for all steps together; not a number if it fails at once."""
-    loop = simulation.time_loop()
-    count, taken = 1, 0.0
-    try:
-        state = loop.advance(simulation.start(), 1)  # compiles what is to be compiled
-        while taken < _TIMED:
-            count *= 2
-            begun = clock.perf_counter()
-            loop.advance(state, 1 + count)
-            taken = clock.perf_counter() - begun
-    except StepError:
-        return float("nan")
-    return taken / count
-
-
 def _loop(simulation: Simulation) -> tuple[str, str, str]:
-    if isinstance(simulation.time_loop(), StepByStep):
-        return ("time loop", "step by step", "each step by the parts themselves, which fits all")
-    return ("time loop", "compiled", "whole steps together: all parts are of declared kinds")
+    if compiles_steps(simulation):
+        return ("time loop", "compiled", "whole steps together: all parts are of declared kinds")
+    return ("time loop", "step by step", "each step by the parts themselves, which fits all")
 
 
-def _seconds_per_iteration(simulation: Simulation, own: Freedoms) -> float:
-    begun = clock.perf_counter()
-    K = tangent(simulation, np.zeros_like(simulation.particles.positions))
-    try:
-        factorised(own.reduced(K), symmetric=own.adjoint and is_symmetric(simulation))
-    except SingularError:
-        return float("nan")  # nothing holds the body: the run will say so
-    return clock.perf_counter() - begun
-
-
-def _effects(simulation: Simulation) -> list[dict[str, Any]]:
+def _effects(effects: Mapping[str, Any], simulation: Simulation | None) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     named = set()
-    for label, effect in simulation.effects.items():
+    for label, effect in effects.items():
         name = registry.entry_of("effects", effect).name
         named.add(name)
+        arrays = 0 if simulation is None else sum(effect.arrays(simulation.setting).values())
         rows.append(
             {
-                "effect": label,
+                "effect": label if simulation is not None else name,
                 "simulated": True,
                 "why": "named by the scene",
-                "arrays": sum(effect.arrays(simulation.setting).values()),
+                "arrays": arrays,
             }
         )
     rows += [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,6 +12,10 @@ from solidsph.commands.console import ProgressObserver, progress, say, show_json
 from solidsph.commands.target import resolve
 from solidsph.interfaces.case import Case, Measurement
 from solidsph.scene import Scene
+
+if TYPE_CHECKING:
+    from solidsph.costs.model import Prediction
+    from solidsph.costs.work import Compilation
 
 
 @click.command()
@@ -60,24 +64,31 @@ def _write(wanted: Scene | Case, path: Path) -> None:
 
 
 def _run_scene(target: str, scene: Scene, folder: Path, *, shown: bool, as_json: bool) -> None:
-    from solidsph.builder import Builder
     from solidsph.carry_out import carry_out
+    from solidsph.commands import prediction as told
+    from solidsph.costs.process import peak_memory
     from solidsph.results.record import Record
-    from solidsph.studies.case_run import peak_memory
 
-    simulation = Builder(scene).build()
+    simulation, build = told.built(scene)
+    prediction = told.of_run(simulation, build)
+    if shown and prediction is not None and prediction.seconds > told.LONG:
+        say(told.announcement(prediction))
     path = folder / "record.h5"
     with progress(shown) as display:
         observers = [ProgressObserver(display, Path(target).stem, simulation)] if display else []
         result = carry_out(simulation, record=path, observers=observers)
     with Record(path) as record:
         history = {name: float(values[-1]) for name, values in record.history.items()}
+    memory = peak_memory()
     facts: dict[str, Any] = {
         "particles": simulation.particles.count,
         "pairs": simulation.dynamics.internal.pair_count,
+        **({} if prediction is None else told.work_done(prediction.work, result.effort)),
         **result.effort,
+        "build time [s]": build.seconds,
         "wall time [s]": result.seconds,
-        "peak memory [MiB]": peak_memory() / 2**20,
+        "peak memory [MiB]": memory / 2**20,
+        **told.scored(prediction, result.seconds, memory),
     }
     if as_json:
         show_json({"scene": target, "record": str(path), **facts, "final": history})
@@ -88,26 +99,34 @@ def _run_scene(target: str, scene: Scene, folder: Path, *, shown: bool, as_json:
 
 
 def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bool) -> None:
+    from solidsph.commands import prediction as told
     from solidsph.studies.case_run import run_case
 
+    case_predictions: dict[str, Prediction | None] = {}
+    compiled: set[Compilation] = set()
     with progress(shown) as display:
 
         def begin(name: str, simulation: Any) -> Sequence[object]:
+            case_predictions[name] = told.of_run(simulation, None, frozenset(compiled))
+            compiled.update(told.compilations(case_predictions[name]))
             return [ProgressObserver(display, name, simulation)] if display else []
 
         result = run_case(case, folder, begin=begin)
+    predictions = told.scores(case_predictions, result.runs)
     if as_json:
         show_json(
             {
                 "case": target,
                 "passed": result.passed,
                 "peak memory [bytes]": result.peak_memory,
+                "predicted": told.sums(result.runs, predictions),
                 "measurements": [_row(m) for m in result.measurements],
                 "runs": [
                     {
                         "scene": r.name,
                         "outcome": r.outcome,
                         "wall time [s]": r.seconds,
+                        "predicted wall time [s]": predictions[r.name],
                         "steps": r.steps,
                         "particles": r.particles,
                         "pairs": r.pairs,
@@ -132,12 +151,22 @@ def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bo
         if result.runs:
             show_table(
                 "runs",
-                ["scene", "outcome", "wall time [s]", "steps", "particles", "pairs"],
+                ["scene", "outcome", "wall time [s]", "predicted", "steps", "particles", "pairs"],
                 [
-                    [r.name, r.outcome, r.seconds, r.steps, r.particles, r.pairs]
+                    [
+                        r.name,
+                        r.outcome,
+                        r.seconds,
+                        predictions[r.name],
+                        r.steps,
+                        r.particles,
+                        r.pairs,
+                    ]
                     for r in result.runs
                 ],
             )
+            together = told.sums(result.runs, predictions)
+            show_table("all runs", ["", "value"], [[k, v] for k, v in together.items()])
         sources = {m.source for m in result.measurements if m.source}
         for source in sorted(sources):
             say(f"reference: {source}")

@@ -10,6 +10,7 @@ import attrs
 
 from solidsph.arrays import Array
 from solidsph.body import Body
+from solidsph.engines.tally import Tally, Way
 from solidsph.interfaces.condition import StressCondition
 
 if TYPE_CHECKING:
@@ -42,6 +43,20 @@ class InternalForces(ABC):
     @abstractmethod
     def fields(self, displacements: Array) -> StressFields:
         """Deformation, stress and energy at the same displacements, for reports and records."""
+
+    @property
+    def tally(self) -> Sequence[Tally]:
+        """What one evaluation passes over, part by part, for those who count and price it.
+
+        An engine that does not say is taken for one that keeps nothing but its pairs' indices.
+        """
+        own = 8 * self.pair_count
+        return (Tally(Way.UNKNOWN, self.pair_count, 0, own, own),)
+
+    @property
+    def bytes(self) -> int:
+        """Memory of the arrays kept between evaluations."""
+        return sum(part.held for part in self.tally)
 
     def time_loop(self, dynamics: Dynamics, integrator: Integrator, step_size: float) -> TimeLoop:
         """How steps under these forces are carried out; an engine may have a way of its own."""

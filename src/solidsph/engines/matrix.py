@@ -15,6 +15,7 @@ from scipy.sparse import csr_array, hstack, vstack
 from solidsph.arrays import Array, Mask, Tensor
 from solidsph.body import Body
 from solidsph.engines.engine import Engine, InternalForces, StressFields
+from solidsph.engines.tally import Tally, Way, array_bytes, vectors
 from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.formulation import Configuration
 from solidsph.neighbours import Pairs, neighbour_pairs
@@ -27,6 +28,14 @@ class Operators:
 
     gradient: csr_array  # (d n, n): row k n + p gives the derivative along axis k at p [1/m]
     force: csr_array  # (n, d n): from stress components along axis k to force [m^(d-1)]
+
+    @property
+    def bytes(self) -> int:
+        """Memory of both."""
+        return sum(
+            array_bytes((matrix.data, matrix.indices, matrix.indptr))
+            for matrix in (self.gradient, self.force)
+        )
 
 
 def operators(body: Body, pairs: Pairs, crowding: Array | float = 1.0) -> Operators:
@@ -56,6 +65,14 @@ class _FixedBody:
     def operators(self, displacements: Array) -> Operators:
         return self.constant
 
+    @property
+    def tally(self) -> Tally:
+        """What an evaluation passes over."""
+        n, d = self.body.particles.positions.shape
+        held = self.constant.bytes
+        pairs = self.constant.gradient.nnz // d
+        return Tally(Way.PRODUCTS, pairs, n, held + vectors(n, d), held)
+
 
 @final
 @attrs.frozen(eq=False)
@@ -64,6 +81,7 @@ class _FollowedBody:
 
     body: Body
     reference_sums: Array  # (n,) sum of V_q W at the start, the measure of a full neighbourhood
+    pair_count: int  # at the start
 
     def operators(self, displacements: Array) -> Operators:
         body, particles = self.body, self.body.particles
@@ -72,6 +90,17 @@ class _FollowedBody:
         # The volume follows the crowding of particles, relative to that of the reference
         # configuration, so that the deficit at a surface cancels.
         return operators(body, pairs, self.reference_sums / kernel_sums(body, pairs))
+
+    @property
+    def tally(self) -> Tally:
+        """What an evaluation passes over, with the neighbours of the start."""
+        n, d = self.body.particles.positions.shape
+        # Pairs, and both matrices: numbers and indices of 8 bytes, written and read.
+        matrices = 2 * self.pair_count * d * (8 + 8)
+        pairs = self.pair_count * (8 * d + 3 * 8)
+        held = self.reference_sums.nbytes
+        touched = held + 2 * (matrices + pairs) + vectors(n, d)
+        return Tally(Way.PRODUCTS_ANEW, self.pair_count, n, touched, held)
 
 
 def kernel_sums(body: Body, pairs: Pairs) -> Array:
@@ -88,6 +117,10 @@ class MatrixForces(InternalForces):
     parts: Sequence[_FixedBody | _FollowedBody]
     conditions: Sequence[StressCondition]
     pair_count: int
+
+    @property
+    def tally(self) -> Sequence[Tally]:
+        return tuple(part.tally for part in self.parts)
 
     def forces(self, time: float, displacements: Array) -> Array:
         n, d = displacements.shape
@@ -174,5 +207,5 @@ class MatrixEngine(Engine):
                 matrices = operators(body, pairs)
                 parts.append(_FixedBody(body, matrices))
             else:
-                parts.append(_FollowedBody(body, kernel_sums(body, pairs)))
+                parts.append(_FollowedBody(body, kernel_sums(body, pairs), pairs.count))
         return MatrixForces(tuple(parts), tuple(conditions), count)

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, TypeAlias
 import attrs
 
 from solidsph.arrays import Array
+from solidsph.errors import SceneError
 from solidsph.results.record import Record
 from solidsph.scene import Scene
 
@@ -81,8 +82,17 @@ class Case(ABC):
         return self
 
     def accuracy(self, measurements: Sequence[Measurement]) -> Measurement:
-        """The one of its measurements whose error is held against cost."""
-        return next(m for m in measurements if m.error is not None)
+        """The one of its measurements whose error is held against cost.
+
+        Raises:
+            SceneError: none of them has an error.
+        """
+        found = next((m for m in measurements if m.error is not None), None)
+        if found is None:
+            raise SceneError(
+                f"{self.title!r} has no reference at these parameters; leave them as they are"
+            )
+        return found
 
     @property
     def resolution(self) -> float:

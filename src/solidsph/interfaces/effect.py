@@ -35,3 +35,12 @@ class Effect(ABC):
     @abstractmethod
     def stiffness_rate(self, bodies: Sequence[Body]) -> float:
         """Angular frequency that its stiffness adds at most [rad/s]; 0 if none."""
+
+    def pair_work(self, particles: float, pairs: float) -> float:
+        """Pairs that an evaluation of its forces visits, by what the cost of a run is estimated.
+
+        Args:
+            particles: how many the scene has.
+            pairs: ordered ones within the support, self pairs included.
+        """
+        return 0.0

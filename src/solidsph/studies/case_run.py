@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import resource
-import sys
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -16,6 +13,8 @@ import numpy as np
 
 from solidsph.builder import Builder
 from solidsph.carry_out import carry_out
+from solidsph.costs.counted import counted
+from solidsph.costs.process import peak_memory
 from solidsph.errors import ConvergenceError, DivergedError
 from solidsph.interfaces.case import Case, Curves, Measurement
 from solidsph.results.record import Record
@@ -35,6 +34,8 @@ class SceneRun:
     evaluations: int  # of the forces, or of the tangent
     particles: int
     pairs: int
+    pairs_visited: int  # by an evaluation, for effects too
+    bytes_touched: int  # that an evaluation must move at least
     outcome: str
 
 
@@ -87,13 +88,15 @@ def run_scenes(case: Case, folder: Path, *, begin: Begin = _unobserved) -> Seque
         outcome, begun = FINISHED, clock.perf_counter()
         simulation = Builder(scene).build()
         effort: Mapping[str, Any] = {}
+        observers = begin(name, simulation)
         try:
-            effort = carry_out(simulation, record=path, observers=begin(name, simulation)).effort
+            effort = carry_out(simulation, record=path, observers=observers).effort
         except (DivergedError, ConvergenceError) as cause:
             if not path.exists():  # it failed before there was anything to measure
                 raise
             outcome = _told(cause)
         seconds = clock.perf_counter() - begun
+        work = counted(simulation)
         with Record(path) as record:
             steps = int(record.steps[-1])
         runs.append(
@@ -105,6 +108,8 @@ def run_scenes(case: Case, folder: Path, *, begin: Begin = _unobserved) -> Seque
                 evaluations=effort.get("iterations", steps),
                 particles=simulation.particles.count,
                 pairs=simulation.dynamics.internal.pair_count,
+                pairs_visited=work.visited,
+                bytes_touched=work.touched,
                 outcome=outcome,
             )
         )
@@ -129,15 +134,3 @@ def _told(cause: DivergedError | ConvergenceError) -> str:
     if isinstance(cause, DivergedError):
         return f"diverged at step {cause.step}: {cause.cause}"
     return f"no equilibrium beyond load factor {cause.load_factor:g}: {cause.cause}"
-
-
-def peak_memory() -> int:
-    """Largest resident size of this process so far [bytes]."""
-    # Linux counts towards ru_maxrss what the process was that started this one.
-    status = Path("/proc/self/status")
-    if status.exists():
-        found = re.search(r"VmHWM:\s*(\d+) kB", status.read_text())
-        if found:
-            return 1024 * int(found[1])
-    largest = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return largest if sys.platform == "darwin" else 1024 * largest

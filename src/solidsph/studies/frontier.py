@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
 from itertools import pairwise
 from math import inf, isfinite, log, nan
 from typing import Any, final
@@ -26,12 +27,28 @@ class Orders:
 
 
 @final
-@attrs.frozen
+@attrs.frozen(slots=False)
 class Frontier:
     """The points of a sweep over one case. Iterating gives a row for each, as pandas takes them."""
 
     points: Sequence[Point]
     refining: str  # the setting that refines
+
+    @cached_property
+    def _trusted(self) -> Mapping[int, float]:
+        """Of every point, by its identity: the largest error of its scheme at its spacing or any
+        finer one."""
+        trusted = {}
+        for points in self.schemes().values():
+            largest = 0.0
+            for point in reversed(points):
+                largest = max(largest, point.error)
+                trusted[id(point)] = largest
+        return trusted
+
+    def trusted(self, point: Point) -> float:
+        """An error that refinement does not take back [-]: a smaller one was small by chance."""
+        return self._trusted.get(id(point), point.error)
 
     def __iter__(self) -> Iterator[Mapping[str, Any]]:
         front = self.front()
@@ -39,6 +56,7 @@ class Frontier:
             yield {
                 **point.settings,
                 "error": point.error,
+                "trusted error": self.trusted(point),
                 "time [s]": point.time,
                 "shortest [s]": min(point.seconds),
                 "longest [s]": max(point.seconds),
@@ -46,6 +64,7 @@ class Frontier:
                 "particles": point.particles,
                 "steps": point.steps,
                 "pair evaluations": point.pair_evaluations,
+                "bytes touched": point.bytes_touched,
                 "peak memory [bytes]": point.peak_memory,
                 "on the front": point in front,
                 "outcome": point.outcome,
@@ -57,12 +76,15 @@ class Frontier:
     def front(self, cost: Cost = lambda point: point.time) -> Sequence[Point]:
         """Points than which none is both cheaper and nearer, by rising cost.
 
+        How near a point is says the error that can be trusted: what crosses the reference on its
+        way past it is not nearer for that.
+
         Args:
             cost: what is cheap: by default the median wall time.
         """
         chosen: list[Point] = []
-        for point in sorted(self.finished(), key=lambda point: (cost(point), point.error)):
-            if not chosen or point.error < chosen[-1].error:
+        for point in sorted(self.finished(), key=lambda point: (cost(point), self.trusted(point))):
+            if not chosen or self.trusted(point) < self.trusted(chosen[-1]):
                 chosen.append(point)
         return chosen
 
@@ -102,12 +124,12 @@ class Frontier:
     def next_digit(self) -> float:
         """How many times the time a tenth of the error takes, along the front."""
         front = self.front()
-        falls = -power([point.time for point in front], [point.error for point in front])
+        falls = -power([point.time for point in front], [self.trusted(point) for point in front])
         return 10.0 ** (1.0 / falls) if falls > 0.0 else inf
 
     def cheapest(self, accuracy: float) -> Point | None:
-        """The quickest point with at most that error."""
-        within = [point for point in self.front() if point.error <= accuracy]
+        """The quickest point with at most that error, to be trusted."""
+        within = [point for point in self.front() if self.trusted(point) <= accuracy]
         return within[0] if within else None
 
     def best(self, time: float) -> Point | None:
@@ -122,7 +144,7 @@ class Frontier:
         """
         if not point.finished:
             return inf
-        cheaper = self.cheapest(point.error)
+        cheaper = self.cheapest(self.trusted(point))
         return 1.0 if cheaper is None else max(1.0, point.time / cheaper.time)
 
     def sentence(self) -> str:
@@ -142,8 +164,8 @@ class Frontier:
         if not parts:
             parts.append(f"10 % was not reached by any of {len(self.points)} configurations")
         parts.append(
-            f"nothing was nearer than {100.0 * last.error:.2g} %, in {_time(last.time)} with "
-            f"{last.label()}"
+            f"nothing was nearer than {100.0 * self.trusted(last):.2g} %, in {_time(last.time)} "
+            f"with {last.label()}"
         )
         price = self.next_digit()
         if isfinite(price) and len(front) > 1:

@@ -16,8 +16,8 @@ _MARKERS = "osD^vP*X<>"
 
 
 def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
-    """Dominated points in grey, the front in black; bars go from the quickest repeat to the
-    slowest. On the right every scheme as it is refined.
+    """Dominated points in grey, the front in black, where errors are those that can be trusted;
+    bars go from the quickest repeat to the slowest. On the right every scheme as it is refined.
     """
     figure = Figure(figsize=(13.0, 6.0), layout="constrained")
     by_time, by_spacing = figure.subplots(1, 2, sharey=True)
@@ -26,21 +26,21 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
     markers = {scheme: _MARKERS[i % len(_MARKERS)] for i, scheme in enumerate(schemes)}
 
     others = [point for point in frontier.finished() if point not in front]
-    _points(by_time, others, "o", "0.75", "dominated")
+    _points(by_time, frontier, others, "o", "0.75", "dominated")
     by_time.loglog(
         [point.time for point in front],
-        [100.0 * point.error for point in front],
+        [100.0 * frontier.trusted(point) for point in front],
         color="black",
         linewidth=1.0,
         zorder=2,
     )
     for scheme, marker in markers.items():
         mine = [point for point in front if frontier.scheme(point) == scheme]
-        _points(by_time, mine, marker, "black", scheme)
+        _points(by_time, frontier, mine, marker, "black", scheme)
     for point in front:
         by_time.annotate(
             shown(point.settings.get(frontier.refining, "")),
-            (point.time, 100.0 * point.error),
+            (point.time, 100.0 * frontier.trusted(point)),
             xytext=(6, 5),
             textcoords="offset points",
             fontsize=8,
@@ -84,12 +84,19 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
     figure.savefig(path, dpi=150)
 
 
-def _points(axes: Axes, points: Sequence[Point], marker: str, color: str, label: str) -> None:
+def _points(
+    axes: Axes,
+    frontier: Frontier,
+    points: Sequence[Point],
+    marker: str,
+    color: str,
+    label: str,
+) -> None:
     if not points:
         return
     axes.errorbar(
         [point.time for point in points],
-        [100.0 * point.error for point in points],
+        [100.0 * frontier.trusted(point) for point in points],
         xerr=[
             [point.time - min(point.seconds) for point in points],
             [max(point.seconds) - point.time for point in points],

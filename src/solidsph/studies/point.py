@@ -12,9 +12,10 @@ from typing import Any
 
 import attrs
 
+from solidsph.costs.process import peak_memory
 from solidsph.errors import SolidsphError
 from solidsph.interfaces.case import Case
-from solidsph.studies.case_run import FINISHED, opened, peak_memory, run_scenes
+from solidsph.studies.case_run import FINISHED, opened, run_scenes
 from solidsph.studies.varied import varied
 
 
@@ -31,7 +32,8 @@ class Point:
     spacing: float = inf  # of the particles [m]
     particles: int = 0
     steps: int = 0
-    pair_evaluations: int = 0
+    pair_evaluations: int = 0  # pairs visited in all evaluations, those of effects included
+    bytes_touched: int = 0  # that all evaluations must move at least
     seconds: Sequence[float] = (inf,)  # wall time of every repeat [s]
     peak_memory: int = 0  # largest of a whole process [bytes]
 
@@ -74,7 +76,8 @@ def measured(case: Case, settings: Mapping[str, Any]) -> Point:
             spacing=wanted.resolution,
             particles=sum(run.particles for run in runs),
             steps=sum(run.steps for run in runs),
-            pair_evaluations=sum(run.pairs * run.evaluations for run in runs),
+            pair_evaluations=sum(run.pairs_visited * run.evaluations for run in runs),
+            bytes_touched=sum(run.bytes_touched * run.evaluations for run in runs),
             seconds=(seconds,),
             peak_memory=peak_memory(),
         )

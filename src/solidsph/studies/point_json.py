@@ -20,6 +20,7 @@ def to_json(point: Point) -> dict[str, Any]:
         "settings": plain(point.settings),
         "error": _number(point.error),
         "value": None if point.value is None else _number(point.value),
+        "reference": None if point.reference is None else _number(point.reference),
         "spacing": _number(point.spacing),
         "seconds": [_number(one) for one in point.seconds],
     }
@@ -42,6 +43,7 @@ def from_json(table: Mapping[str, Any], settings: Mapping[str, Any]) -> Point:
         particles=int(table["particles"]),
         steps=int(table["steps"]),
         pair_evaluations=int(table["pair_evaluations"]),
+        bytes_touched=int(table["bytes_touched"]),
         seconds=tuple(float(one) for one in table["seconds"]),
         peak_memory=int(table["peak_memory"]),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import pairwise, product
+from itertools import product
 from math import inf, isfinite, log
 from statistics import median
 from typing import Any, final
@@ -54,6 +54,10 @@ class Goal(ABC):
         """Whether a point of that predicted error and time would be good enough."""
 
     @abstractmethod
+    def refuted(self, finer: Point) -> bool:
+        """Whether a finer point of its scheme shows that a point was good enough by chance."""
+
+    @abstractmethod
     def exhausted(self, error: float, time: float) -> bool:
         """Whether nothing finer than a point of that error and time can be."""
 
@@ -74,6 +78,9 @@ class Accuracy(Goal):
     def promising(self, error: float, time: float) -> bool:
         return error <= _MISS * self.error
 
+    def refuted(self, finer: Point) -> bool:
+        return finer.error > self.error
+
     def exhausted(self, error: float, time: float) -> bool:
         return error <= self.error
 
@@ -93,6 +100,9 @@ class Within(Goal):
 
     def promising(self, error: float, time: float) -> bool:
         return time <= _MISS * self.time
+
+    def refuted(self, finer: Point) -> bool:
+        return False  # whatever it is, it is the smallest that was found
 
     def exhausted(self, error: float, time: float) -> bool:
         return time > self.time
@@ -126,7 +136,8 @@ def search(
     from it in one choice, run at their coarsest: what each choice does to error and time is taken
     to do the same in any company. From there powers of the spacing predict the rest; the most
     promising is run, and what it shows replaces the prediction, until nothing promises to be worth
-    a run.
+    a run. What is good enough without being better than anything coarser is run once more, finer,
+    lest it be so by chance.
 
     Args:
         case: already `priced`.
@@ -167,8 +178,39 @@ class _Book:
         self.points[place] = point
 
     def best(self, goal: Goal) -> Point | None:
-        met = [point for point in self.points.values() if goal.met(point)]
-        return min(met, key=lambda point: goal.loss(point.error, point.time), default=None)
+        place = self._best(goal)
+        return None if place is None else self.points[place]
+
+    def _best(self, goal: Goal) -> tuple[int, int] | None:
+        met = [
+            (scheme, level)
+            for (scheme, level), point in self.points.items()
+            if goal.met(point)
+            and not any(
+                goal.refuted(finer) for place, finer in self._known(scheme).items() if place > level
+            )
+        ]
+
+        def loss(place: tuple[int, int]) -> float:
+            return goal.loss(self.points[place].error, self.points[place].time)
+
+        return min(met, key=loss, default=None)
+
+    def _doubtful(self, goal: Goal, longest: float) -> tuple[int, int] | None:
+        """Where to look whether the best is good enough by chance; None if that is known."""
+        best = self._best(goal)
+        if best is None:
+            return None
+        scheme, level = best
+        known = self._known(scheme)
+        finer = [place for place in known if place > level]
+        coarser = [point for place, point in known.items() if place < level]
+        if finer or any(point.error > known[level].error for point in coarser):
+            return None
+        place = (scheme, level + 1)
+        if self._has(level + 1) and self.predicted(*place)[1] <= longest:
+            return place
+        return None
 
     def next(self, goal: Goal, longest: float) -> tuple[int, int] | None:
         """The place to run next, None if there is nothing left to gain."""
@@ -180,7 +222,7 @@ class _Book:
         offers = sorted(self._offers(goal, longest))
         if offers and offers[0][0] < bound:
             return offers[0][1]
-        return None
+        return self._doubtful(goal, longest)
 
     def _offers(self, goal: Goal, longest: float) -> Iterator[tuple[float, tuple[int, int]]]:
         """Of each scheme the place that promises most, with its predicted loss."""
@@ -270,7 +312,9 @@ class _Book:
         """Of the error, by the two finest levels known."""
         errors = {level: max(point.error, _TINY) for level, point in known.items()}
         found = self._power(errors)
-        return _ORDER if found is None else min(max(found, _ORDERS[0]), _ORDERS[1])
+        if found is None or found <= 0.0:  # what rises has crossed the reference: all is open
+            return _ORDER
+        return min(max(found, _ORDERS[0]), _ORDERS[1])
 
     def _fixed(self) -> float:
         """What every run takes whatever its spacing, about [s]."""
@@ -301,20 +345,13 @@ class _Book:
         tried = f"{len(self.points)} configurations tried"
         if best is None:
             return f"{tried}: none meets the goal, and none finer promises to"
-        place = next(place for place, point in self.points.items() if point is best)
-        errors = [
-            self.points[place[0], level].error
-            for level in range(len(self.levels))
-            if (place[0], level) in self.points
-        ]
-        if len(errors) < 2:
-            return (
-                f"{tried}: its error at no other spacing is known, so that it may be small by "
-                "chance"
-            )
-        if any(fine > coarse for coarse, fine in pairwise(errors)):
-            return f"{tried}: its error does not fall steadily, so that it may be small by chance"
-        return f"{tried}: its error falls with the spacing, as that of a sound scheme does"
+        scheme, level = next(place for place, point in self.points.items() if point is best)
+        known = self._known(scheme)
+        if any(point.error > best.error for place, point in known.items() if place < level):
+            return f"{tried}: its error is smaller than at a coarser spacing, as it must be"
+        if any(goal.met(point) for place, point in known.items() if place > level):
+            return f"{tried}: a finer spacing is good enough too"
+        return f"{tried}: its error at no finer spacing is known, so that it may be small by chance"
 
 
 def _split(axes: Axes) -> tuple[str, list[Any], Sequence[Settings]]:

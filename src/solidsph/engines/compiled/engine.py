@@ -29,6 +29,7 @@ from solidsph.engines.compiled.shares import (
 )
 from solidsph.engines.engine import Engine, InternalForces, StressFields
 from solidsph.engines.matrix import MatrixEngine
+from solidsph.engines.tally import Tally, Way, vectors
 from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.integrator import Integrator
@@ -102,6 +103,26 @@ class CompiledBody:
         shares = {id(one): one.buffers.nbytes for one in (self.gradient_shares, self.force_shares)}
         own = self.factors.nbytes + self.u.nbytes
         return own + sum(rows.values()) + sum(shares.values())
+
+    @property
+    def tally(self) -> Sequence[Tally]:
+        """What an evaluation passes over: runs by stencils, the rest by rows."""
+        n, d = self.body.particles.positions.shape
+        # Gathering and scattering are one pass each; a pair counts once for the two together.
+        both = (self.gradient, self.force)
+        run_pairs = sum(one.run_pairs for one in both) // 2
+        row_pairs = sum(one.row_pairs for one in both) // 2
+        ran = sum(one.run_particles for one in both) // 2
+        row_bytes = sum({id(one): one.row_bytes for one in both}.values())
+        shared_bytes = sum({id(one): one.bytes for one in both}.values()) - row_bytes
+        # How many buffers there are depends on the threads of the machine; one is touched at least.
+        touched = shared_bytes + self.factors.nbytes + 2 * self.u.nbytes + vectors(n, d)
+        held = self.bytes - row_bytes
+        precision, threaded = self.u.itemsize, self.gradient_shares.threaded
+        return (
+            Tally(Way.STENCILS, run_pairs, ran, touched, held, precision, threaded),
+            Tally(Way.ROWS, row_pairs, n - ran, row_bytes, row_bytes, precision, threaded),
+        )
 
     @property
     def fused(self) -> bool:
@@ -220,9 +241,8 @@ class CompiledForces(InternalForces):
         return sum(part.pair_count for part in self.parts)
 
     @property
-    def bytes(self) -> int:
-        """Memory of the arrays kept between evaluations."""
-        return sum(part.bytes for part in self.parts)
+    def tally(self) -> Sequence[Tally]:
+        return tuple(own for part in self.parts for own in part.tally)
 
     def time_loop(self, dynamics: Dynamics, integrator: Integrator, step_size: float) -> TimeLoop:
         fixed = [part for part in self.parts if isinstance(part, CompiledBody)]

@@ -16,6 +16,7 @@ from solidsph.engines.compiled.chunks import weighted_chunks
 from solidsph.engines.compiled.pointwise import no_law
 from solidsph.engines.compiled.rows import Rows, compressed
 from solidsph.engines.compiled.shares import aligned, passes, shared, spread_pass, thread_count
+from solidsph.engines.tally import Tally, Way, vectors
 from solidsph.mismatch import Mismatch, MismatchOperator
 
 _DTYPE = "float64"
@@ -83,6 +84,16 @@ class MismatchSweeps(MismatchOperator):
     def bytes(self) -> int:
         own = [a.nbytes for a in self.arrays if isinstance(a, np.ndarray)]
         return sum(own) + self.arrays.rows.bytes
+
+    @property
+    def tally(self) -> Tally:
+        n, d = self.arrays.positions.shape
+        rows = self.arrays.rows
+        # Once to gather H, once to scatter the stress, and the near pairs between.
+        pairs = 2 * (rows.run_pairs + rows.row_pairs) + len(self.arrays.columns)
+        threaded = len(self.arrays.table) > 1
+        touched = self.bytes + vectors(n, d)
+        return Tally(Way.MISMATCH_SWEEPS, pairs, n, touched, self.bytes, threaded=threaded)
 
     def forces(self, displacements: Array) -> Array:
         forces = np.empty_like(displacements)

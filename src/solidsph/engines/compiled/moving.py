@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, final
 
@@ -18,6 +19,7 @@ from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.engines.compiled.pointwise_sums import PointwiseSums
 from solidsph.engines.compiled.vectors import MATRIX
 from solidsph.engines.compiled.weighted_sums import WeightedSums
+from solidsph.engines.tally import Tally, Way, vectors
 
 
 @attrs.frozen(eq=False)
@@ -70,6 +72,13 @@ class MovingBody:
         """Memory of the arrays kept between evaluations."""
         own = (self.reference_sums, self.tensors, self._values, self._slopes, *self._rows)
         return self.search.bytes + sum(array.nbytes for array in own)
+
+    @property
+    def tally(self) -> Sequence[Tally]:
+        """What an evaluation passes over, with the neighbours of the start."""
+        n, d = self.body.particles.positions.shape
+        way = Way.FORMULAS if isinstance(self.sums, PointwiseSums) else Way.WEIGHTS
+        return (Tally(way, self.pair_count, n, self.bytes + vectors(n, d), self.bytes),)
 
     def forces(self, displacements: Array, out: Array) -> None:
         """Forces (n, d) from displacements (n, d) where no condition changes the stress."""

@@ -57,6 +57,23 @@ class Rows(NamedTuple):
         return int(self.blocks[self.blocks[:, 2] >= 0, 1].sum())
 
     @property
+    def run_pairs(self) -> int:
+        """Pairs that are visited by stencils."""
+        _, count, where = self.blocks.T
+        run = where >= 0
+        return int(count[run] @ np.diff(self.members)[where[run]])
+
+    @property
+    def row_pairs(self) -> int:
+        """Pairs that are visited by rows, those of members that several share each time."""
+        return int((self.spans[:, 1] - self.spans[:, 0]).sum())
+
+    @property
+    def row_bytes(self) -> int:
+        """Memory of what belongs to rows alone."""
+        return self.spans.nbytes + self.row_offsets.nbytes + self.row_weights.nbytes
+
+    @property
     def bytes(self) -> int:
         """Memory of all arrays."""
         return sum(array.nbytes for array in self)

@@ -1,0 +1,294 @@
+"""A report: a sweep as one page of HTML that needs nothing but a browser."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from importlib.metadata import version
+from importlib.resources import files
+from math import isfinite
+from pathlib import Path
+from string import Template
+from typing import Any, final
+
+import attrs
+
+from solidsph.errors import SolidsphError
+from solidsph.interfaces.case import Case
+from solidsph.studies.case_run import FINISHED
+from solidsph.studies.frontier import Frontier
+from solidsph.studies.point import Point, shown
+from solidsph.studies.report_figures import EXPENSES, TIME, Figures, drawable, library
+from solidsph.studies.varied import varied
+
+
+def write_report(made: Frontier, case: Case, path: Path, *, title: str | None = None) -> None:
+    """Write a page with the plots, a table of all points and the scenes of each.
+
+    It asks nothing of any network: Plotly's script is in it, about 5 MB.
+
+    Args:
+        made: a sweep over `case`.
+        case: whose scenes are shown.
+        path: of the page, an HTML file.
+        title: by default the case's.
+
+    Raises:
+        SceneError: Plotly is not installed.
+    """
+    page = _Page(made, case.priced(), title)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(page.text(), encoding="utf-8")
+
+
+@attrs.frozen
+class Column:
+    """Of the table: a heading, and a cell of every point."""
+
+    heading: str
+    cells: Sequence[Cell]
+
+    @property
+    def numeric(self) -> bool:
+        """Whether it holds numbers only."""
+        return all(cell.number is not None or not cell.text for cell in self.cells)
+
+
+@attrs.frozen
+class Cell:
+    """What is read, and the number it is sorted by, if it is one."""
+
+    text: str
+    number: float | None = None
+
+    @classmethod
+    def of(cls, value: Any, form: str = ".3g") -> Cell:
+        """A number in this form, none if it is not finite, or else words."""
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return cls(shown(value))
+        if not isfinite(value):
+            return cls("")
+        return cls(str(value) if isinstance(value, int) else format(value, form), float(value))
+
+
+@final
+@attrs.frozen
+class _Page:
+    made: Frontier
+    case: Case
+    title: str | None
+
+    def text(self) -> str:
+        folder = files("solidsph.studies") / "report_page"
+        parts = {name: (folder / name).read_text("utf-8") for name in ("page.css", "page.js")}
+        points, finished = len(self.made), len(self.made.finished())
+        quantity = next((p.quantity for p in self.made.points if p.quantity), "")
+        return Template((folder / "page.html").read_text("utf-8")).substitute(
+            title=escape(self.title or self.case.title),
+            sentence=escape(self.made.sentence()),
+            facts=escape(
+                f"{points} configurations, {finished} finished"
+                + (f"; the error is that of: {quantity}" if quantity else "")
+                + f"; reference: {self.case.source}"
+            ),
+            version=escape(version("solidsph")),
+            style=parts["page.css"],
+            choices="".join(self._choices()),
+            left_out=self._left_out(),
+            table=self._table(),
+            orders=self._orders(),
+            failures=self._failures(),
+            data=_embedded(self._data()),
+            library=library(),
+            script=parts["page.js"],
+        )
+
+    def _data(self) -> Mapping[str, Any]:
+        figures = Figures(self.made)
+        return {
+            "expenses": [
+                {
+                    "front": figures.numbers(self.made.front(expense.of)),
+                    "figures": [figures.against(expense), figures.against_spacing(expense)],
+                }
+                if expense.fits(self.made)
+                else None
+                for expense in EXPENSES
+            ],
+            "points": [
+                {
+                    "label": point.label() or "as it is",
+                    "brief": _brief(point),
+                    "places": _places(point),
+                    **self._scenes(number, point),
+                }
+                for number, point in enumerate(self.made.points, 1)
+            ],
+        }
+
+    def _scenes(self, number: int, point: Point) -> Mapping[str, Any]:
+        """Of one point: texts of TOML with names for files; or why there is none."""
+        try:
+            scenes = varied(self.case, point.settings).scenes()
+        except SolidsphError as cause:
+            return {"scenes": [], "note": f"There is no scene: {cause}"}
+        if not scenes:
+            return {"scenes": [], "note": "This case runs no scene: it computes its result itself."}
+        written = []
+        for name, scene in scenes.items():
+            one = {"name": name, "file": f"{re.sub(r'[^A-Za-z0-9_-]+', '-', name)}-{number}.toml"}
+            try:
+                written.append({**one, "toml": scene.to_toml()})
+            except SolidsphError as cause:
+                written.append({**one, "why": f"This scene cannot be written: {cause}"})
+        return {"scenes": written, "note": ""}
+
+    def _choices(self) -> Iterator[str]:
+        for number, expense in enumerate(EXPENSES):
+            fits = expense.fits(self.made)
+            state = "" if fits else ' disabled title="not known of every configuration"'
+            yield (
+                f'<button type="button" data-expense="{number}" '
+                f'aria-pressed="{str(expense is TIME).lower()}"{state}>'
+                f"{escape(expense.name)}</button>\n"
+            )
+
+    def _left_out(self) -> str:
+        exact = [p for p in self.made.finished() if not drawable(p)]
+        if not exact:
+            return ""
+        return (
+            f"<p>{len(exact)} of them have an error of exactly 0 and are in the table only: a "
+            "logarithmic axis has no place for them.</p>"
+        )
+
+    def _table(self) -> str:
+        columns = self._columns()
+        headings = "".join(
+            f'<th scope="col"{_numeric(c)}><button type="button">{escape(c.heading)}</button></th>'
+            for c in columns
+        )
+        front = self._front()
+        rows = []
+        for number in range(len(self.made)):
+            cells = "".join(
+                _td(column, column.cells[number], number if place == 0 else None)
+                for place, column in enumerate(columns)
+            )
+            mark = ' class="front"' if number in front else ""
+            rows.append(f'<tr data-point="{number}"{mark}>{cells}</tr>')
+        body = "\n".join(rows)
+        return f"<thead><tr>{headings}</tr></thead>\n<tbody>\n{body}\n</tbody>"
+
+    def _columns(self) -> Sequence[Column]:
+        points, front = self.made.points, self._front()
+        names = dict.fromkeys(name for point in points for name in point.settings)
+        several = any(len(point.seconds) > 1 for point in points)
+        return [
+            _column("no.", list(range(1, len(points) + 1))),
+            _column("front", ["front" if n in front else "" for n in range(len(points))]),
+            *(_column(name, [p.settings.get(name, "") for p in points], "g") for name in names),
+            _column("error [%]", [100.0 * p.error for p in points]),
+            _column("trusted [%]", [100.0 * self.made.trusted(p) for p in points]),
+            _column("time [s]", [p.time for p in points]),
+            *([Column("repeats [s]", [_repeats(p) for p in points])] if several else []),
+            _column("spacing [m]", [p.spacing for p in points]),
+            _column("particles", [p.particles for p in points]),
+            _column("steps", [p.steps for p in points]),
+            _column("pair evaluations", [float(p.pair_evaluations) for p in points], ".4g"),
+            _column("bytes touched", [float(p.bytes_touched) for p in points], ".4g"),
+            _column("memory [MiB]", [p.peak_memory / 2**20 for p in points], ".4g"),
+            _column("outcome", [_outcome(p).splitlines()[0] for p in points]),
+        ]
+
+    def _front(self) -> set[int]:
+        return set(Figures(self.made).numbers(self.made.front()))
+
+    def _orders(self) -> str:
+        orders = self.made.orders()
+        if not orders:
+            return "<p>No scheme has two spacings that finished.</p>"
+        rows = "\n".join(
+            f'<tr><th scope="row">{escape(_scheme(one.settings))}</th>'
+            f'<td class="number">{_order(one.in_spacing)}</td>'
+            f'<td class="number">{_order(one.in_time)}</td>'
+            f"<td>{'no' if one.crosses else 'yes'}</td></tr>"
+            for one in orders
+        )
+        return (
+            '<div class="wide" tabindex="0" role="region" aria-label="orders"><table id="orders">\n'
+            '<thead><tr><th scope="col">scheme</th><th scope="col">in spacing</th>'
+            '<th scope="col">in time</th><th scope="col">falls steadily</th></tr></thead>\n'
+            f"<tbody>\n{rows}\n</tbody></table></div>"
+        )
+
+    def _failures(self) -> str:
+        failed = [(n, p) for n, p in enumerate(self.made.points, 1) if not p.finished]
+        if not failed:
+            return "<p>Every configuration finished.</p>"
+        items = "\n".join(
+            f"<li>{n}, {escape(p.label() or 'as it is')}: <pre>{escape(_outcome(p))}</pre></li>"
+            for n, p in failed
+        )
+        return f'<ul id="failures">\n{items}\n</ul>'
+
+
+def _column(heading: str, values: Sequence[Any], form: str = ".3g") -> Column:
+    return Column(heading, [Cell.of(value, form) for value in values])
+
+
+def _repeats(point: Point) -> Cell:
+    """From the quickest to the slowest, sorted by the quickest."""
+    quickest, slowest = min(point.seconds), max(point.seconds)
+    return Cell(f"{quickest:.3g} to {slowest:.3g}", quickest) if isfinite(slowest) else Cell("")
+
+
+def _td(column: Column, cell: Cell, number: int | None) -> str:
+    sort = "" if cell.number is None else f' data-number="{cell.number!r}"'
+    text = escape(cell.text)
+    if number is not None:  # what the keyboard comes to, and says whose scene it shows
+        text = f'<button type="button" aria-label="scene of configuration {text}">{text}</button>'
+    return f"<td{_numeric(column)}{sort}>{text}</td>"
+
+
+def _numeric(column: Column) -> str:
+    return ' class="number"' if column.numeric else ""
+
+
+def _outcome(point: Point) -> str:
+    if point.outcome == FINISHED and not point.finished:
+        return "finished, with an error that is not finite"
+    return point.outcome or "unknown"
+
+
+def _brief(point: Point) -> str:
+    if not point.finished:
+        return _outcome(point)
+    return f"{100.0 * point.error:.3g} % in {point.time:.3g} s"
+
+
+def _places(point: Point) -> Mapping[str, Any] | None:
+    """Where a point is drawn, across for each cost; None if it is not."""
+    if not drawable(point):
+        return None
+    return {
+        "costs": [expense.of(point) for expense in EXPENSES],
+        "spacing": point.spacing if isfinite(point.spacing) else None,
+        "error": 100.0 * point.error,
+    }
+
+
+def _scheme(settings: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} {shown(value)}" for name, value in settings.items()) or "as it is"
+
+
+def _order(value: float) -> str:
+    return f"{value:.2f}" if isfinite(value) else "none"
+
+
+def _embedded(data: Mapping[str, Any]) -> str:
+    """`data` as JSON that ends no element of HTML early, whatever texts it holds."""
+    text = json.dumps(data, allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
