@@ -23,6 +23,10 @@ from solidsph_builtin.cases._scheme import check_count, with_scheme
 SIDE, HEIGHT = 1.0, 6.0  # [m]
 DENSITY, YOUNGS_MODULUS = 1100.0, 17e6  # [kg/m^3], [Pa]
 
+# At 400 rad/s corners are faster than waves: the law stiffens so much that the step must be a
+# tenth, and so twisted a column writhes, so that its axis need not stay.
+_FAST: Mapping[str, Any] = {"time_step_factor": 0.03, "axis_tolerance": 0.1}
+
 _SOURCE = "its foot can do no work; what twists one way must have been twisted the other"
 
 
@@ -44,10 +48,10 @@ class TwistingColumn(Case):
     }
     trials: ClassVar[Mapping[str, Trial]] = {
         f"{rate:g} rad/s, nu {nu:g}": Trial(
-            {"rate": rate, "poissons_ratio": nu}, {"across": 4, "duration": 0.05}
+            {"rate": rate, "poissons_ratio": nu, **more}, {"across": 4, "duration": 0.05}
         )
         for nu in (0.45, 0.495)
-        for rate in (30.0, 105.0, 200.0, 400.0)
+        for rate, more in ((30.0, {}), (105.0, {}), (200.0, {}), (400.0, _FAST))
     }
 
     across: int = 6  # particles along each side of the square
