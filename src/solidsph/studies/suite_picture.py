@@ -9,7 +9,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from solidsph.studies.stability import Grade, Verdict
+from solidsph.studies.suite import Grade, Verdict
 
 # Told apart in grey too.
 _LOOKS: Mapping[Grade, Mapping[str, Any]] = {

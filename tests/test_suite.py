@@ -14,8 +14,8 @@ from solidsph import SceneError, Simulation, registry
 from solidsph.interfaces.case import Case, Measurement, Trial
 from solidsph.results.record import Record
 from solidsph.scene import Scene
-from solidsph.studies.stability import Grade, energy_residual, judged, trials
-from solidsph.studies.stability_picture import draw_suite
+from solidsph.studies.suite import Grade, energy_residual, judged, trials
+from solidsph.studies.suite_picture import draw_suite
 
 ALL = list(trials())
 

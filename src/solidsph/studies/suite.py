@@ -1,4 +1,4 @@
-"""Stability: hard cases, run and judged; some of them must fail, or the rest proves nothing."""
+"""Suite: hard cases, run and judged; some of them must fail, or the rest proves nothing."""
 
 from __future__ import annotations
 
