@@ -12,7 +12,7 @@ import numpy as np
 
 from solidsph.arrays import Array
 from solidsph.errors import SceneError
-from solidsph.interfaces.case import Case, Curves, Measurement
+from solidsph.interfaces.case import Case, Curves, Measurement, Trial
 from solidsph.parameters import check_positive, number
 from solidsph.results.record import Record
 from solidsph.scene import Scene
@@ -60,6 +60,16 @@ class NonlinearBar(Case):
         "particles": (51, 101, 201, 401),
         "linear": (0.25, 0.5, 1.0),
         "cover": (1.6, 2.2, 3.0),
+    }
+    trials: ClassVar[Mapping[str, Trial]] = {
+        "pushed and pulled suddenly at 0.3 c": Trial(
+            {"velocities": (0.3,), "time_step_factor": 0.15}, {"particles": 101}
+        ),
+        "pushed suddenly at 0.5 c, no viscosity": Trial(
+            {"velocities": (0.5,)},
+            {"particles": 101},
+            must_fail="nothing gives a shock a width, so that particles run through each other",
+        ),
     }
 
     velocities: Sequence[float] = (0.1, 0.3, 0.5)  # of pushes and of pulls [confined wave speeds]
