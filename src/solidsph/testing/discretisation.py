@@ -19,6 +19,7 @@ from solidsph.interfaces.shape import Shape
 from solidsph.particles import Particles
 from solidsph.parts import construct
 from solidsph.testing.check import Check, Verdict, at_most, check
+from solidsph.testing.samples import made_once
 
 SPACING = 0.1  # [m]
 
@@ -59,7 +60,7 @@ class _Sample:
         return float(areas.sum())
 
 
-def _samples(discretisation: Discretisation) -> list[_Sample]:
+def _discretised(discretisation: Discretisation) -> list[_Sample]:
     """Those shapes that are not refused.
 
     Raises:
@@ -76,6 +77,9 @@ def _samples(discretisation: Discretisation) -> list[_Sample]:
     if not found:
         raise SceneError(f"every shape is refused; the first, {refusals[0]}")
     return found
+
+
+_samples = made_once(_discretised)
 
 
 @check
@@ -139,7 +143,7 @@ def spacing(discretisation: Discretisation) -> Verdict:
     medians, least = [], []
     for sample in _samples(discretisation):
         p = sample.particles
-        gaps = cKDTree(p.positions).query(p.positions, k=2)[0][:, 1] / SPACING
+        gaps = np.asarray(cKDTree(p.positions).query(p.positions, k=2)[0])[:, 1] / SPACING
         medians.append(float(np.median(gaps)))
         least.append(float(gaps.min()))
     told = f"medians {min(medians):.2f} to {max(medians):.2f} spacings, closest {min(least):.2f}"
@@ -204,7 +208,7 @@ def images(discretisation: Discretisation) -> Verdict:
 @check
 def same_bits(discretisation: Discretisation) -> Verdict:
     """The same input gives the same bits."""
-    pairs = zip(_samples(discretisation), _samples(discretisation), strict=True)
+    pairs = zip(_samples(discretisation), _discretised(discretisation), strict=True)
     for one, other in pairs:
         for first, again in zip(_arrays(one.particles), _arrays(other.particles), strict=True):
             if not np.array_equal(first, again):
