@@ -40,6 +40,9 @@ _GRID = {1: 400, 2: 40, 3: 14}
 # followed by ones of this softness.
 _SOFT_ON_GRID = 0.05
 
+# As a phase: of longer waves rounding leaves nothing, and the translation is none.
+_LONGEST = 1e-3
+
 # Extremes that are told: the rest are waves much like them.
 _TOLD = 8
 
@@ -53,6 +56,7 @@ _FREE = {1: (8,), 2: (4, 3), 3: (2, 2, 1)}
 # some hundredths.
 _STILL = 1e-3
 
+_LARGE = 1e9  # in place of infinity, of which a search makes differences
 _SEARCH: Any = {"xatol": 1e-7, "fatol": 1e-14, "maxiter": 400}
 
 WAVELENGTHS = (2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 40.0)
@@ -218,8 +222,11 @@ class _Waves:
 
     def softness(self, wave_vector: Array) -> float:
         """Least squared speed over that of a shear wave."""
+        length = float(wave_vector @ wave_vector)
+        if length < _LONGEST**2:
+            return np.inf
         squares = np.linalg.eigvals(self.symbols(wave_vector[None])[0])
-        return float((-squares.real).min() / (wave_vector @ wave_vector * self._shear))
+        return float((-squares.real).min() / (length * self._shear))
 
     def wave(self, wave_vector: Array) -> Wave:
         """The fastest growing, or else the softest, wave with that wave vector."""
@@ -258,7 +265,13 @@ class _Waves:
         for index in minima[order[: 4 * _TOLD]]:
             start = grid[tuple(index)]
             bounds = [(max(0.0, k - width), min(pi, k + width)) for k in start]
-            best = minimize(measure, start, method="Nelder-Mead", bounds=bounds, options=_SEARCH)
+            best = minimize(
+                lambda k: min(measure(k), _LARGE),
+                start,
+                method="Nelder-Mead",
+                bounds=bounds,
+                options=_SEARCH,
+            )
             k = best.x if best.fun < measure(start) else start
             if all(np.abs(k - other).max() > _SAME for _, other in found):
                 found.append((measure(k), k))
@@ -277,6 +290,18 @@ class _Waves:
         ratios = squares / np.diag(exact)
         # What rounding leaves of a wave that costs nothing is no growth.
         return np.sqrt(np.where(ratios > -(SOFT**2), np.maximum(ratios, 0.0), np.nan))
+
+
+def _least(
+    measure: Callable[[Array], float], start: Array, bounds: Sequence[tuple[float, float]]
+) -> Array:
+    """Where near `start` (d,) it is least, within bounds of each component."""
+
+    def finite(wave_vector: Any) -> Any:
+        return min(measure(wave_vector), _LARGE)
+
+    found: Any = minimize(finite, start, method="Nelder-Mead", bounds=list(bounds), options=_SEARCH)
+    return np.asarray(found.x) if found.fun < measure(start) else start
 
 
 def _checked(dimension: int, stretch: float | Sequence[float]) -> tuple[float, ...]:

@@ -73,6 +73,7 @@ class Scheme:
         factory=lambda: _integrator(DEFAULT_INTEGRATOR), converter=_integrator
     )
     spacing: float = 1.0  # [m]
+    time_step_factor: float = attrs.fields(Scene).time_step_factor.default  # in use [CFL steps]
 
     @classmethod
     def of(cls, scene: Scene) -> Scheme:
@@ -93,6 +94,7 @@ class Scheme:
             effects=tuple(effect.part for effect in scene.effects),
             integrator=scene.integrator or DEFAULT_INTEGRATOR,
             spacing=body.spacing,
+            time_step_factor=scene.time_step_factor,
         )
 
     @property
