@@ -129,8 +129,8 @@ def show_certificate(found: Certificate, confirmed: Sequence[Sequence[Any]]) -> 
     form = scheme.formulation
     sums = f"{type(form.gradient).__name__}, {type(form.divergence).__name__}"
     say(
-        f"{type(form).__name__} ({sums}), {type(scheme.kernel).__name__}, cover {scheme.cover:g}, {scheme.material}, "
-        f"effects: {', '.join(_name(one) for one in scheme.effects) or 'none'}"
+        f"{type(form).__name__} ({sums}), {type(scheme.kernel).__name__}, cover {scheme.cover:g}, "
+        f"{scheme.material}, effects: {', '.join(_name(one) for one in scheme.effects) or 'none'}"
     )
     rows = [_zero(found), _growth(found), _step(found)]
     if found.free is not None:
@@ -246,12 +246,16 @@ def _free(found: Certificate) -> list[str]:
     free = found.free
     assert free is not None
     factor = free.critical_step / found.rule_step
-    good = "note" if free.zero_modes or factor < 1.0 else "pass"
+    rigid = found.dimension * (found.dimension + 1) // 2
+    resisted = f"; {rigid - free.rigid_modes} rigid motions meet a force" * (
+        free.rigid_modes < rigid
+    )
+    good = "note" if free.zero_modes or resisted or factor < 1.0 else "pass"
     return [
         f"free body of {free.particles}",
         good if _stable(found, factor) else "FAIL",
         f"{free.zero_modes or 'no'} zero-energy modes beyond rigid ones; critical "
-        f"time_step_factor {factor:.3g}",
+        f"time_step_factor {factor:.3g}{resisted}",
         "its surface included",
     ]
 

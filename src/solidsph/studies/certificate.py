@@ -9,6 +9,7 @@ A free body adds its surface; its modes come from `studies.spectrum`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import combinations
 from math import pi
 from typing import Any
 
@@ -20,6 +21,7 @@ from scipy.optimize import minimize
 
 from solidsph.arrays import Array
 from solidsph.errors import SceneError
+from solidsph.simulation import Simulation
 from solidsph.studies.dispersion import LatticeResponse, lattice_response
 from solidsph.studies.ellipticity import acoustic_tensors, least_stiffness
 from solidsph.studies.scheme import Scheme, deformation, stretched
@@ -56,6 +58,9 @@ _FREE = {1: (8,), 2: (4, 3), 3: (2, 2, 1)}
 # some hundredths.
 _STILL = 1e-3
 
+# Of a spacing: a rotation so small is a linear motion up to its square.
+_TINY = 1e-4
+
 _LARGE = 1e9  # in place of infinity, of which a search makes differences
 _SEARCH: Any = {"xatol": 1e-7, "fatol": 1e-14, "maxiter": 400}
 
@@ -85,7 +90,7 @@ class FreeBody:
     """Modes of a small free body, unstretched."""
 
     particles: int
-    rigid_modes: int  # translations and rotations
+    rigid_modes: int  # translations and rotations that cost no energy: 1, 3 or 6 of them should
     zero_modes: int  # that cost no energy, beyond those
     growth_rate: float  # [1/transit]
     highest_frequency: float  # [rad/transit]
@@ -265,14 +270,7 @@ class _Waves:
         for index in minima[order[: 4 * _TOLD]]:
             start = grid[tuple(index)]
             bounds = [(max(0.0, k - width), min(pi, k + width)) for k in start]
-            best = minimize(
-                lambda k: min(measure(k), _LARGE),
-                start,
-                method="Nelder-Mead",
-                bounds=bounds,
-                options=_SEARCH,
-            )
-            k = best.x if best.fun < measure(start) else start
+            k = _least(measure, start, bounds)
             if all(np.abs(k - other).max() > _SAME for _, other in found):
                 found.append((measure(k), k))
         found.sort(key=lambda one: one[0])
@@ -344,13 +342,34 @@ def _free_body(scheme: Scheme, dimension: int, rate: float) -> FreeBody:
     exponents = found.growth_rates + 1j * found.frequencies
     highest = found.highest_frequency
     still = int(np.sum(np.abs(exponents) < _STILL * highest))
-    rigid = dimension * (dimension + 1) // 2
+    rigid = _free_rigid_motions(simulation, (_STILL * highest) ** 2)
     limit = scheme.integrator.stability_limit
     return FreeBody(
         particles=simulation.particles.count,
-        rigid_modes=min(rigid, still),
-        zero_modes=max(still - rigid, 0),
+        rigid_modes=rigid,
+        zero_modes=still - rigid,
         growth_rate=found.growth_rate * scheme.transit,
         highest_frequency=highest * scheme.transit,
         critical_step=limit / (highest + rate) / scheme.transit,
     )
+
+
+def _free_rigid_motions(simulation: Simulation, least: float) -> int:
+    """How many translations and rotations meet less than the stiffness `least` [1/s^2]."""
+    X = simulation.particles.positions
+    dimension = X.shape[1]
+    motions = [np.tile(axis, (len(X), 1)) for axis in np.eye(dimension)]
+    for i, j in combinations(range(dimension), 2):
+        turn = np.zeros((dimension, dimension))
+        turn[i, j], turn[j, i] = -1.0, 1.0
+        motions.append(X @ turn.T / float(np.abs(X).max()))
+    step = _TINY * float(simulation.particles.spacings.min())
+    rest = np.zeros_like(X)
+    free = 0
+    for motion in motions:
+        there, back = (
+            simulation.dynamics.respond(0.0, X + way * step * motion, rest).accelerations
+            for way in (1.0, -1.0)
+        )
+        free += bool(np.abs(there - back).max() / (2.0 * step) < least)
+    return free

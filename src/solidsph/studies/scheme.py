@@ -73,7 +73,7 @@ class Scheme:
         factory=lambda: _integrator(DEFAULT_INTEGRATOR), converter=_integrator
     )
     spacing: float = 1.0  # [m]
-    time_step_factor: float = attrs.fields(Scene).time_step_factor.default  # in use [CFL steps]
+    time_step_factor: float = 0.5  # in use, of the CFL step [-]
 
     @classmethod
     def of(cls, scene: Scene) -> Scheme:
