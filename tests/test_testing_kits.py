@@ -4,27 +4,44 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Sequence
 from math import exp, sqrt
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
 import pytest
 
 from solidsph import (
+    BoundaryHandler,
+    Discretisation,
     Divergence,
+    Effect,
     Formulation,
     Gradient,
     Integrator,
     Kernel,
     Material,
     SceneError,
+    Shape,
     State,
+    registry,
 )
-from solidsph.arrays import Array, Scalar, Tensor
+from solidsph.arrays import Array, Indices, Mask, Scalar, Tensor
+from solidsph.body import Body
 from solidsph.dynamics import Dynamics
+from solidsph.interfaces.condition import (
+    Condition,
+    ForceCondition,
+    MotionCondition,
+    Observation,
+    StressCondition,
+)
 from solidsph.interfaces.formulation import Configuration
+from solidsph.interfaces.shape import Surface
 from solidsph.neighbours import Pairs
+from solidsph.particles import Particles
+from solidsph.setting import Setting
 from solidsph.tensors import (
     add,
     contraction,
@@ -36,7 +53,11 @@ from solidsph.tensors import (
     trace,
     transpose,
 )
-from solidsph.testing import checks, conformance, example_part, kits
+from solidsph.testing import checks, conformance, example_part, examples, kits
+from solidsph_builtin.boundaries.ghost_extension import Extension, GhostExtension
+from solidsph_builtin.discretisations.lattice import Lattice
+from solidsph_builtin.materials.neo_hookean import NeoHookean
+from solidsph_builtin.shapes.box import Box
 
 # Kernels, each wrong in one respect
 
@@ -115,7 +136,26 @@ class NotPointwise(GoodKernel):
         return (1.0 - q) ** 4 * (1.0 + 4.0 * q) * (1.0 + 1e-3 * np.ndim(q))
 
 
+class ManyNegative(GoodKernel):
+    @staticmethod
+    def profile(q: Scalar, params: tuple[float, ...]) -> Scalar:
+        return (1.0 - q) ** 2 * (1.0 + 2.0 * q) * (1.0 - 5.0 * q**2)
+
+
+class ClaimsToNeverPair(GoodKernel):
+    """A parabola, whose transform oscillates."""
+
+    nonnegative_transform: ClassVar[bool] = True
+
+    @staticmethod
+    def profile(q: Scalar, params: tuple[float, ...]) -> Scalar:
+        return 1.0 - q**2
+
+
 KERNELS = [
+    (WrongSlope, {"gradient moment"}),
+    (ManyNegative, {"moments"}),
+    (ClaimsToNeverPair, {"transform"}),
     (NegativeLobe, {"not negative", "falling", "mass", "support", "scaling"}),
     (WrongSlope, {"slope"}),
     (UnseenBySteps, {"slope"}),
@@ -240,7 +280,23 @@ class ArraysOnly(GoodMaterial):
         return GoodMaterial.energy(F, params) * np.ones(F.shape[2])
 
 
+class TurnedStress(GoodMaterial):
+    @staticmethod
+    def first_piola(F: Tensor, params: tuple[float, ...]) -> Tensor:
+        return product(hooke(green_lagrange(F)), F)
+
+
+class Softening(GoodMaterial):
+    """Its shear modulus is negative, though it declares another."""
+
+    @staticmethod
+    def tangent(F: Tensor, dF: Tensor, params: tuple[float, ...]) -> Tensor:
+        return scale(-1.0, GoodMaterial.tangent(F, dF, params))
+
+
 MATERIALS = [
+    (TurnedStress, {"stress measures"}),
+    (Softening, {"ellipticity"}),
     (WrongStress, {"stress"}),
     (TangentWithoutInitialStress, {"tangent"}),
     (UnsymmetricTangent, {"symmetric tangent"}),
@@ -476,7 +532,482 @@ FORMULATIONS = [
     (with_false_divergence, {"linear momentum", "angular momentum", "adjoint"}),
 ]
 
+# Divergences
+
+
+@attrs.frozen
+class GoodDivergence(Divergence):
+    """d_pq = -V_q g_qp."""
+
+    conserves_momentum: ClassVar[bool] = True
+    adjoint: ClassVar[bool] = True
+    uses_ghost_stress: ClassVar[bool] = False
+
+    def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:
+        return -volumes[pairs.columns, None] * gradient_weights[pairs.reversed_order()]
+
+
+class MeanForce(GoodDivergence):
+    def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:
+        return -gradient_weights[pairs.reversed_order()]
+
+
+class OneForceTooMany(GoodDivergence):
+    def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:
+        weights = super().weights(pairs, gradient_weights, volumes)
+        return np.concatenate([weights, weights[:1]])
+
+
+class Pulling(GoodDivergence):
+    def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:
+        return -super().weights(pairs, gradient_weights, volumes)
+
+
+class OwnVolumes(GoodDivergence):
+    def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:
+        return volumes[pairs.rows, None] * gradient_weights
+
+
+class DivergenceInPlace(GoodDivergence):
+    def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:
+        weights = super().weights(pairs, gradient_weights, volumes)
+        gradient_weights *= 2.0
+        return weights
+
+
+DIVERGENCES = [
+    (OneForceTooMany, {"shape"}),
+    (MeanForce, {"area"}),
+    (Pulling, {"divergence inside"}),
+    (OwnVolumes, {"momentum", "adjoint"}),
+    (DivergenceInPlace, {"leaves its input"}),
+]
+
+# Shapes
+
+
+@attrs.frozen
+class GoodShape(Shape):
+    """The unit square."""
+
+    @property
+    def square(self) -> Shape:
+        return Box([1.0, 1.0])
+
+    @property
+    def dimension(self) -> int:
+        return 2
+
+    def bounds(self) -> tuple[Array, Array]:
+        return self.square.bounds()
+
+    def signed_distance(self, points: Array) -> Array:
+        return self.square.signed_distance(points)
+
+    def surface(self, spacing: float) -> Surface:
+        return self.square.surface(spacing)
+
+    def volume(self) -> float:
+        return 1.0
+
+
+class DistanceAsColumn(GoodShape):
+    def signed_distance(self, points: Array) -> Array:
+        return super().signed_distance(points)[:, None]
+
+
+class BoundsTooSmall(GoodShape):
+    def bounds(self) -> tuple[Array, Array]:
+        lower, upper = super().bounds()
+        return lower, 0.9 * upper
+
+
+class OpenBelow(GoodShape):
+    def surface(self, spacing: float) -> Surface:
+        whole = super().surface(spacing)
+        kept = np.array(whole.faces) != "bottom"
+        faces = tuple(face for face in whole.faces if face != "bottom")
+        return Surface(whole.points[kept], whole.area_vectors[kept], faces)
+
+
+class LargerThanItIs(GoodShape):
+    def volume(self) -> float:
+        return 1.01
+
+
+class DistanceFromInside(GoodShape):
+    def signed_distance(self, points: Array) -> Array:
+        return super().signed_distance(points) + 1e-3
+
+
+class DistanceInOtherUnits(GoodShape):
+    def signed_distance(self, points: Array) -> Array:
+        return 1e3 * super().signed_distance(points)
+
+
+class InsideOut(GoodShape):
+    def signed_distance(self, points: Array) -> Array:
+        return -super().signed_distance(points)
+
+
+class SampledCoarsely(GoodShape):
+    def surface(self, spacing: float) -> Surface:
+        return super().surface(0.1)
+
+
+class FacesBySpacing(GoodShape):
+    def surface(self, spacing: float) -> Surface:
+        whole = super().surface(spacing)
+        return attrs.evolve(whole, faces=tuple(f"{face}-{spacing:g}" for face in whole.faces))
+
+
+SHAPES = [
+    (DistanceAsColumn, {"arrays"}),
+    (BoundsTooSmall, {"bounds"}),
+    (OpenBelow, {"closed boundary"}),
+    (LargerThanItIs, {"volume"}),
+    (DistanceFromInside, {"on boundary"}),
+    (DistanceInOtherUnits, {"distance near boundary"}),
+    (InsideOut, {"sign", "distance near boundary"}),
+    (SampledCoarsely, {"sampling"}),
+    (FacesBySpacing, {"named faces"}),
+]
+
+# Discretisations
+
+
+@attrs.frozen
+class GoodDiscretisation(Discretisation):
+    """The cells of a lattice, with a layer of ghosts."""
+
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        return Lattice(ghosts=1).particles(shape, spacing)
+
+
+class RefusesAll(GoodDiscretisation):
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        raise SceneError("not today")
+
+
+class WithoutLast(GoodDiscretisation):
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        given = super().particles(shape, spacing)
+        return attrs.evolve(given, volumes=given.volumes[:-1], cells=given.volumes)
+
+
+class TooHeavy(GoodDiscretisation):
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        given = super().particles(shape, spacing)
+        return attrs.evolve(given, volumes=(1.0 + 1e-9) * given.volumes)
+
+
+class Beside(GoodDiscretisation):
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        given = super().particles(shape, spacing)
+        return attrs.evolve(given, positions=given.positions + spacing)
+
+
+class TooCoarse(GoodDiscretisation):
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        return super().particles(shape, 2.0 * spacing)
+
+
+class OpenSurface(GoodDiscretisation):
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        given = super().particles(shape, spacing)
+        return attrs.evolve(given, area_vectors=np.abs(given.area_vectors))
+
+
+class FaceForgotten(GoodDiscretisation):
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        given = super().particles(shape, spacing)
+        return attrs.evolve(given, faces=dict(list(given.faces.items())[1:]))
+
+
+class TagOfAll(GoodDiscretisation):
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        given = super().particles(shape, spacing)
+        tags = {name: np.ones(given.count, dtype=np.bool_) for name in given.tags}
+        return attrs.evolve(given, tags=tags)
+
+
+class NoImages(GoodDiscretisation):
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        given = super().particles(shape, spacing)
+        return attrs.evolve(given, images=np.zeros_like(given.images))
+
+
+class Unseeded(GoodDiscretisation):
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        given = super().particles(shape, spacing)
+        return attrs.evolve(given, volumes=np.random.default_rng().permutation(given.volumes))
+
+
+DISCRETISATIONS = [
+    (RefusesAll, {"represents a shape"}),
+    (WithoutLast, {"arrays"}),
+    (TooHeavy, {"volumes"}),
+    (Beside, {"inside"}),
+    (TooCoarse, {"spacing"}),
+    (OpenSurface, {"closed surface"}),
+    (FaceForgotten, {"faces"}),
+    (TagOfAll, {"tags"}),
+    (NoImages, {"images"}),
+    (Unseeded, {"same bits"}),
+]
+
+# Boundary handlers
+
+
+@attrs.frozen(eq=False)
+class HeldInPlace(MotionCondition):
+    label: str
+    held: Mask
+
+    def impose(self, time: float, derivative: int, values: Array) -> None:
+        values[self.held] = 0.0
+
+    def report(self, observation: Observation) -> dict[str, float]:
+        return {f"{self.label} count [-]": float(self.held.sum())}
+
+
+def held_left(setting: Setting) -> Mask:
+    held = np.zeros(setting.particles.positions.shape, dtype=np.bool_)
+    held[setting.select("left")] = True
+    return held
+
+
+@attrs.frozen
+class GoodHandler(BoundaryHandler):
+    """u = 0 on the left face."""
+
+    condition: ClassVar[Any] = HeldInPlace
+
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        return [self.condition(label, held_left(setting))]
+
+
+class BindsNothing(GoodHandler):
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        return []
+
+
+class OneMore(HeldInPlace):
+    def impose(self, time: float, derivative: int, values: Array) -> None:
+        values[self.held] = 0.0
+        values[-1] = 0.0
+
+
+class HoldsOneMore(GoodHandler):
+    condition = OneMore
+
+
+class Running(HeldInPlace):
+    def impose(self, time: float, derivative: int, values: Array) -> None:
+        values[self.held] = 1e3 * time if derivative == 1 else 0.0
+
+
+class MovesOnTheSpot(GoodHandler):
+    condition = Running
+
+
+class NoUnits(HeldInPlace):
+    def report(self, observation: Observation) -> dict[str, float]:
+        return {"how many": float(self.held.sum())}
+
+
+class ReportsWithoutUnits(GoodHandler):
+    condition = NoUnits
+
+
+class KeepsForces(Extension):
+    def return_forces(self, forces: Array) -> None:
+        forces[self.ghosts] = 0.0
+
+
+class ForgetsGhosts(BoundaryHandler):
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        (right,) = GhostExtension().bind(setting, label)
+        names = ("label", "ghosts", "shape", "displacement", "stress")
+        return [KeepsForces(**{name: getattr(right, name) for name in names})]
+
+
+@attrs.frozen(eq=False)
+class NoStress(StressCondition):
+    label: str
+
+    def impose_stress(self, time: float, stress: Array) -> None:
+        stress[:] = 0.0
+
+    def report(self, observation: Observation) -> dict[str, float]:
+        return {}
+
+
+class StressFree(BoundaryHandler):
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        return [NoStress(label)]
+
+
+@attrs.frozen(eq=False)
+class Push(ForceCondition):
+    """By how often it has been asked."""
+
+    label: str
+    particles: Indices
+    times: list[float] = attrs.field(factory=list)
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        self.times.append(time)
+        return np.full((len(self.particles), positions.shape[1]), float(len(self.times)))
+
+    def report(self, observation: Observation) -> dict[str, float]:
+        return {}
+
+
+class PushesMoreAndMore(BoundaryHandler):
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        return [Push(label, setting.select("left"))]
+
+
+BOUNDARIES = [
+    (BindsNothing, {"conditions"}),
+    (HoldsOneMore, {"held only"}),
+    (MovesOnTheSpot, {"rates", "energy account"}),
+    (ForgetsGhosts, {"virtual power"}),
+    (StressFree, {"stresses"}),
+    (PushesMoreAndMore, {"forces"}),
+    (ReportsWithoutUnits, {"report"}),
+]
+
+# Effects
+
+
+@attrs.frozen(eq=False)
+class Drag(ForceCondition):
+    label: str
+    particles: Indices
+    resistance: Array  # (k, 1) [kg/s]
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return -self.resistance * velocities[self.particles]
+
+    def report(self, observation: Observation) -> dict[str, float]:
+        return {}
+
+
+@attrs.frozen
+class GoodEffect(Effect):
+    """f = -m v / s."""
+
+    condition: ClassVar[Any] = Drag
+
+    def bind(self, setting: Setting, label: str) -> ForceCondition:
+        return self.condition(label, np.arange(setting.particles.count), setting.masses[:, None])
+
+    def arrays(self, setting: Setting) -> dict[str, int]:
+        return {"resistance": setting.masses.nbytes}
+
+    def damping_rate(self, bodies: Sequence[Body]) -> float:
+        return 1.0
+
+    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
+        return 0.0
+
+
+class OtherLabel(GoodEffect):
+    def bind(self, setting: Setting, label: str) -> ForceCondition:
+        return super().bind(setting, "mine")
+
+
+class DragInPlace(Drag):
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        positions *= 1.0 + 1e-3
+        return super().forces(time, positions, velocities)
+
+
+class MovesParticles(GoodEffect):
+    condition = DragInPlace
+
+
+class NegativeSize(GoodEffect):
+    def arrays(self, setting: Setting) -> dict[str, int]:
+        return {"resistance": -1}
+
+
+class ClaimsMomentum(GoodEffect):
+    conserves_momentum: ClassVar[bool] = True
+
+
+class DragForward(Drag):
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return -super().forces(time, positions, velocities)
+
+
+class Drives(GoodEffect):
+    condition = DragForward
+
+
+class DampsMoreThanDeclared(GoodEffect):
+    def damping_rate(self, bodies: Sequence[Body]) -> float:
+        return 0.9
+
+
+class Anchor(Drag):
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return -1e4 * self.resistance * positions[self.particles]
+
+
+class StiffUndeclared(GoodEffect):
+    condition = Anchor
+
+
+class DragNoUnits(Drag):
+    def report(self, observation: Observation) -> dict[str, float]:
+        return {"resistance": 1.0}
+
+
+class EffectWithoutUnits(GoodEffect):
+    condition = DragNoUnits
+
+
+class LeavesItsMark(GoodEffect):
+    """Makes every neo-Hookean material stiffer from now on."""
+
+    def bind(self, setting: Setting, label: str) -> ForceCondition:
+        stress = neo_hookean_stress
+        type(setting.bodies[0].material).first_piola = staticmethod(
+            lambda F, params: scale(1.01, stress(F, params))
+        )
+        return super().bind(setting, label)
+
+
+neo_hookean_stress = NeoHookean.first_piola
+
+
+@pytest.fixture(autouse=True)
+def _mended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever is done to the class is undone."""
+    monkeypatch.setattr(NeoHookean, "first_piola", staticmethod(neo_hookean_stress))
+
+
+EFFECTS = [
+    (OtherLabel, {"bound"}),
+    (MovesParticles, {"forces", "energy account"}),
+    (NegativeSize, {"arrays"}),
+    (ClaimsMomentum, {"momentum"}),
+    (Drives, {"stored energy"}),
+    (DampsMoreThanDeclared, {"damping rate"}),
+    (StiffUndeclared, {"stiffness rate"}),
+    (EffectWithoutUnits, {"report"}),
+    (LeavesItsMark, {"nothing when absent"}),
+]
+
 WRONG = {
+    "divergences": DIVERGENCES,
+    "shapes": SHAPES,
+    "discretisations": DISCRETISATIONS,
+    "boundaries": BOUNDARIES,
+    "effects": EFFECTS,
     "kernels": KERNELS,
     "materials": MATERIALS,
     "integrators": INTEGRATORS,
@@ -484,6 +1015,11 @@ WRONG = {
     "formulations": FORMULATIONS,
 }
 GOOD = {
+    "divergences": GoodDivergence,
+    "shapes": GoodShape,
+    "discretisations": GoodDiscretisation,
+    "boundaries": GoodHandler,
+    "effects": GoodEffect,
     "kernels": GoodKernel,
     "materials": GoodMaterial,
     "integrators": GoodIntegrator,
@@ -552,8 +1088,29 @@ def test_example_parts_take_typical_values_where_none_are_given() -> None:
     other = example_part("materials", "neo-hookean", poissons_ratio=0.1)
     assert typical.density == other.density
     assert (typical.poissons_ratio, other.poissons_ratio) == (0.3, 0.1)
+    for name, typical_of in (("union", 2), ("difference", 1)):
+        of = example_part("shapes", name).of
+        assert len(of if isinstance(of, tuple) else [of]) == typical_of
+
+
+def test_example_parts_say_which_value_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(examples.TYPICAL, "lengths")
     with pytest.raises(SceneError, match="missing parameter 'lengths'"):
         example_part("shapes", "box")
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [(kind, name) for kind in kits() for name in registry.names(kind)],
+    ids=lambda value: value,
+)
+def test_every_installed_part_conforms(kind: str, name: str) -> None:
+    results = conformance(kind, example_part(kind, name))
+    assert [result for result in results if not result.passed] == []
+
+
+def test_every_kind_of_part_but_a_case_has_a_kit() -> None:
+    assert set(kits()) == set(registry.INTERFACES) - {"cases"}
 
 
 def test_checks_need_no_hypothesis() -> None:

@@ -12,7 +12,7 @@ import click
 
 from solidsph.errors import ConvergenceError, DivergedError, SolidsphError
 
-VERBS = ("run", "explain", "cases", "plugins", "check", "plot", "reproduce", "cost")
+VERBS = ("run", "explain", "cases", "plugins", "check", "plot", "reproduce", "cost", "stability")
 
 TRACEBACK = "SOLIDSPH_TRACEBACK"
 """Environment variable: if 1, an unexpected error shows its traceback."""

@@ -19,7 +19,8 @@ from solidsph.results.record import Record
 from solidsph.scene import Scene
 from solidsph.studies.ellipticity import least_stiffness
 from solidsph.studies.spectrum import spectrum
-from solidsph_builtin.cases._stability_map import FORMS, UPDATED, StabilityMap, onset, stability_map
+from solidsph.studies.stability_map import StabilityMap
+from solidsph_builtin.cases._stability_map import FORMS, UPDATED, onset, stability_map
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 
 # How long the growth is watched, in e-foldings of the rate that the spectrum predicts for the
@@ -154,7 +155,7 @@ class TensileInstability(Case):
         }
 
     def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_builtin.cases._stability_picture import draw_maps
+        from solidsph.studies.stability_picture import draw_growth
         from solidsph_builtin.cases._tensile_picture import draw_configuration, draw_forms
 
         paths = [
@@ -170,7 +171,13 @@ class TensileInstability(Case):
             transit=self.transit,
             path=paths[1],
         )
-        draw_maps(self.maps(), self.cover, self.poissons_ratio, paths[2])
+        draw_growth(
+            self.maps(),
+            paths[2],
+            title="Small deviations from a uniform stretch of an endless bar, "
+            f"Poisson's ratio {self.poissons_ratio:g}: where they grow",
+            mark=(self.cover, "cover of Figs. 13 and 14"),
+        )
         return paths
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:

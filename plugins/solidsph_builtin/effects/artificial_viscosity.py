@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import ClassVar, final
 
 import attrs
 import numpy as np
@@ -43,6 +43,8 @@ class ArtificialViscosity(Effect):
     the rate k meets the pressure rho_0 (linear c s k + quadratic s^2 k^2) / 2 in every dimension
     and with every kernel.
     """
+
+    conserves_momentum: ClassVar[bool] = True
 
     linear: float = number(default=1.0)  # [-]
     quadratic: float = number(default=2.0)  # [-]

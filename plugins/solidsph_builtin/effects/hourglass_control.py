@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import ClassVar, final
 
 import attrs
 import numpy as np
@@ -53,6 +53,8 @@ class HourglassControl(Effect):
 
     Each particle's share is recorded as a field, and as a number for the whole body.
     """
+
+    conserves_momentum: ClassVar[bool] = True
 
     strength: float = number(default=0.5)  # [-] times the shear modulus
 

@@ -1,22 +1,87 @@
-"""solidsph check: whether a part keeps its interface's promises."""
+"""solidsph check: whether a part keeps its interface's promises, and what a scheme does."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import click
 
 from solidsph import registry
+from solidsph.commands.certified import (
+    SchemeOptions,
+    confirmations,
+    facts,
+    passed,
+    scheme_options,
+    show_certificate,
+    stretch_of,
+)
 from solidsph.commands.console import say, show_json, show_table
 from solidsph.commands.target import parameters
 from solidsph.errors import SceneError
 
 
 @click.command()
-@click.argument("name", metavar="PLUGIN")
+@click.argument("name", metavar="[PLUGIN]", required=False)
 @click.option("--kind", help="Kind of part, where parts of several kinds have the name.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A part's parameter.")
+@scheme_options
+@click.option("--stretch", default="1", show_default=True, help="Of a scheme: 1.2, or 1.2,1,1.")
+@click.option("--dimension", type=click.IntRange(1, 3), help="Of a scheme.  [default: 2]")
+@click.option("--run", "confirm", is_flag=True, help="Confirm a scheme's certificate by runs.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
-def check(name: str, kind: str | None, settings: tuple[str, ...], as_json: bool) -> None:
-    """Certify a part by name: the conformance kit that every built-in part passes."""
+def check(
+    name: str | None,
+    kind: str | None,
+    settings: tuple[str, ...],
+    stretch: str,
+    dimension: int | None,
+    confirm: bool,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Certify a part by name: the conformance kit that every built-in part passes. Or a scheme, by
+    the waves of its lattice: zero-energy and growing ones, critical step, wave speeds."""
+    scheme = SchemeOptions(**options)
+    if name is None:
+        if not scheme.given and dimension is None and stretch == "1":
+            raise SceneError(
+                "there is nothing to check; name a part, such as `solidsph check cubic-spline`, or "
+                "a scheme, such as `solidsph check --scheme SCENE` or `--kernel NAME --cover 3`"
+            )
+        _certify(scheme, settings, stretch, dimension or 2, confirm, as_json)
+        return
+    if scheme.given or dimension is not None:
+        raise SceneError(
+            f"{name!r} is a part, but the options name a scheme; check one at a time: leave out "
+            "the part's name, or the scheme's options"
+        )
+    _conform(name, kind, settings, as_json)
+
+
+def _certify(
+    options: SchemeOptions,
+    settings: tuple[str, ...],
+    stretch: str,
+    dimension: int,
+    confirm: bool,
+    as_json: bool,
+) -> None:
+    from solidsph.studies.certificate import certificate
+
+    found = certificate(options.made(settings), dimension, stretch_of(stretch))
+    confirmed = confirmations(found) if confirm else []
+    good = passed(found) and not any(row[1] == "FAIL" for row in confirmed)
+    if as_json:
+        show_json({**facts(found), "confirmed": confirmed})
+    else:
+        show_certificate(found, confirmed)
+        say("certified" if good else "NOT certified: see FAIL above")
+    if not good:
+        raise SystemExit(1)
+
+
+def _conform(name: str, kind: str | None, settings: tuple[str, ...], as_json: bool) -> None:
     from solidsph.testing import conformance, example_part, kits
 
     found = _kind_of(name, kind)
@@ -28,14 +93,14 @@ def check(name: str, kind: str | None, settings: tuple[str, ...], as_json: bool)
     part = example_part(found, name, **parameters(settings))
     entry = registry.find(found, name)
     results = conformance(found, part)
-    passed = all(result.passed for result in results)
+    good = all(result.passed for result in results)
     if as_json:
         show_json(
             {
                 "part": name,
                 "kind": registry.singular(found),
                 "distribution": f"{entry.distribution} {entry.version}",
-                "passed": passed,
+                "passed": good,
                 "checks": [
                     {
                         "check": result.name,
@@ -54,8 +119,8 @@ def check(name: str, kind: str | None, settings: tuple[str, ...], as_json: bool)
             [[r.name, "pass" if r.passed else "FAIL", r.measured, r.required] for r in results],
         )
         count = sum(not result.passed for result in results)
-        say("certified" if passed else f"NOT certified: {count} of {len(results)} checks failed")
-    if not passed:
+        say("certified" if good else f"NOT certified: {count} of {len(results)} checks failed")
+    if not good:
         raise SystemExit(1)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 from solidsph.body import Body
 from solidsph.interfaces.condition import ForceCondition
@@ -15,6 +16,9 @@ class Effect(ABC):
 
     An implementation is a frozen attrs class whose fields are the TOML keys of the effect.
     """
+
+    conserves_momentum: ClassVar[bool] = False
+    """Whether its forces on a free body, and their moments, add up to zero whatever the motion."""
 
     @abstractmethod
     def bind(self, setting: Setting, label: str) -> ForceCondition:

@@ -22,6 +22,10 @@ class Kernel(ABC):
     knots: ClassVar[tuple[float, ...]] = ()
     """Inner q where the profile is less smooth (spline joints), so that quadrature can see them."""
 
+    nonnegative_transform: ClassVar[bool] = False
+    """Whether the Fourier transform of W is nowhere negative in 1, 2 and 3D: neighbours then never
+    gain by moving together, however many there are (Dehnen & Aly 2012)."""
+
     @property
     def params(self) -> tuple[float, ...]:
         """Numbers passed on to `profile` and `slope`."""

@@ -1,26 +1,61 @@
-"""Waves on the discrete bar without ends: growth and frequency of every wavelength at once.
+"""Waves on an endless lattice: growth and frequency of every wavelength at once.
 
-Far from the ends of a uniform bar every particle sees the same neighbours, so the derivative of
-the accelerations by the positions is one column, shifted: the deviation exp(i k p) of particle p is
-a mode, and its eigenvalue the Fourier sum of that column. Where `spectrum` solves a dense
-eigenvalue problem of all particles, this moves a single one.
+Far from the surface of a uniformly stretched block every particle sees the same neighbours, so the
+derivative of the accelerations by the positions is one block of columns, shifted: the deviation
+exp(i k . p) of the particle at place p of the lattice is a mode, and its eigenvalues are those of
+the Fourier sum of that block. Where `spectrum` solves a dense eigenvalue problem of all particles,
+this moves a single one, once along each axis.
 """
 
 from __future__ import annotations
 
+from math import pi
+
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
-from solidsph.arrays import Array, Indices
+from solidsph.arrays import Array
 from solidsph.dynamics import Dynamics
 from solidsph.errors import SolidsphError
 from solidsph.particles import State
 from solidsph.studies.spectrum import RELATIVE_STEP
 
+# Wave vectors times particles that answer, at a time: complex numbers of 16 bytes.
+_PHASES = 1 << 22
+
+
+@attrs.frozen(eq=False)
+class LatticeResponse:
+    """How the particles of an endless lattice answer to one that is moved."""
+
+    places: NDArray[np.int64]  # (m, d) of those that answer, from the one moved [spacings]
+    blocks: Array  # (m, d, d) derivative of their accelerations by its position [1/s^2]
+
+    @property
+    def reach(self) -> int:
+        """How far along an axis the farthest of them is [spacings]."""
+        return int(np.abs(self.places).max(initial=0))
+
+    def symbols(self, wave_vectors: Array) -> NDArray[np.complex128]:
+        """The matrices (k, d, d) [1/s^2] whose eigenvalues are the squares of the exponents.
+
+        Args:
+            wave_vectors: advance of the phase from particle to particle along each axis, (k, d).
+        """
+        count = max(1, _PHASES // max(1, len(self.places)))
+        parts = [
+            np.tensordot(
+                np.exp(-1j * (wave_vectors[first : first + count] @ self.places.T)), self.blocks, 1
+            )
+            for first in range(0, len(wave_vectors), count)
+        ]
+        return np.concatenate(parts)
+
 
 @attrs.frozen(eq=False)
 class Dispersion:
-    """Exponents of small deviations, by wave number."""
+    """Exponents of small deviations of a bar, by wave number."""
 
     wave_numbers: Array  # (m,) advance of the phase from particle to particle, above 0, up to pi
     growth_rates: Array  # (m,) [1/s]
@@ -43,42 +78,64 @@ def dispersion(dynamics: Dynamics, state: State, wave_numbers: int = 200) -> Dis
     Raises:
         SolidsphError: the scene is no bar, or so short that its ends reach the middle.
     """
-    particles = dynamics.particles
-    if particles.dimension != 1:
+    dimension = dynamics.particles.dimension
+    if dimension != 1:
         raise SolidsphError(
-            f"the waves of a {particles.dimension}D scene have no single wave number; "
-            "take `spectrum`, or a bar"
+            f"the waves of a {dimension}D scene have no single wave number; "
+            "take `spectrum` or `lattice_response`, or a bar"
         )
-    order = np.argsort(state.positions[:, 0])
-    middle = len(order) // 2
-    column = _column(dynamics, state, order, middle)
-    shifts = np.arange(len(order)) - middle
-    reach = int(np.abs(shifts[column != 0.0]).max(initial=0))
-    # A particle that answers to the middle one looks as far to its other side.
-    if 2 * reach >= min(middle, len(order) - 1 - middle):
-        raise SolidsphError(
-            f"a particle answers to the {reach} on either side, and the bar of {len(order)} ends "
-            f"too near its middle; take at least {4 * reach + 3} particles"
-        )
-    # At these wave numbers the phase repeats after `period` particles.
-    period = 2 * wave_numbers
-    folded = np.bincount(shifts % period, column, period)
-    exponents = np.sqrt(np.fft.fft(folded)[1 : wave_numbers + 1])
-    k = np.pi * np.arange(1, wave_numbers + 1) / wave_numbers
+    k = pi * np.arange(1, wave_numbers + 1) / wave_numbers
+    exponents = np.sqrt(lattice_response(dynamics, state).symbols(k[:, None])[:, 0, 0])
     return Dispersion(k, exponents.real, np.abs(exponents.imag))
 
 
-def _column(dynamics: Dynamics, state: State, order: Indices, middle: int) -> Array:
-    """Derivative of all accelerations by the position of the middle particle, (n,) [1/s^2]."""
-    moved = order[middle]
-    h = RELATIVE_STEP * float(dynamics.particles.spacings[moved])
+def lattice_response(dynamics: Dynamics, state: State) -> LatticeResponse:
+    """How a lattice answers about its uniform `state`, from the particle nearest to its middle.
+
+    Raises:
+        SolidsphError: the particles are not the points of a lattice in rows along the axes, or so
+            few that the surface reaches the middle.
+    """
+    particles = dynamics.particles
+    X = particles.positions
+    middle = int(np.argmin(np.linalg.norm(X - 0.5 * (X.min(axis=0) + X.max(axis=0)), axis=1)))
+    spacing = float(particles.spacings[middle])
+    exact = (X - X[middle]) / spacing
+    places = np.rint(exact).astype(np.int64)
+    # A lattice is placed to rounding; a jitter worth the name moves its particles farther.
+    if np.abs(exact - places).max() > 1e-6:
+        raise SolidsphError(
+            "the particles do not stand in rows one spacing apart, so waves have no wave vector; "
+            "take a 'lattice' whose spacing divides the body, or `spectrum`"
+        )
+    blocks = _blocks(dynamics, state, middle, spacing)
+    answering = np.any(blocks != 0.0, axis=(1, 2))
+    found = LatticeResponse(places[answering], blocks[answering])
+    depth = int(min(-places.min(axis=0).max(), places.max(axis=0).min()))
+    # A particle that answers to the middle one looks as far to its other side.
+    if 2 * found.reach >= depth:
+        row = "bar" if particles.dimension == 1 else "row"
+        raise SolidsphError(
+            f"a particle answers to the {found.reach} on either side, and the {row} of "
+            f"{2 * depth + 1} ends too near its middle; take at least {4 * found.reach + 3} "
+            "particles"
+        )
+    return found
+
+
+def _blocks(dynamics: Dynamics, state: State, moved: int, spacing: float) -> Array:
+    """Derivative of all accelerations by the position of one particle, (n, d, d) [1/s^2]."""
+    h = RELATIVE_STEP * spacing
     rest = np.zeros_like(state.velocities)
-    values = []
-    for k in (-2, -1, 1, 2):
-        positions = state.positions.copy()
-        positions[moved] += k * h
-        placed = dynamics.place(state.time, positions)
-        values.append(dynamics.respond(state.time, placed, rest).accelerations[order, 0])
-    # Where no difference is, none must be left by rounding: that is how far the particle reaches.
-    fourth: Array = ((values[0] - values[3]) - 8.0 * (values[1] - values[2])) / (12.0 * h)
-    return fourth
+    columns = []
+    for axis in range(state.positions.shape[1]):
+        values = []
+        for k in (-2, -1, 1, 2):
+            positions = state.positions.copy()
+            positions[moved, axis] += k * h
+            placed = dynamics.place(state.time, positions)
+            values.append(dynamics.respond(state.time, placed, rest).accelerations)
+        # Where no difference is, none must be left by rounding: so far the particle reaches.
+        fourth = (values[0] - values[3]) - 8.0 * (values[1] - values[2])
+        columns.append(fourth / (12.0 * h))
+    return np.stack(columns, axis=2)

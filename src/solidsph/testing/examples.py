@@ -10,6 +10,8 @@ import attrs
 from solidsph import registry
 from solidsph.parts import construct
 
+_BOX = {"type": "box", "lengths": [1.2, 0.8]}
+
 # By the name of the field. Soft rubber; any values of one solid would do.
 TYPICAL: Mapping[str, Any] = {
     "youngs_modulus": 1e6,  # [Pa]
@@ -21,7 +23,33 @@ TYPICAL: Mapping[str, Any] = {
     "amplitude": 0.2,  # [-]
     "rate": 20.0,  # [1/s]
     "seed": 1,
+    # Shapes
+    "length": 1.3,  # [m]
+    "lengths": [1.2, 0.8],  # [m]
+    "radius": 0.5,  # [m]
+    "inner_radius": 0.2,  # [m]
+    "outer_radius": 0.5,  # [m]
+    "vertices": [[0.0, 0.0], [1.2, 0.0], [0.5, 0.3], [0.0, 0.9]],  # [m]
+    # Boundary handlers
+    "where": "left",
+    "axis": "x",
+    "displacement": {"x": "0.002*sin(300*t)"},  # [m]
+    "traction": {"x": "1e3*sin(300*t)"},  # [Pa]
+    # Discretisations: on the rectangle of their kit, which the map takes to itself
+    "before": _BOX,
+    "to": {"x": "X + 0.05*sin(2*pi*X/1.2)"},  # [m]
+    "positions": [[0.05 + 0.1 * i, 0.05 + 0.1 * j] for i in range(12) for j in range(8)],  # [m]
 }
+
+# Where a field of one name means something else in each kind.
+TYPICAL_OF_KIND: Mapping[tuple[str, str], Any] = {
+    ("discretisations", "of"): "lattice",
+    ("shapes", "of"): [_BOX, {"type": "disc", "radius": 0.3, "centre": [1.2, 0.8]}],
+    ("shapes", "minus"): {"type": "disc", "radius": 0.22, "centre": [0.6, 0.4]},
+}
+
+# Fields with a default that a part cannot do without all the same.
+_OFFERED = ("positions",)
 
 
 def example_part(kind: str, name: str, **parameters: Any) -> Any:
@@ -33,10 +61,21 @@ def example_part(kind: str, name: str, **parameters: Any) -> Any:
         PluginError: the part cannot be loaded.
     """
     cls = registry.load(kind, name)
-    needed = [
-        field.alias or field.name
-        for field in (attrs.fields(cls) if attrs.has(cls) else ())
-        if field.init and field.default is attrs.NOTHING
-    ]
-    typical = {key: TYPICAL[key] for key in needed if key in TYPICAL}
+    fields = attrs.fields(cls) if attrs.has(cls) else ()
+    typical = {
+        key: value
+        for field in fields
+        if field.init and (field.default is attrs.NOTHING or field.name in _OFFERED)
+        for key in [field.alias or field.name]
+        for value in [_typical(kind, key, str(field.type))]
+        if value is not None
+    }
     return construct(kind, {"type": name, **typical, **parameters})
+
+
+def _typical(kind: str, key: str, annotation: str) -> Any:
+    value = TYPICAL_OF_KIND.get((kind, key), TYPICAL.get(key))
+    # One part where one is wanted: the first of several.
+    if isinstance(value, list) and key == "of" and not annotation.startswith("tuple"):
+        return value[0]
+    return value

@@ -7,15 +7,17 @@ not take.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from scipy.integrate import quad
+from scipy.special import j0
 
 from solidsph.arrays import Array
 from solidsph.interfaces.kernel import Kernel
-from solidsph.smoothing import UNIT_SPHERE, profile_slope, smoothing_kernel
-from solidsph.testing.check import Check, Verdict, at_most, check, worst
+from solidsph.smoothing import UNIT_SPHERE, SmoothingKernel, profile_slope, smoothing_kernel
+from solidsph.testing.check import Check, Verdict, at_most, check, not_promised, worst
 from solidsph.testing.samples import DIMENSIONS
 
 # Not 1, so that a missing or doubled factor H shows.
@@ -23,6 +25,13 @@ _RADIUS = 0.7
 
 # A smooth integrand in double precision is integrated to a few 1e-15; a thousand of those.
 MASS_TOLERANCE = 1e-12
+
+# Wave numbers over the inverse support radius: up to half a wavelength between two particles at a
+# cover of 19.
+_WAVES = np.linspace(0.0, 60.0, 1201)
+
+# Of the mass; the quadrature errs by less, a profile cut at 1e-4 of its height by about that.
+_NEGATIVE = 1e-9
 
 
 def smoothed_mass(kernel: Kernel, dimension: int, support_radius: float) -> float:
@@ -148,8 +157,67 @@ def pointwise(kernel: Kernel) -> Verdict:
     return at_most(max(errors), 1e-14)
 
 
+@check
+def gradient_moment(kernel: Kernel) -> Verdict:
+    """The first moment of the gradient of W is minus its mass, and what a cut leaves at the edge,
+    so that linear fields have their gradients."""
+    errors = []
+    for d in DIMENSIONS:
+        W = smoothing_kernel(kernel, d, _RADIUS)
+        ends = [end * _RADIUS for end in _ends(kernel)]
+        moment = _shells(partial(_times_slope, W), d, ends) / d
+        edge = float(W.value(np.array([_RADIUS * (1.0 - 1e-15)]))[0])
+        expected = UNIT_SPHERE[d] / d * _RADIUS**d * edge - (1.0 - kernel.lost_mass(d))
+        errors.append(abs(moment - expected))
+    return at_most(max(errors), MASS_TOLERANCE)
+
+
+@check
+def moments(kernel: Kernel) -> Verdict:
+    """The second moment of W is finite, positive and less than that of all its mass at the edge,
+    by a sum over a fine lattice in space: first moments are zero, the second are isotropic."""
+    told, errors = [], []
+    for d, count in ((1, 2001), (2, 201), (3, 61)):
+        W = smoothing_kernel(kernel, d, 1.0)
+        axis = (np.arange(count) + 0.5) / count * 2.0 - 1.0
+        x = np.stack([one.ravel() for one in np.meshgrid(*[axis] * d, indexing="ij")])
+        w = W.value(np.sqrt(np.sum(x**2, axis=0))) * (2.0 / count) ** d
+        second = (w * x) @ x.T
+        errors += [
+            float(np.abs(x @ w).max()),
+            float(np.abs(second - second[0, 0] * np.eye(d)).max()),
+        ]
+        mean = float(np.trace(second)) / float(w.sum())
+        told.append(mean)
+    # Odd terms, and those that an exchange of axes maps to each other, cancel to rounding.
+    passed = max(errors) <= 1e-12 and all(0.0 < one < 1.0 for one in told)
+    listed = ", ".join(f"{one:.4f}" for one in told)
+    return Verdict(passed, f"mean square distances {listed} H^2; asymmetry {max(errors):.1e}")
+
+
+@check
+def transform(kernel: Kernel) -> Verdict:
+    """The Fourier transform of W is nowhere negative in 1, 2 and 3D, if so declared; otherwise the
+    first negative wave number is told, from which on crowded neighbours may pair."""
+    least: dict[int, tuple[float, float]] = {}
+    for d in DIMENSIONS:
+        values = _transform(kernel, d, _WAVES)
+        first = np.flatnonzero(values < -_NEGATIVE)
+        if first.size:
+            least[d] = float(_WAVES[first[0]]), float(values.min())
+    if kernel.nonnegative_transform or not least:
+        worst_of_all = min((value for _, value in least.values()), default=0.0)
+        told = "nowhere negative" if not least else f"negative in {sorted(least)}D"
+        return Verdict(not least, f"{told}, least {worst_of_all:.1e} of the mass")
+    listed = "; ".join(f"{d}D: {low:.0e} from k H = {k:.1f}" for d, (k, low) in least.items())
+    return not_promised(f"negative, {listed}")
+
+
 CHECKS: tuple[Check, ...] = (
     mass,
+    gradient_moment,
+    moments,
+    transform,
     declared_loss,
     closed_normalisation,
     not_negative,
@@ -192,3 +260,25 @@ def _shells(f: Callable[[float], float], dimension: int, ends: list[float]) -> f
         )[0]
         for a, b in pairwise(ends)
     )
+
+
+def _times_slope(W: SmoothingKernel, r: float) -> float:
+    return r * float(W.slope(np.array([r]))[0])
+
+
+def _spherical_mean(phases: Array, dimension: int) -> Array:
+    """Mean of exp(i k . x) over all directions, for phases |k| |x|."""
+    if dimension == 1:
+        return np.cos(phases)
+    return np.asarray(j0(phases) if dimension == 2 else np.sinc(phases / np.pi))
+
+
+def _transform(kernel: Kernel, dimension: int, wave_numbers: Array) -> Array:
+    """Fourier transform of W with H = 1, over its mass, at wave numbers (m,)."""
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    ends = _ends(kernel)
+    q = np.concatenate([a + 0.5 * (b - a) * (nodes + 1.0) for a, b in pairwise(ends)])
+    w = np.concatenate([0.5 * (b - a) * weights for a, b in pairwise(ends)])
+    shells = w * _profile(kernel, q) * q ** (dimension - 1)
+    phases = np.outer(wave_numbers, q)
+    return np.asarray(_spherical_mean(phases, dimension) @ shells / shells.sum())

@@ -6,15 +6,31 @@ from collections.abc import Mapping
 
 from solidsph.errors import SceneError
 from solidsph.parts import construct
-from solidsph.testing import formulation, gradient, integrator, kernel, material
+from solidsph.testing import (
+    boundary,
+    discretisation,
+    divergence,
+    effect,
+    formulation,
+    gradient,
+    integrator,
+    kernel,
+    material,
+    shape,
+)
 from solidsph.testing.check import Check, CheckResult
 
 _KITS: Mapping[str, tuple[Check, ...]] = {
     "kernels": kernel.CHECKS,
+    "shapes": shape.CHECKS,
+    "discretisations": discretisation.CHECKS,
+    "boundaries": boundary.CHECKS,
     "materials": material.CHECKS,
     "gradients": gradient.CHECKS,
+    "divergences": divergence.CHECKS,
     "formulations": formulation.CHECKS,
     "integrators": integrator.CHECKS,
+    "effects": effect.CHECKS,
 }
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from solidsph.arrays import Array, Tensor
 from solidsph.interfaces.material import Material
+from solidsph.studies.ellipticity import least_stiffness, losses_of_ellipticity
 from solidsph.tensors import particles_first
 from solidsph.testing.check import Check, Verdict, at_most, check, more_than, not_promised
 from solidsph.testing.samples import (
@@ -26,6 +27,10 @@ _COUNT = 20  # deformation gradients in each dimension
 # rounding, 1e-16 / step; both stay below 1e-11 of the stiffness.
 _STEP = 2e-3
 _DIFFERENCE_TOLERANCE = 1e-10
+
+# Where ellipticity is looked for: from strong compression to strong tension.
+_STRETCHES = (0.3, 3.0)
+_SAMPLES = 15
 
 # A few dozen operations on numbers of the order of the stiffness.
 _ROUNDING = 1e-13
@@ -111,6 +116,49 @@ def angular_momentum(material: Material) -> Verdict:
 
 
 @check
+def stress_measures(material: Material) -> Verdict:
+    """F S F^T / J with S = F^-1 P is the Cauchy stress: J sigma : d is the power of a rate of
+    deformation d, if the law is objective."""
+    if not material.objective:
+        return not_promised("the law declares that it is not objective")
+    errors = []
+    for d, rng in seeded():
+        F = random_deformation_gradients(rng, d, _COUNT)
+        S = np.moveaxis(
+            np.linalg.solve(np.moveaxis(F, -1, 0), np.moveaxis(_stress(material, F), -1, 0)), 0, -1
+        )
+        J = np.linalg.det(np.moveaxis(F, -1, 0))
+        sigma = np.einsum("ikn,kln,jln->ijn", F, S, F) / J
+        rate = _directions(rng, d)
+        rate = 0.5 * (rate + rate.transpose(1, 0, 2))
+        power = J * np.einsum("ijn,ijn->n", sigma, rate)
+        along = np.einsum("ikn,kjn->ijn", rate, F)
+        found = central_difference(partial(_energy, material), F, along, _STEP)
+        errors.append(np.abs(found - power).max())
+        errors.append(np.abs(sigma - sigma.transpose(1, 0, 2)).max())
+    return at_most(max(errors) / _stiffness(material), _DIFFERENCE_TOLERANCE)
+
+
+@check
+def ellipticity(material: Material) -> Verdict:
+    """Unstrained it carries waves in every direction; where that is lost under uniaxial stretch is
+    told: there the deformation localises, whatever the particles do."""
+    at_rest = min(least_stiffness(material, np.eye(d)).value for d in (1, 2, 3))
+    if not at_rest > 0.0:
+        return Verdict(False, f"least stiffness {at_rest / _stiffness(material):.1e} unstrained")
+    lost = [
+        found
+        for end in _STRETCHES
+        for found in losses_of_ellipticity(
+            material, lambda s: np.diag([s, 1.0]), 1.0, end, samples=_SAMPLES
+        )[:1]
+    ]
+    where = " and ".join(f"at a stretch of {one:.3f}" for one in lost)
+    least, most = _STRETCHES
+    return Verdict(True, f"lost {where}" if lost else f"kept from {least:g} to {most:g}")
+
+
+@check
 def small_strain(material: Material) -> Verdict:
     """The tangent at F = I is that of the declared Lame parameters, lambda tr(e) I + 2 mu e."""
     lam, mu = material.lame_parameters
@@ -175,6 +223,8 @@ CHECKS: tuple[Check, ...] = (
     natural_state,
     objectivity,
     angular_momentum,
+    stress_measures,
+    ellipticity,
     small_strain,
     missing_dimensions,
     wave_speed,

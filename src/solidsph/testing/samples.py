@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import wraps
 from math import cos, sin
+from typing import Any, TypeVar
 
 import numpy as np
 
 from solidsph.arrays import Array
+
+Made = TypeVar("Made")
 
 DIMENSIONS = (1, 2, 3)
 
@@ -71,3 +75,16 @@ def seeded() -> Iterator[tuple[int, np.random.Generator]]:
     """Each dimension with random numbers of its own, the same in every run."""
     for dimension in DIMENSIONS:
         yield dimension, np.random.default_rng(dimension)
+
+
+def made_once(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
+    """`make`, which remembers what it made of the last part: checks of a part come one by one."""
+    kept: list[tuple[object, Made]] = []
+
+    @wraps(make)
+    def remembered(part: Any) -> Made:
+        if not kept or kept[0][0] is not part:
+            kept[:] = [(part, make(part))]
+        return kept[0][1]
+
+    return remembered

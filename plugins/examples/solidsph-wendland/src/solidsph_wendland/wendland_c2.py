@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import pi
-from typing import final
+from typing import ClassVar, final
 
 import attrs
 
@@ -19,6 +19,8 @@ class WendlandC2(Kernel):
     This is Wendland's function of two and three dimensions; it serves in one as well, where his
     own would be (1 - q)^3 (1 + 3 q).
     """
+
+    nonnegative_transform: ClassVar[bool] = True
 
     @staticmethod
     def profile(q: Scalar, params: tuple[float, ...]) -> Scalar:

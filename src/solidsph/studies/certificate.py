@@ -1,0 +1,375 @@
+"""Certificate: what a scheme does to small deviations from a uniform stretch, wave by wave.
+
+On an endless lattice every small deviation is a sum of waves, each with an exponent of its own
+(`studies.dispersion`). Four things can be read off them before anything is run: waves that cost no
+energy, waves that grow, the largest stable step, and how fast waves go for how fast they should.
+A free body adds its surface; its modes come from `studies.spectrum`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import combinations
+from math import pi
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter
+from scipy.optimize import minimize
+
+from solidsph.arrays import Array
+from solidsph.errors import SceneError
+from solidsph.simulation import Simulation
+from solidsph.studies.dispersion import LatticeResponse, lattice_response
+from solidsph.studies.ellipticity import acoustic_tensors, least_stiffness
+from solidsph.studies.scheme import Scheme, deformation, stretched
+from solidsph.studies.spectrum import spectrum
+from solidsph.tensors import components_first, particles_first
+
+GROWS = 5e-4
+"""Growth counts from here on [e-foldings per wave transit of one spacing]: rounding leaves 1e-4 of
+a neutral mode, the square root of what it leaves of its eigenvalue."""
+
+SOFT = 1e-2
+"""A wave that is not even so fast, relative to a shear wave, costs no energy to speak of [-]."""
+
+# Wave numbers along each axis between 0 and pi; extremes are then sought between them.
+_GRID = {1: 400, 2: 40, 3: 14}
+
+# Between two points of the coarsest grid, a tenth of a radian away, a wave that costs nothing is
+# followed by ones of this softness.
+_SOFT_ON_GRID = 0.05
+
+# As a phase: of longer waves rounding leaves nothing, and the translation is none.
+_LONGEST = 1e-3
+
+# Extremes that are told: the rest are waves much like them.
+_TOLD = 8
+
+# Two extremes this close, as phases, are one.
+_SAME = 1e-2
+
+# Layers about the middle of the free body, along each axis: enough for edges and an inside.
+_FREE = {1: (8,), 2: (4, 3), 3: (2, 2, 1)}
+
+# Of the highest frequency: rounding leaves 1e-6 of it, the slowest bending of so small a body has
+# some hundredths.
+_STILL = 1e-3
+
+# Of a spacing: a rotation so small is a linear motion up to its square.
+_TINY = 1e-4
+
+_LARGE = 1e9  # in place of infinity, of which a search makes differences
+_SEARCH: Any = {"xatol": 1e-7, "fatol": 1e-14, "maxiter": 400}
+
+WAVELENGTHS = (2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 40.0)
+"""Where wave speeds are told [spacings]."""
+
+
+@attrs.frozen(eq=False)
+class Wave:
+    """One wave of the lattice, in units of spacing and of the transit of a confined wave."""
+
+    wave_vector: Array  # (d,) advance of the phase from particle to particle along each axis
+    polarisation: Array  # (d,) direction of its displacement, real part, of length 1
+    growth_rate: float  # [1/transit]
+    frequency: float  # [rad/transit]
+    softness: float  # squared speed over that of a shear wave; negative where it grows [-]
+    count: int  # polarisations with this wave vector that grow, or else cost no energy
+
+    @property
+    def wavelength(self) -> float:
+        """[spacings]"""
+        return float(2.0 * pi / np.linalg.norm(self.wave_vector))
+
+
+@attrs.frozen(eq=False)
+class FreeBody:
+    """Modes of a small free body, unstretched."""
+
+    particles: int
+    rigid_modes: int  # translations and rotations that cost no energy: 1, 3 or 6 of them should
+    zero_modes: int  # that cost no energy, beyond those
+    growth_rate: float  # [1/transit]
+    highest_frequency: float  # [rad/transit]
+    critical_step: float  # [transits]
+
+
+@attrs.frozen(eq=False)
+class Certificate:
+    """What a scheme does at one uniform stretch."""
+
+    scheme: Scheme
+    stretches: tuple[float, ...]  # along each axis
+    elliptic: bool  # whether the material itself carries waves in every direction there
+    mean_stress: float  # over lambda + 2 mu; positive in tension
+    zero_modes: tuple[Wave, ...]  # that cost no energy
+    growing: tuple[Wave, ...]  # the fastest first, each the fastest about its wave vector
+    fastest: Wave  # of the highest frequency
+    critical_step: float  # largest stable step on the endless lattice [transits]
+    rule_step: float  # the CFL step, that of time_step_factor = 1 [transits]
+    wavelengths: Array  # (m,) along the first axis [spacings]
+    speeds: Array  # (m, d) over the exact ones: along the wave first, then across it [-]
+    free: FreeBody | None  # only unstretched: otherwise a free body is in no equilibrium
+
+    @property
+    def dimension(self) -> int:
+        """1, 2 or 3."""
+        return len(self.stretches)
+
+    @property
+    def growth_rate(self) -> float:
+        """Of the fastest growing wave [1/transit]; 0 if none grows."""
+        return self.growing[0].growth_rate if self.growing else 0.0
+
+    @property
+    def largest_factor(self) -> float:
+        """Largest stable time_step_factor, on the endless lattice and in the free body [-]."""
+        steps = [self.critical_step, *([] if self.free is None else [self.free.critical_step])]
+        return min(steps) / self.rule_step
+
+    @property
+    def cause(self) -> str:
+        """Why waves grow: "material", "tensile", "pairing", or nothing if none does.
+
+        Where the material has lost ellipticity no scheme may hide it. Otherwise it is the scheme
+        alone: by the stress that is there, tensile where it pulls, pairing where it pushes.
+        """
+        if not self.growing:
+            return ""
+        if not self.elliptic:
+            return "material"
+        return "tensile" if self.mean_stress > 0.0 else "pairing"
+
+
+def certificate(
+    scheme: Scheme, dimension: int, stretch: float | Sequence[float] = 1.0
+) -> Certificate:
+    """Certify a scheme at a uniform stretch.
+
+    Args:
+        scheme: kernel, cover, formulation with its gradient and divergence, material, effects.
+        dimension: 1, 2 or 3.
+        stretch: of every axis, or one for each.
+
+    Raises:
+        SceneError: a stretch is not positive, or the block of particles would be too large.
+        BuildError: parts of the scheme do not fit each other.
+    """
+    stretches = _checked(dimension, stretch)
+    response, simulation_step, rate = _response(scheme, stretches)
+    unit = scheme.transit
+    waves = _Waves(scheme, response, dimension)
+    grid = waves.grid()
+    softness, rates, frequencies = waves.measured(grid)
+    soft = waves.extremes(grid, softness, waves.softness, below=_SOFT_ON_GRID)
+    growing = waves.extremes(grid, -rates, lambda k: -waves.wave(k).growth_rate, below=-GROWS)
+    # Waves that cost nothing are minima of the energy, not places where it changes its sign.
+    zero = [one for one in soft if abs(one.softness) <= SOFT**2 and one.growth_rate <= GROWS]
+    (fastest, *_) = waves.extremes(
+        grid, -frequencies, lambda k: -waves.wave(k).frequency, below=-0.99 * frequencies.max()
+    )
+    limit = scheme.integrator.stability_limit
+    F = deformation(stretches)
+    return Certificate(
+        scheme=scheme,
+        stretches=stretches,
+        elliptic=least_stiffness(scheme.material, F).value > 0.0,
+        mean_stress=_mean_stress(scheme, F),
+        zero_modes=tuple(zero),
+        growing=tuple(growing),
+        fastest=fastest,
+        critical_step=limit / (fastest.frequency + rate * unit),
+        rule_step=simulation_step / unit,
+        wavelengths=np.array(WAVELENGTHS),
+        speeds=waves.speeds(F),
+        free=_free_body(scheme, dimension, rate) if set(stretches) == {1.0} else None,
+    )
+
+
+@attrs.frozen(eq=False)
+class _Waves:
+    """All waves of a lattice, in units of spacing and transit."""
+
+    scheme: Scheme
+    response: LatticeResponse
+    dimension: int
+
+    def grid(self) -> Array:
+        """Wave vectors (n, ..., d) between 0 and pi along each axis."""
+        axis = np.linspace(0.0, pi, _GRID[self.dimension] + 1)
+        return np.stack(np.meshgrid(*[axis] * self.dimension, indexing="ij"), axis=-1)
+
+    def symbols(self, wave_vectors: Array) -> NDArray[np.complex128]:
+        """(k, d, d) [1/transit^2]"""
+        return self.response.symbols(wave_vectors) * self.scheme.transit**2
+
+    def measured(self, grid: Array) -> tuple[Array, Array, Array]:
+        """Softness, growth rate and highest frequency at every wave vector of the grid."""
+        flat = grid.reshape(-1, self.dimension)
+        squares = np.linalg.eigvals(self.symbols(flat))
+        exponents = np.sqrt(squares)
+        lengths = np.sum(flat**2, axis=1) * self._shear
+        lengths[0] = np.inf  # the translation
+        softness = (-squares.real).min(axis=1) / lengths
+        softness[0] = np.inf
+        found = (softness, exponents.real.max(axis=1), np.abs(exponents.imag).max(axis=1))
+        softness, rates, frequencies = (one.reshape(grid.shape[:-1]) for one in found)
+        return softness, rates, frequencies
+
+    @property
+    def _shear(self) -> float:
+        """Squared speed of a shear wave, in 1D of the confined one, over that of the latter."""
+        lam, mu = self.scheme.material.lame_parameters
+        return 1.0 if self.dimension == 1 else mu / (lam + 2.0 * mu)
+
+    def softness(self, wave_vector: Array) -> float:
+        """Least squared speed over that of a shear wave."""
+        length = float(wave_vector @ wave_vector)
+        if length < _LONGEST**2:
+            return np.inf
+        squares = np.linalg.eigvals(self.symbols(wave_vector[None])[0])
+        return float((-squares.real).min() / (length * self._shear))
+
+    def wave(self, wave_vector: Array) -> Wave:
+        """The fastest growing, or else the softest, wave with that wave vector."""
+        squares, modes = np.linalg.eig(self.symbols(wave_vector[None])[0])
+        exponents = np.sqrt(squares)
+        grows = float(exponents.real.max()) > GROWS
+        chosen = int(np.argmax(exponents.real if grows else squares.real))
+        mode = modes[:, chosen]
+        mode = (mode / mode[np.argmax(np.abs(mode))]).real
+        slow = np.abs(squares) <= SOFT**2 * float(wave_vector @ wave_vector) * self._shear
+        return Wave(
+            wave_vector=wave_vector,
+            polarisation=mode / np.linalg.norm(mode),
+            growth_rate=float(exponents.real.max()),
+            frequency=float(np.abs(exponents.imag).max()),
+            softness=self.softness(wave_vector),
+            count=int(np.sum(exponents.real > GROWS) if grows else np.sum(slow)),
+        )
+
+    def extremes(
+        self, grid: Array, values: Array, measure: Callable[[Array], float], *, below: float
+    ) -> list[Wave]:
+        """Waves at the least local minima of `measure`, the least first.
+
+        Args:
+            grid: wave vectors (n, ..., d).
+            values: what it is there, (n, ...).
+            measure: what it is at any wave vector (d,).
+            below: only minima whose value on the grid is less count.
+        """
+        neighbourhood = minimum_filter(values, size=3, mode="nearest")
+        minima = np.argwhere((values <= neighbourhood) & (values < below))
+        order = np.argsort([values[tuple(one)] for one in minima], kind="stable")
+        width = pi / _GRID[self.dimension]
+        found: list[tuple[float, Array]] = []
+        for index in minima[order[: 4 * _TOLD]]:
+            start = grid[tuple(index)]
+            bounds = [(max(0.0, k - width), min(pi, k + width)) for k in start]
+            k = _least(measure, start, bounds)
+            if all(np.abs(k - other).max() > _SAME for _, other in found):
+                found.append((measure(k), k))
+        found.sort(key=lambda one: one[0])
+        return [self.wave(k) for _, k in found[:_TOLD]]
+
+    def speeds(self, F: Array) -> Array:
+        """Phase speeds along the first axis over the exact ones, (m, d); nan where one grows."""
+        k = np.zeros((len(WAVELENGTHS), self.dimension))
+        k[:, 0] = 2.0 * pi / np.array(WAVELENGTHS)
+        lam, mu = self.scheme.material.lame_parameters
+        along = np.eye(self.dimension)[:1]
+        exact = acoustic_tensors(self.scheme.material, F, along)[0] / (lam + 2.0 * mu)
+        squares = np.real(np.einsum("kii->ki", -self.symbols(k))) / k[:, :1] ** 2
+        # In rows along the axes of stretch, waves along an axis move along one.
+        ratios = squares / np.diag(exact)
+        # What rounding leaves of a wave that costs nothing is no growth.
+        return np.sqrt(np.where(ratios > -(SOFT**2), np.maximum(ratios, 0.0), np.nan))
+
+
+def _least(
+    measure: Callable[[Array], float], start: Array, bounds: Sequence[tuple[float, float]]
+) -> Array:
+    """Where near `start` (d,) it is least, within bounds of each component."""
+
+    def finite(wave_vector: Any) -> Any:
+        return min(measure(wave_vector), _LARGE)
+
+    found: Any = minimize(finite, start, method="Nelder-Mead", bounds=list(bounds), options=_SEARCH)
+    return np.asarray(found.x) if found.fun < measure(start) else start
+
+
+def _checked(dimension: int, stretch: float | Sequence[float]) -> tuple[float, ...]:
+    if dimension not in (1, 2, 3):
+        raise SceneError(f"a certificate has 1, 2 or 3 dimensions, not {dimension!r}")
+    stretches = np.asarray(stretch, dtype=np.float64)
+    if stretches.ndim == 0:
+        stretches = np.full(dimension, float(stretches))
+    if stretches.shape != (dimension,) or not np.all((stretches > 0.0) & np.isfinite(stretches)):
+        raise SceneError(
+            f"stretch must be one positive number, or one for each of {dimension} axes, got "
+            f"{stretch!r}; 1 is unstretched"
+        )
+    return tuple(float(one) for one in stretches)
+
+
+def _response(scheme: Scheme, stretches: Sequence[float]) -> tuple[LatticeResponse, float, float]:
+    """The lattice's answer, the CFL step [s] and the rate of damping that effects declare [1/s]."""
+    dimension = len(stretches)
+    layers = [scheme.depth(min(stretches))] * dimension
+    simulation = scheme.simulation(dimension, layers)
+    bodies = simulation.setting.bodies
+    rate = sum(effect.damping_rate(bodies) for effect in simulation.effects.values())
+    state = stretched(simulation, stretches)
+    return lattice_response(simulation.dynamics, state), simulation.step_size, rate
+
+
+def _mean_stress(scheme: Scheme, F: Array) -> float:
+    """Mean Cauchy stress over lambda + 2 mu."""
+    lam, mu = scheme.material.lame_parameters
+    P = particles_first(
+        scheme.material.first_piola(components_first(F[None]), scheme.material.params), 1
+    )[0]
+    return float(np.trace(P @ F.T) / np.linalg.det(F) / len(F) / (lam + 2.0 * mu))
+
+
+def _free_body(scheme: Scheme, dimension: int, rate: float) -> FreeBody:
+    simulation = scheme.simulation(dimension, _FREE[dimension])
+    found = spectrum(simulation.dynamics, simulation.start())
+    exponents = found.growth_rates + 1j * found.frequencies
+    highest = found.highest_frequency
+    still = int(np.sum(np.abs(exponents) < _STILL * highest))
+    rigid = _free_rigid_motions(simulation, (_STILL * highest) ** 2)
+    limit = scheme.integrator.stability_limit
+    return FreeBody(
+        particles=simulation.particles.count,
+        rigid_modes=rigid,
+        zero_modes=still - rigid,
+        growth_rate=found.growth_rate * scheme.transit,
+        highest_frequency=highest * scheme.transit,
+        critical_step=limit / (highest + rate) / scheme.transit,
+    )
+
+
+def _free_rigid_motions(simulation: Simulation, least: float) -> int:
+    """How many translations and rotations meet less than the stiffness `least` [1/s^2]."""
+    X = simulation.particles.positions
+    dimension = X.shape[1]
+    motions = [np.tile(axis, (len(X), 1)) for axis in np.eye(dimension)]
+    for i, j in combinations(range(dimension), 2):
+        turn = np.zeros((dimension, dimension))
+        turn[i, j], turn[j, i] = -1.0, 1.0
+        motions.append(X @ turn.T / float(np.abs(X).max()))
+    step = _TINY * float(simulation.particles.spacings.min())
+    rest = np.zeros_like(X)
+    free = 0
+    for motion in motions:
+        there, back = (
+            simulation.dynamics.respond(0.0, X + way * step * motion, rest).accelerations
+            for way in (1.0, -1.0)
+        )
+        free += bool(np.abs(there - back).max() / (2.0 * step) < least)
+    return free

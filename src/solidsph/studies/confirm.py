@@ -1,0 +1,120 @@
+"""Runs that confirm a certificate: one wave in the middle of a block whose outer layers are held.
+
+What the outer layers do reaches the middle no faster than waves go, so as long as a run is short
+enough for its block the middle moves as on the endless lattice.
+"""
+
+from __future__ import annotations
+
+from math import ceil, log
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array
+from solidsph.errors import SolidsphError
+from solidsph.particles import State
+from solidsph.simulation import Simulation
+from solidsph.studies.certificate import Certificate, Wave
+from solidsph.studies.scheme import stretched
+
+# Deviations at the start, in spacings: a million times the rounding of positions, and as far from
+# where the answer is no longer linear.
+_START = 1e-9
+
+# Growth is watched over so many e-foldings.
+_FOLDINGS = 4.0
+
+# Steps at a part of the predicted critical one: two per cent above it, a wave grows by a factor of
+# 1.2 in each.
+_STEPS = 60
+
+# Layers of particles that move, on either side of the middle, where the step is tried.
+_MOVING = {1: 24, 2: 14, 3: 8}
+
+
+def measured_growth(certificate: Certificate) -> float:
+    """Rate at which the certificate's fastest growing wave grows in a run [1/transit].
+
+    Raises:
+        SolidsphError: no wave grows.
+    """
+    if not certificate.growing:
+        raise SolidsphError("no wave grows, so there is no growth to be run; take another stretch")
+    wave = certificate.growing[0]
+    duration = _FOLDINGS / wave.growth_rate  # [transits]
+    # No wave is faster than the material's, by as much as the stretch stiffens it: half as much.
+    layers = ceil(1.5 * duration * max(1.0, *certificate.stretches))
+    simulation, start = _block(certificate, layers)
+    # A hundred steps, or what is stable: the scheme's own error is then (0.04)^2 / 24 and less.
+    step = min(0.25 * certificate.critical_step, 0.01 * duration) * certificate.scheme.transit
+    state, first = _begun(certificate, simulation, start, wave, step)
+    for _ in range(ceil(duration * certificate.scheme.transit / step)):
+        state = simulation.integrator.advance(state, simulation.dynamics, step)
+    last = _amplitude(certificate, simulation, start, state, wave)
+    return log(last / first) / (state.time - start.time) * certificate.scheme.transit
+
+
+def amplification(certificate: Certificate, part: float) -> float:
+    """How many times its start the wave of the highest frequency becomes in a run of many steps, at
+    a part of the predicted critical step."""
+    wave = certificate.fastest
+    simulation, start = _block(certificate, _MOVING[certificate.dimension])
+    step = part * certificate.critical_step * certificate.scheme.transit
+    still = attrs.evolve(wave, growth_rate=0.0)
+    state, first = _begun(certificate, simulation, start, still, step)
+    largest = first
+    for _ in range(_STEPS):
+        state = simulation.integrator.advance(state, simulation.dynamics, step)
+        deviation = state.positions - start.positions
+        largest = max(largest, float(np.abs(deviation).max()) / certificate.scheme.spacing)
+        if largest > 1e-2:  # beyond, nothing is linear any more
+            break
+    return largest / first
+
+
+def _block(certificate: Certificate, moving: int) -> tuple[Simulation, State]:
+    """Layers that move, within layers that are held at the uniform stretch."""
+    scheme, stretches = certificate.scheme, certificate.stretches
+    held = scheme.depth(min(stretches))
+    axes = "XYZ"[: certificate.dimension]
+    edge = f"{(moving + 0.5) * scheme.spacing!r}"
+    outer = " or ".join(f"abs({axis}) > {edge}" for axis in axes)
+    uniform = {
+        axis.lower(): f"{stretch - 1.0!r}*{axis}"
+        for axis, stretch in zip(axes, stretches, strict=True)
+    }
+    hold = {"type": "prescribed-motion", "where": outer, "displacement": uniform}
+    layers = [moving + held] * certificate.dimension
+    simulation = scheme.simulation(certificate.dimension, layers, boundaries=[(hold, "held")])
+    return simulation, stretched(simulation, stretches)
+
+
+def _shape(certificate: Certificate, simulation: Simulation, wave: Wave) -> Array:
+    """The wave's displacement (n, d), of length 1 where it is largest."""
+    places = simulation.particles.positions / certificate.scheme.spacing
+    return np.cos(places @ wave.wave_vector)[:, None] * wave.polarisation
+
+
+def _begun(
+    certificate: Certificate, simulation: Simulation, start: State, wave: Wave, step: float
+) -> tuple[State, float]:
+    """The first state of a run in that wave, growing as predicted, and its amplitude [spacings]."""
+    deviation = _START * certificate.scheme.spacing * _shape(certificate, simulation, wave)
+    rate = wave.growth_rate / certificate.scheme.transit
+    begun = attrs.evolve(
+        start,
+        positions=simulation.dynamics.place(start.time, start.positions + deviation),
+        velocities=simulation.dynamics.carry(start.time, rate * deviation),
+    )
+    first = _amplitude(certificate, simulation, start, begun, wave)
+    return simulation.integrator.start(begun, simulation.dynamics, step), first
+
+
+def _amplitude(
+    certificate: Certificate, simulation: Simulation, start: State, state: State, wave: Wave
+) -> float:
+    """Of the wave in the deviation of the middle particle [spacings]."""
+    middle = int(np.argmin(np.linalg.norm(simulation.particles.positions, axis=1)))
+    deviation = (state.positions - start.positions)[middle] / certificate.scheme.spacing
+    return abs(float(deviation @ wave.polarisation))

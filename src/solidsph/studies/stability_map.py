@@ -1,0 +1,67 @@
+"""Growth and critical step of small deviations over stretch and cover, on an endless bar."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array, Mask
+from solidsph.errors import BuildError
+from solidsph.interfaces.formulation import Configuration
+from solidsph.studies.certificate import GROWS
+from solidsph.studies.dispersion import dispersion
+from solidsph.studies.scheme import Scheme, stretched
+
+
+@attrs.frozen(eq=False)
+class StabilityMap:
+    """The fastest modes of an endless bar at uniform stretch."""
+
+    stretches: Array  # (s,) [-]
+    covers: Array  # (c,) [spacings in the reference configuration]
+    rates: Array  # (c, s) growth of the fastest [e-foldings per wave transit of one spacing]
+    factors: Array  # (c, s) largest stable time step over the CFL step [-]
+    seen: Array  # (c, s) stretch that the sums make of the uniform one: a small cover misses it [-]
+    connected: Mask  # (c, s) whether a particle has a neighbour where the sums are taken
+
+    @property
+    def grows(self) -> Mask:
+        """Where it is unstable, (c, s)."""
+        grows: Mask = self.rates > GROWS
+        return grows
+
+
+def stability_map(
+    scheme: Scheme, stretches: Sequence[float], covers: Sequence[float]
+) -> StabilityMap:
+    """The map of a scheme, whose own cover does not count."""
+    shape = (len(covers), len(stretches))
+    rates, factors, seen = (np.full(shape, nan) for _ in range(3))
+    for row, cover in enumerate(covers):
+        wider = attrs.evolve(scheme, cover=cover)
+        simulation = wider.simulation(1, [wider.depth(min(1.0, *stretches))])
+        limit = scheme.integrator.stability_limit / simulation.step_size
+        for column, stretch in enumerate(stretches):
+            uniform = stretched(simulation, [stretch])
+            try:
+                found = dispersion(simulation.dynamics, uniform)
+                F = simulation.dynamics.observe(uniform).deformation_gradients
+            except BuildError:  # a gradient that cannot be formed without neighbours
+                continue
+            rates[row, column] = found.growth_rate * scheme.transit
+            factors[row, column] = limit / max(found.highest_frequency, 1e-300)
+            seen[row, column] = F[len(F) // 2, 0, 0]
+    # In the current configuration neighbours move out of the support that was cut at the start.
+    current = scheme.formulation.configuration is Configuration.CURRENT
+    spread = np.array(stretches) if current else np.ones(len(stretches))
+    return StabilityMap(
+        stretches=np.array(stretches),
+        covers=np.array(covers),
+        rates=rates,
+        factors=factors,
+        seen=seen,
+        connected=spread[None, :] < np.array(covers)[:, None],
+    )
