@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -16,6 +17,7 @@ from solidsph.results.record import Record
 from solidsph.scene import Scene
 from solidsph.studies.suite import Grade, energy_residual, judged, trials
 from solidsph.studies.suite_picture import draw_suite
+from tests.test_cli import solidsph
 
 ALL = list(trials())
 
@@ -107,6 +109,29 @@ def test_grades_and_their_reasons(tmp_path: Path) -> None:
     path = tmp_path / "suite.png"
     draw_suite([good, bad, refused], "made up", path)
     assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_command(tmp_path: Path) -> None:
+    listed = json.loads(solidsph("stability", "--list", "--json", cwd=tmp_path).stdout)["trials"]
+    assert [(row["case"], row["trial"]) for row in listed] == [one[:2] for one in ALL]
+    assert {row["expected"] for row in listed} >= {"stable", "fails"}
+    brief = solidsph("stability", "inside-out", "stretched-bar", "--brief", cwd=tmp_path)
+    assert brief.returncode == 0, brief.stdout
+    assert "as expected, those that must fail included" in brief.stdout
+    assert (tmp_path / "results/stability/suite.png").exists()
+    updated = ("--formulation", "updated-lagrangian", "--brief", "--json")
+    surprised = solidsph("stability", "stretched-bar", *updated, cwd=tmp_path)
+    assert surprised.returncode == 1
+    verdict = json.loads(surprised.stdout)["trials"][0]
+    assert (verdict["grade"], verdict["as expected"]) == ("degraded", False)
+    for wrong, message in (
+        (("csm1",), "no hard settings"),
+        (("stretched-bar", "--map"), "a map is of a scheme"),
+        (("--material", "linear-elastic"), "materials and effects of their own"),
+    ):
+        done = solidsph("stability", *wrong, cwd=tmp_path)
+        assert done.returncode == 2
+        assert message in done.stderr
 
 
 def test_only_cases_with_trials_are_in_the_suite() -> None:

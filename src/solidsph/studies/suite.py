@@ -89,7 +89,7 @@ def judged(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # hard cases are what warnings are for
-            wanted = varied(case, settings)
+            wanted = varied(case, _understood(case, settings))
             runs = run_scenes(wanted, folder)
         conservative = {name for name, scene in wanted.scenes().items() if _has_energy(scene)}
         with opened(runs) as records:
@@ -97,7 +97,7 @@ def judged(
             residual = max((one for one in residuals if isfinite(one)), default=residual)
             grade, reason = _graded(runs, wanted.measure(records), residual)
     except SolidsphError as cause:
-        grade, reason = Grade.FAILED, str(cause)
+        grade, reason = Grade.FAILED, " ".join(str(cause).split())
     return Verdict(
         case=name,
         trial=label,
@@ -108,6 +108,14 @@ def judged(
         must_fail=trial.must_fail,
         known=trial.known,
     )
+
+
+def _understood(case: Case, settings: Mapping[str, Any]) -> Mapping[str, Any]:
+    """`settings` as the case takes them: one without a strength of its own has an effect for it."""
+    if "hourglass" not in settings or hasattr(case, "hourglass"):
+        return settings
+    rest = {name: value for name, value in settings.items() if name != "hourglass"}
+    return {**rest, "hourglass-control.strength": settings["hourglass"]}
 
 
 def _graded(
