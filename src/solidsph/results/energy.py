@@ -8,6 +8,9 @@ import numpy as np
 
 from solidsph.interfaces.condition import Observation
 
+KINETIC, STRAIN, RESIDUAL = "kinetic energy [J]", "strain energy [J]", "energy residual [J]"
+"""Columns of every record."""
+
 
 def kinetic_energy(observation: Observation) -> float:
     """Sum of m v^2 / 2 [J, per unit of the missing dimensions]."""
@@ -27,8 +30,8 @@ def ledger(observation: Observation, initial: float) -> Mapping[str, float]:
     kinetic, strain = kinetic_energy(observation), strain_energy(observation)
     work = observation.state.work
     return {
-        "kinetic energy [J]": kinetic,
-        "strain energy [J]": strain,
+        KINETIC: kinetic,
+        STRAIN: strain,
         **{f"work of {name} [J]": value for name, value in work.items()},
-        "energy residual [J]": kinetic + strain - initial - sum(work.values()),
+        RESIDUAL: kinetic + strain - initial - sum(work.values()),
     }
