@@ -13,7 +13,7 @@ from solidsph.interfaces.condition import Observation
 from solidsph.particles import State
 from solidsph.results.checkpoint import Checkpoint, write_checkpoint
 from solidsph.results.circumstances import circumstances
-from solidsph.results.recorder import scene_text
+from solidsph.results.recorder import remove, scene_text
 
 if TYPE_CHECKING:
     from solidsph.arrays import Array
@@ -38,6 +38,7 @@ class Checkpointer:
         self._is_resumed = is_resumed
         self._state: State | None = None
         self._kept: Mapping[str, Array] = {}
+        self._found: Mapping[str, str] = {}  # the circumstances, once they have been asked for
         self._is_written = False
         self._last = clock.perf_counter()
         self._cost: float | None = None  # of the last one [s]
@@ -46,7 +47,7 @@ class Checkpointer:
     def solidsph_setup(self, simulation: Simulation) -> None:
         if not self._is_resumed:
             # Of an older run, which this one takes the place of.
-            self._path.unlink(missing_ok=True)
+            remove(self._path)
 
     @implementation(trylast=True)
     def solidsph_resume(
@@ -90,13 +91,14 @@ class Checkpointer:
         if self._state is None or simulation.scene.statics is not None:
             return  # load steps depend on those before; an equilibrium is found anew
         begun = clock.perf_counter()
+        self._found = self._found or circumstances(simulation)
         checkpoint = Checkpoint(
             state=self._state,
             scene=scene_text(simulation),
             step_size=simulation.step_size,
             steps=simulation.steps,
             halvings=simulation.halvings,
-            circumstances=circumstances(simulation),
+            circumstances=self._found,
             kept=self._kept,
         )
         write_checkpoint(self._path, checkpoint)

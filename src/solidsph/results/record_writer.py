@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import platform
 import shutil
@@ -40,6 +41,7 @@ _VERTEX = 1  # VTK's number for a cell of one point
 _PAGE = 4096  # bytes; a chunk holds at least about as much
 _LARGEST_CHUNK = 2**30  # bytes; HDF5 allows just under 4 GiB
 _SPARE = 2**18  # bytes; that much must be free beyond a step's arrays, for HDF5's indices
+_AT_ONCE = 2**24  # bytes; room is tried for by so much
 _ABANDONED: list[Any] = []  # kept from being closed
 # HDF5 1.10 is the first that can be read while it is written; newer formats open in fewer tools.
 _FILE_FORMAT = ("v110", "v110")
@@ -105,6 +107,7 @@ class RecordWriter:
         self._history = np.dtype([(name, np.float64) for name in columns])
         self._count = 0
         self._last_time = -np.inf
+        self._assured = 0  # bytes by which the file can grow, as far as is known
         _check_fields(fields, particles)
         draft = self.path.with_name(f"{self.path.name}.{os.getpid()}.partial")
         remedy = "choose a path in a folder that you may write to"
@@ -112,6 +115,7 @@ class RecordWriter:
             with _explained(f"cannot create the record {self.path}", remedy):
                 _check_free(self.path, overwrite)
                 self.path.parent.mkdir(parents=True, exist_ok=True)
+                _try_room(draft, _reference_bytes(particles) + len(scene.encode()) + _SPARE)
                 with h5py.File(draft, "w", libver=_FILE_FORMAT, locking=False) as file:
                     _write_grid(file, particles, fields)
                     _write_run(file, particles, scene, plugins, fields, columns, versions, notes)
@@ -203,6 +207,7 @@ class RecordWriter:
         with _explained(problem, remedy):
             if shutil.disk_usage(self.path.parent).free < needed:
                 raise OSError("the disk is full")
+            self._assure(needed)
         with uninterrupted(), _explained(problem, remedy), self._abandoned_on_failure():
             for name, values in rows.items():
                 self._extend(name, count * particles.count, particles.count, values)
@@ -249,6 +254,19 @@ class RecordWriter:
         with suppress(RecordError):  # the error that stopped the run is the one to be told
             self.close(outcome)
 
+    def _assure(self, needed: int) -> None:
+        """That the file can grow by so much; tried for many steps at once, since it takes time."""
+        self._assured -= needed
+        if self._assured >= 0:
+            return
+        path = Path(self._file.filename)
+        try:
+            _try_room(path, max(needed, _AT_ONCE))
+            self._assured = max(needed, _AT_ONCE) - needed
+        except OSError:
+            _try_room(path, needed)
+            self._assured = 0
+
     def _end_with(self, outcome: str) -> None:
         text = outcome.encode(errors="replace")[:OUTCOME_BYTES]
         self._file["solidsph/outcome"][()] = text
@@ -265,7 +283,7 @@ class RecordWriter:
         except HDF5_ERRORS:
             with suppress(*HDF5_ERRORS):
                 self._end_with("stopped: a step could not be written")
-            _ABANDONED.append(self._file)
+            _ABANDONED.append((self._file, self._datasets, self._announced))
             self._file = None
             raise
 
@@ -297,6 +315,36 @@ def _explained(problem: str, remedy: str) -> Iterator[None]:
         yield
     except HDF5_ERRORS as error:
         raise RecordError(f"{problem}: {reason(error)}; {remedy}") from None
+
+
+def _try_room(path: Path, size: int) -> None:
+    """That a file can grow by so much, found out without HDF5, which a failed write would hurt.
+
+    Raises:
+        OSError: the device is full, or a quota or a limit does not allow it.
+    """
+    if not hasattr(os, "posix_fallocate"):
+        return
+    with path.open("ab") as file:
+        end = os.fstat(file.fileno()).st_size
+        try:
+            os.posix_fallocate(file.fileno(), end, size)
+        except OSError as error:
+            if error.errno in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+                raise
+        finally:
+            os.ftruncate(file.fileno(), end)
+
+
+def _reference_bytes(particles: Particles) -> int:
+    """What the particles take in a file, before any step."""
+    cells, tags, vector = 17, len(particles.tags), 24
+    each = cells + tags + 3 * vector + 3 * 8 + 5
+    faces = sum(
+        face.particles.nbytes + face.area_vectors.nbytes + face.areas.nbytes
+        for face in particles.faces.values()
+    )
+    return each * particles.count + faces
 
 
 def _check_free(path: Path, overwrite: bool) -> None:

@@ -43,7 +43,7 @@ class Recorder:
     def solidsph_setup(self, simulation: Simulation) -> None:
         # A run that fails before its first output must not seem to have left an older record.
         if self._since is None:
-            self._path.unlink(missing_ok=True)
+            remove(self._path)
 
     @implementation
     def solidsph_resume(
@@ -180,6 +180,21 @@ def _parted(name: str) -> tuple[str, str]:
     """Quantity and unit of "quantity [unit]"."""
     quantity, _, unit = name.rpartition(" [")
     return quantity, unit.rstrip("]")
+
+
+def remove(path: Path) -> None:
+    """Remove what an older run left at `path`, if it left anything.
+
+    Raises:
+        RecordError: there can be no file of that name, or it may not be removed.
+    """
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as cause:
+        raise RecordError(
+            f"cannot create {path}: {cause.strerror or cause}; choose a path in a folder that you "
+            "may write to"
+        ) from None
 
 
 def scene_text(simulation: Simulation) -> str:

@@ -78,12 +78,12 @@ def pending(
         checkpoint = _checkpoint(record)
         if record.outcome == FINISHED and until is None:
             return None
-        own = _as_before(simulation or _built(record), checkpoint)
-        if scene_text(own) != record.scene:
+        if simulation is not None and scene_text(simulation) != record.scene:
             raise RecordError(
                 f"the record {path} is of another scene than the one given; give the same, or "
                 "record into another file"
             )
+        own = _as_before(simulation or _built(record), checkpoint)
         if not force:
             _check_circumstances(record, checkpoint, own)
         notes = list(record.notes)
