@@ -149,20 +149,21 @@ class Simulation:
 
     def output_steps(self) -> tuple[int, ...]:
         """Steps after which the state is observed, evenly spread, the last one among them."""
-        asked = min(self.steps, round(self.scene.duration / self.step_size))
+        # In steps of the scene's own size, so that halving them changes no time.
+        size = 2**self.halvings
+        asked, steps = round(self.scene.duration / self.step_size) // size, self.steps / size
         count = min(self.scene.outputs, asked)
         marks = np.linspace(0, asked, count + 1)[1:]
-        if self.steps > asked:  # extended
+        if steps > asked:  # extended
             apart = asked / count
-            further = np.arange(count + 1, ceil(self.steps / apart)) * apart
-            marks = np.concatenate([marks, further, [self.steps]])
-        return tuple(int(step) for step in np.unique(np.rint(marks)))
+            further = np.arange(count + 1, ceil(steps / apart)) * apart
+            marks = np.concatenate([marks, further])
+        whole = np.append(size * np.rint(marks).astype(np.int64), self.steps)
+        return tuple(int(step) for step in np.unique(whole) if step <= self.steps)
 
     def _observe(self, state: State) -> Observation:
         observation = self.dynamics.observe(state)
-        with np.errstate(all="ignore"):
-            J = np.linalg.det(observation.deformation_gradients)
-        turned = ~(J > 0.0) & ~self.particles.ghosts
+        turned = ~(observation.volume_ratios > 0.0) & ~self.particles.ghosts
         if turned.any():
             raise self._diverged(state, "the volume has vanished or turned inside out")
         return observation

@@ -145,7 +145,7 @@ class Recorder:
             )
 
     def _history(self, simulation: Simulation, observation: Observation) -> dict[str, float]:
-        columns = dict(ledger(observation, self._initial_energy))
+        columns = dict(ledger(observation, self._initial_energy, simulation.conditions))
         for condition in simulation.conditions:
             columns |= condition.report(observation)
         return columns
@@ -208,7 +208,7 @@ def scene_text(simulation: Simulation) -> str:
 
 def _fields(observation: Observation) -> dict[str, Array]:
     F, P = observation.deformation_gradients, observation.stresses
-    J = np.linalg.det(F)
+    J = observation.volume_ratios
     sigma = np.einsum("pik,pjk->pij", P, F) / J[:, None, None]
     return {
         "velocity": observation.state.velocities,
