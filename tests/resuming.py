@@ -124,8 +124,8 @@ def main(folder: Path, count: int, seed: int) -> None:
 
         act, had = begin, 0
         # The last one is left alone: without checkpoints a run might else never get to its end.
-        left = chance.randint(1, 5)
-        while not _in_a_process(act, chance.uniform(0.0, 1.2 * took) if left else 300.0):
+        left = chance.randint(1, 4)
+        while not _in_a_process(act, chance.uniform(0.0, took) if left else 300.0):
             kills += 1
             left -= 1
             if path.exists():

@@ -761,6 +761,14 @@ def test_a_newer_format_is_refused(tmp_path: Path) -> None:
     assert_refused(path, f"format {FORMAT + 1}.*up to {FORMAT}.*update")
 
 
+def test_an_older_format_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run"
+    written(path, 3, 2, 1)
+    with h5py.File(path, "r+") as file:
+        file["solidsph"].attrs["format"] = FORMAT - 1
+    assert_refused(path, f"older format {FORMAT - 1}.*reads {FORMAT}; run its scene again")
+
+
 def test_a_truncated_record_is_refused(tmp_path: Path) -> None:
     path, cut = tmp_path / "run", tmp_path / "cut"
     written(path, 50, 2, 20)

@@ -40,6 +40,14 @@ class Observation:
         found: Array = self.made["J"]
         return found
 
+    @property
+    def squared_speeds(self) -> Array:
+        """v^2 of every particle, (n,) [m^2/s^2]."""
+        if "v^2" not in self.made:
+            self.made["v^2"] = np.sum(self.state.velocities**2, axis=1)
+        found: Array = self.made["v^2"]
+        return found
+
 
 class Condition(ABC):
     """Something imposed on some of the particles."""

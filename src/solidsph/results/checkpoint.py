@@ -104,6 +104,12 @@ def read_checkpoint(path: Path) -> Checkpoint:
             f"the checkpoint {path} has format {words[0][:9]}, this solidsph reads up to {FORMAT}; "
             "update solidsph"
         )
+    if int(words[0]) < FORMAT:
+        raise RecordError(
+            f"the checkpoint {path} has the older format {words[0]}, this solidsph reads {FORMAT}; "
+            "delete it and resume again: the run is then carried out from its first state, and "
+            "what is recorded stays"
+        )
     body = data[len(head) + 1 :]
     damaged = (
         f"the checkpoint {path} is damaged; delete it and resume again: the run is then carried "

@@ -141,6 +141,11 @@ class Record:
                 f"the record {self.path} has format {written}, this solidsph reads up to {FORMAT}; "
                 "update solidsph"
             )
+        if written < FORMAT:  # none was ever given out, so there is nothing to translate from
+            raise RecordError(
+                f"the record {self.path} has the older format {written}, this solidsph reads "
+                f"{FORMAT}; run its scene again"
+            )
         grid = self._file["VTKHDF"]
         announced = int(grid["Steps"].attrs["NSteps"])  # first, since the run goes on meanwhile
         self.dimension = int(run.attrs["dimension"])

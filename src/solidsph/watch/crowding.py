@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Indices
+from solidsph.arrays import Array, Indices
 from solidsph.body import Body
 from solidsph.interfaces.condition import Observation
 from solidsph.watch.accounts import Accounts
@@ -34,12 +34,12 @@ class CollapsingNeighbours(Symptom):
     ) -> Finding | None:
         found, part = 0, np.inf
         for body in simulation.setting.bodies:
-            a, b = _nearest(body)
+            a, b, first = _nearest(body)
             if not len(a):
                 continue
-            x, X = observation.state.positions[body.extent], body.particles.positions
             with np.errstate(all="ignore"):
-                squares = _squares(x, a, b) / _squares(X, a, b)
+                squares = _squares(observation.state.positions[body.extent], a, b)
+                squares *= first
             closest = int(np.argmin(squares))  # the first that is no number, if there is one
             ratio = float(np.sqrt(squares[closest]))
             if not ratio >= part:
@@ -56,24 +56,32 @@ class CollapsingNeighbours(Symptom):
         )
 
 
-def _squares(positions: np.ndarray, a: Indices, b: Indices) -> np.ndarray:
-    # Axis by axis: rows of two or three numbers are slow to sum.
+def _squares(positions: Array, a: Indices, b: Indices) -> Array:
+    # Axis by axis: rows of two or three numbers are slow to gather and to sum.
     total = np.zeros(len(a))
     for axis in range(positions.shape[1]):
-        along = positions[:, axis]
-        total += (along[b] - along[a]) ** 2
+        along = np.ascontiguousarray(positions[:, axis])
+        apart = along.take(b)
+        apart -= along.take(a)
+        apart *= apart
+        total += apart
     return total
 
 
-def _nearest(body: Body) -> tuple[Indices, Indices]:
-    """Pairs of nearest neighbours, each once; found when they are asked for first."""
+def _nearest(body: Body) -> tuple[Indices, Indices, Array]:
+    """Pairs of nearest neighbours, each once, and one over the square of their distance [m^-2].
+
+    Found when they are asked for first.
+    """
     if CollapsingNeighbours not in body.made:
         particles = body.particles
         pairs = cKDTree(particles.positions).query_pairs(
             _NEAR * float(particles.spacings.max()), output_type="ndarray"
         )
         pairs = pairs[~particles.ghosts[pairs].any(axis=1)]
-        order = np.lexsort((pairs[:, 1], pairs[:, 0]))
-        body.made[CollapsingNeighbours] = tuple(np.ascontiguousarray(pairs[order].T))
-    found: tuple[Indices, Indices] = body.made[CollapsingNeighbours]
+        a, b = (
+            np.ascontiguousarray(one) for one in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].T
+        )
+        body.made[CollapsingNeighbours] = (a, b, 1.0 / _squares(particles.positions, a, b))
+    found: tuple[Indices, Indices, Array] = body.made[CollapsingNeighbours]
     return found

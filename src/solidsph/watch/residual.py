@@ -37,8 +37,7 @@ class EnergyFromNowhere(Symptom):
         grade = graded(part, self.warning, self.failure)
         if grade is None:
             return None
-        speeds = np.sum(observation.state.velocities**2, axis=1)
-        own = 0.5 * observation.masses * speeds
+        own = 0.5 * observation.masses * observation.squared_speeds
         own += observation.particles.volumes * observation.energy_densities
         own[observation.particles.ghosts] = 0.0
         return Finding(

@@ -25,6 +25,8 @@ class VanishingVolume(Symptom):
     def look(
         self, simulation: Simulation, observation: Observation, accounts: Accounts
     ) -> Finding | None:
+        if observation.volume_ratios.min() >= self.warning:  # which no NaN is; of ghosts J = 1
+            return None
         J = np.where(observation.particles.ghosts, 1.0, observation.volume_ratios)
         worst = int(np.argmin(np.where(np.isfinite(J), J, -np.inf)))
         if J[worst] >= self.warning:
