@@ -113,18 +113,18 @@ def test_neighbours(left: float, grade: Grade | None) -> None:
 
 
 @pytest.mark.parametrize(
-    ("residuals", "grade"),
+    ("before", "residual", "grade"),
     [
-        ([0.0, 0.05], None),
-        ([0.0, 0.2], Grade.WARNING),
-        ([0.0, -0.2], Grade.WARNING),
-        ([0.0, 0.3, 0.2], None),  # it shrinks again
-        ([0.0, 1.5], Grade.FAILURE),
-        ([0.0, np.nan], Grade.FAILURE),
+        (0.0, 0.05, None),
+        (0.0, 0.2, Grade.WARNING),
+        (0.0, -0.2, Grade.WARNING),
+        (0.3, 0.2, None),  # it shrinks again
+        (0.0, 1.5, Grade.FAILURE),
+        (0.0, np.nan, Grade.FAILURE),
     ],
 )
-def test_energy(residuals: list[float], grade: Grade | None) -> None:
-    accounts = Accounts([1.0] * len(residuals), residuals, [1.0] * len(residuals))
+def test_energy(before: float, residual: float, grade: Grade | None) -> None:
+    accounts = Accounts(start=1.0, residual=residual, before=before, paid=1.0)
     finding = found(EnergyFromNowhere(), box(1), accounts=accounts)
     assert (finding and finding.grade) == grade
 
@@ -318,7 +318,7 @@ def test_what_it_knows_survives_an_interruption(
     whole.solidsph_keep(simulation, kept[0])
     second.solidsph_keep(simulation, kept[1])
     assert np.array_equal(kept[0]["watchdog accounts"], kept[1]["watchdog accounts"])
-    assert kept[0]["watchdog accounts"].shape == (3, 7)
+    assert np.all(kept[0]["watchdog accounts"] != 0.0)
 
 
 def test_a_growing_residual_stops_a_run(tmp_path: Path) -> None:

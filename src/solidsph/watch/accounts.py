@@ -1,4 +1,4 @@
-"""Accounts: energies of a run from output to output, as far as watching needs them."""
+"""Accounts: energies of a run up to an output, as far as watching needs them."""
 
 from __future__ import annotations
 
@@ -10,25 +10,27 @@ from solidsph.interfaces.condition import Observation
 from solidsph.results.energy import kinetic_energy, strain_energy
 
 
-@attrs.define(eq=False)
+@attrs.define
 class Accounts:
-    """What there was of energy at each output so far."""
+    """What there is of energy; `add` enters one more output."""
 
-    energies: list[float] = attrs.field(factory=list)  # kinetic and strain [J]
-    residuals: list[float] = attrs.field(factory=list)  # that no account explains [J]
-    paid: list[float] = attrs.field(factory=list)  # at the start, and by or to accounts [J]
+    start: float = np.nan  # kinetic and strain energy at the first output [J]
+    residual: float = 0.0  # at the last output: what no account explains [J]
+    before: float = 0.0  # the same at the output before [J]
+    paid: float = 0.0  # the most so far of the start and the work of all accounts, by amount [J]
 
     def add(self, observation: Observation) -> None:
         """Enter one more output."""
         energy = kinetic_energy(observation) + strain_energy(observation)
         work = observation.state.work.values()
-        self.energies.append(energy)
-        self.residuals.append(energy - self.energies[0] - sum(work))
-        self.paid.append(self.energies[0] + sum(abs(one) for one in work))
+        if np.isnan(self.start):
+            self.start = energy
+        self.before, self.residual = self.residual, energy - self.start - sum(work)
+        self.paid = max(self.paid, self.start + sum(abs(one) for one in work))
 
     def kept(self) -> Array:
         """As one array."""
-        return np.array([self.energies, self.residuals, self.paid])
+        return np.array(attrs.astuple(self))
 
     @classmethod
     def taken(cls, kept: Array) -> Accounts:

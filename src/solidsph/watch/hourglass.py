@@ -35,7 +35,7 @@ class StoredBesides(Symptom):
             energies = condition.energies(observation)
             own = float(energies.sum())
             # Energies of both that are small beside all that there is are of no consequence.
-            share = own / (own + strain + 1e-3 * accounts.paid[-1] + rounding(simulation))
+            share = own / (own + strain + 1e-3 * accounts.paid + rounding(simulation))
             grade = graded(share, self.warning, self.failure)
             if grade is not None:
                 return Finding(

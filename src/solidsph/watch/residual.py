@@ -30,10 +30,10 @@ class EnergyFromNowhere(Symptom):
     def look(
         self, simulation: Simulation, observation: Observation, accounts: Accounts
     ) -> Finding | None:
-        residual = abs(accounts.residuals[-1])
-        if len(accounts.residuals) > 1 and residual <= abs(accounts.residuals[-2]):
+        residual = abs(accounts.residual)
+        if residual <= abs(accounts.before):
             return None
-        part = residual / (max(accounts.paid) + rounding(simulation))
+        part = residual / (accounts.paid + rounding(simulation))
         grade = graded(part, self.warning, self.failure)
         if grade is None:
             return None
