@@ -501,10 +501,12 @@ import resource, signal, sys
 sys.path.insert(0, {folder!r})
 from pathlib import Path
 from solidsph.errors import RecordError
+from solidsph.results import record_writer
 from test_record import append, opened, some_particles, some_step
 path = Path({path!r})
 particles = some_particles(500, 3)
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+record_writer._try_room = lambda path, size: None  # as if the device failed all of a sudden
 with opened(path, particles) as writer:
     for number in range(9):
         if number == 2:  # no file may grow beyond this, which HDF5 learns when it writes
@@ -757,6 +759,14 @@ def test_a_newer_format_is_refused(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["solidsph"].attrs["format"] = FORMAT + 1
     assert_refused(path, f"format {FORMAT + 1}.*up to {FORMAT}.*update")
+
+
+def test_an_older_format_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run"
+    written(path, 3, 2, 1)
+    with h5py.File(path, "r+") as file:
+        file["solidsph"].attrs["format"] = FORMAT - 1
+    assert_refused(path, f"older format {FORMAT - 1}.*reads {FORMAT}; run its scene again")
 
 
 def test_a_truncated_record_is_refused(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from solidsph import DivergedError, Record, Scene, SceneError, Simulation
+from solidsph.builder import Builder
 from solidsph.hooks import implementation
 from solidsph.results.energy import kinetic_energy, strain_energy
 from tests.scenes import SCENE_TOML, SOFT, box
@@ -97,6 +98,61 @@ def test_energy_accounts_close_with_the_square_of_the_step(tmp_path: Path) -> No
     assert fine < 2e-3
     # Four, up to the next order of the step.
     assert coarse / fine == pytest.approx(4.0, rel=0.1)
+
+
+def test_what_a_penalty_stores_is_what_its_account_has_taken(tmp_path: Path) -> None:
+    """Its force is linear in the displacements, so the trapezoidal rule is exact for its work."""
+    simulation = (
+        box(2)
+        .effect("hourglass-control")
+        .boundary("clamp", where="left")
+        .initial(displacement={"x": "0.02*sin(9*Y)"}, velocity={"x": "3*sin(2*X)"})
+        .duration(0.02)
+        .outputs(20)
+        .build()
+    )
+    simulation.run(record=tmp_path / "run.h5")
+    with Record(tmp_path / "run.h5") as record:
+        stored = record.history["hourglass-control energy [J]"]
+        work = record.history["work of hourglass-control [J]"]
+        assert np.ptp(stored) > 0.1 * stored.max() > 0.0
+        # Rounding of some hundred steps.
+        np.testing.assert_allclose(stored + work, stored[0], rtol=1e-11)
+
+
+def test_energies_of_every_body_add_up(tmp_path: Path) -> None:
+    """Two bodies that do not touch: each keeps the energy that it has, in its own column."""
+
+    def body(builder: Builder, name: str, at: float) -> Builder:
+        shape = {"type": "box", "lengths": [1.0, 1.0], "origin": [at, 0.0]}
+        return builder.body(name, shape=shape, spacing=1 / 6)
+
+    simulation = (
+        body(body(Simulation.builder(), "quick", 0.0), "slow", 3.0)
+        .kernel("modified-mollifier", cover=3.0)
+        .material("neo-hookean", **SOFT)
+        .effect("hourglass-control")
+        .initial(where="quick", velocity={"x": "sin(pi*X)"})
+        .initial(where="slow", velocity={"x": "0.3*sin(pi*(X - 3))"})
+        .duration(0.02)
+        .outputs(10)
+        .integrator("velocity-verlet", time_step_factor=0.2)
+        .build()
+    )
+    simulation.run(record=tmp_path / "run.h5")
+    with Record(tmp_path / "run.h5") as record:
+        history = record.history
+        for kind in ("kinetic", "strain", "hourglass-control"):
+            parts = [history[f"{kind} energy of {name} [J]"] for name in ("quick", "slow")]
+            np.testing.assert_allclose(sum(parts), history[f"{kind} energy [J]"], rtol=1e-12)
+            assert max(parts[0]) > max(parts[1]) > 0.0
+        for name in ("quick", "slow"):
+            own = sum(
+                history[f"{kind} energy of {name} [J]"]
+                for kind in ("kinetic", "strain", "hourglass-control")
+            )
+            # Nothing acts on either; the scheme's energy wavers by (w dt)^2 / 8, some 1e-3.
+            np.testing.assert_allclose(own, own[0], rtol=3e-3)
 
 
 def test_mass_damping_decays_as_the_closed_form_says() -> None:

@@ -23,6 +23,7 @@ from solidsph.interfaces.material import Material
 from solidsph.interfaces.shape import Shape
 from solidsph.particles import Particles, State
 from solidsph.results.record import Record
+from solidsph.results.resume import resume
 from solidsph.scene import Scene
 from solidsph.simulation import Result, Simulation
 
@@ -53,4 +54,5 @@ __all__ = [
     "SolidsphError",
     "State",
     "carry_out",
+    "resume",
 ]

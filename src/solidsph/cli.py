@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 import os
+import signal
 import sys
+import threading
 from importlib import import_module
 from importlib.metadata import version
 
@@ -12,7 +14,10 @@ import click
 
 from solidsph.errors import ConvergenceError, DivergedError, SolidsphError
 
-VERBS = ("run", "explain", "cases", "plugins", "check", "plot", "reproduce", "cost", "stability")
+VERBS = (
+    *("run", "resume", "explain", "cases", "plugins", "check", "plot"),
+    *("reproduce", "cost", "stability"),
+)
 
 TRACEBACK = "SOLIDSPH_TRACEBACK"
 """Environment variable: if 1, an unexpected error shows its traceback."""
@@ -47,13 +52,19 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that cannot show a sign shows another
+    if threading.current_thread() is threading.main_thread():
+        # Whoever asks the process to end is heard like somebody at the keyboard.
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         code = cli.main(prog_name="solidsph", standalone_mode=False)
     except click.ClickException as cause:
         cause.show()
         sys.exit(WRONG_INPUT)
     except (click.Abort, KeyboardInterrupt):
-        print("interrupted; what was recorded so far can be read", file=sys.stderr)
+        print(
+            "interrupted; what was recorded so far can be read, and gone on with: solidsph resume",
+            file=sys.stderr,
+        )
         sys.exit(INTERRUPTED)
     except SolidsphError as cause:
         print(f"error: {cause}", file=sys.stderr)

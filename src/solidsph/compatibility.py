@@ -26,6 +26,9 @@ from solidsph.where import AXES, EVERYWHERE
 # Deeper than this inside another body, in spacings, a particle is not merely touching it.
 _TOUCHING = 1e-6
 
+# No kernel is of use so wide, and its pairs would fill any memory.
+MOST_COVER = 50.0
+
 
 def numbers(scene: Scene) -> Iterator[str]:
     """Durations, factors and counts."""
@@ -37,6 +40,11 @@ def numbers(scene: Scene) -> Iterator[str]:
     ):
         if value is not None and not (isfinite(value) and value > 0.0):
             yield f"{name} must be positive and finite, got {value}; give it in {unit}"
+    if isfinite(scene.cover) and scene.cover > MOST_COVER:
+        yield (
+            f"cover must not exceed {MOST_COVER:g}, got {scene.cover:.6g}; it is in particle "
+            "spacings, and 3 is usual"
+        )
     if scene.time_step_factor > 1.0:
         yield f"time_step_factor must not exceed 1, got {scene.time_step_factor}; 0.5 is usual"
     if scene.outputs < 1:

@@ -35,18 +35,34 @@ class BuildError(SolidsphError):
 
 
 class DivergedError(SolidsphError):
-    """A run went wrong: where, when, and the local volume ratio there."""
+    """A run went wrong: where, when, and the local volume ratio there.
 
-    def __init__(self, *, step: int, time: float, particle: int, volume_ratio: float, cause: str):
+    Listeners of `solidsph_failure` may say more of cause and remedy.
+    """
+
+    def __init__(
+        self,
+        *,
+        step: int,
+        time: float,
+        particle: int,
+        volume_ratio: float,
+        cause: str,
+        remedy: str = "a smaller time_step_factor, a smoother load, or the total Lagrangian form",
+    ):
         self.step = step
         self.time = time
         self.particle = particle
         self.volume_ratio = volume_ratio
         self.cause = cause
-        super().__init__(
-            f"the run diverged at step {step}, t = {time:.6g} s: {cause} at particle {particle}, "
-            f"where J = {volume_ratio:.6g}; the record holds everything up to there. Try a smaller "
-            "time_step_factor, a smoother load, or the total Lagrangian form"
+        self.remedy = remedy
+        super().__init__()
+
+    def __str__(self) -> str:
+        return (
+            f"the run diverged at step {self.step}, t = {self.time:.6g} s: {self.cause} at "
+            f"particle {self.particle}, where J = {self.volume_ratio:.6g}; the record holds "
+            f"everything up to there. Try {self.remedy}"
         )
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -57,14 +73,20 @@ class DivergedError(SolidsphError):
             self.particle,
             self.volume_ratio,
             self.cause,
+            self.remedy,
         )
 
 
 def _rebuild_diverged(
-    step: int, time: float, particle: int, volume_ratio: float, cause: str
+    step: int, time: float, particle: int, volume_ratio: float, cause: str, remedy: str
 ) -> DivergedError:
     return DivergedError(
-        step=step, time=time, particle=particle, volume_ratio=volume_ratio, cause=cause
+        step=step,
+        time=time,
+        particle=particle,
+        volume_ratio=volume_ratio,
+        cause=cause,
+        remedy=remedy,
     )
 
 

@@ -16,8 +16,13 @@ from solidsph.errors import PluginError
 from solidsph.registry import hook_points
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from solidsph.arrays import Array
     from solidsph.builder import Builder
+    from solidsph.errors import DivergedError
     from solidsph.interfaces.condition import Observation
+    from solidsph.particles import State
     from solidsph.simulation import Simulation
 
 STRICT = "SOLIDSPH_STRICT_PLUGINS"
@@ -39,8 +44,27 @@ class Moments:
         """Before the first step of a run."""
 
     @specification
+    def solidsph_resume(
+        self, simulation: Simulation, observation: Observation, kept: Mapping[str, Array]
+    ) -> None:
+        """Before the first step of a run that goes on from an output of an earlier one.
+
+        `kept` holds what listeners put there by `solidsph_keep` at that output.
+        """
+
+    @specification
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
         """At every output, the first state included. Read only."""
+
+    @specification
+    def solidsph_keep(self, simulation: Simulation, kept: dict[str, Array]) -> None:
+        """After an output of a recorded run: put into `kept`, under names that begin with your
+        own, arrays of numbers that you need to go on from there. State that evolves with the
+        motion belongs into `State.memory` instead."""
+
+    @specification
+    def solidsph_failure(self, simulation: Simulation, state: State, error: DivergedError) -> None:
+        """When the motion went wrong: `state` is the last one. `error` may be told more."""
 
     @specification
     def solidsph_finish(self, simulation: Simulation, outcome: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache
+from math import isfinite
 from typing import TypeAlias
 
 import attrs
@@ -160,6 +161,13 @@ def _checked(value: Component, what: str) -> Component:
         raise SceneError(f"{what}: expected a number or a formula, got {value!r}")
     if isinstance(value, str):
         Expression.parse(value, [*AXES, "t"])
-    elif isinstance(value, (int, float)) and not np.isfinite(value):
+    elif isinstance(value, (int, float)) and not _is_finite(value):
         raise SceneError(f"{what}: expected a finite number, got {value!r}")
     return value
+
+
+def _is_finite(value: float) -> bool:
+    try:
+        return isfinite(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        return False

@@ -10,6 +10,9 @@ from solidsph.errors import BuildError, PluginError, SolidsphError
 T = TypeVar("T")
 
 
+_MEMORY = "there is not enough memory for so many particles or pairs; use a larger spacing"
+
+
 class Problems:
     """Collects problems, each with its remedy, until it makes no sense to look further."""
 
@@ -28,6 +31,8 @@ class Problems:
             self.add(cause.problems)
         except SolidsphError as cause:
             self.add([str(cause)])
+        except MemoryError:
+            self.add([_MEMORY])
         except Warning:  # where the user has asked for warnings to be errors
             raise
         except Exception as cause:  # a plugin's code may fail in any way

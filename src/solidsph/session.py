@@ -8,14 +8,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from solidsph.errors import DivergedError
+from solidsph.resumption import Resumption
 
 if TYPE_CHECKING:
     from solidsph.simulation import Simulation
 
+FINISHED, INTERRUPTED = "finished", "interrupted"
+"""Outcomes of a run that got to its end, and of one that somebody stopped."""
+
 
 @contextmanager
 def session(
-    simulation: Simulation, record: Path | None, observers: Sequence[object]
+    simulation: Simulation,
+    record: Path | None,
+    observers: Sequence[object],
+    since: Resumption | None = None,
 ) -> Iterator[None]:
     """Within it, `observers` and a recorder hear the hooks of the simulation's manager.
 
@@ -25,12 +32,16 @@ def session(
         simulation: what is carried out.
         record: HDF5 file to write, if one is wanted.
         observers: objects with methods of `solidsph.hooks.Moments`, heard in this session only.
+        since: what is taken over from an earlier run that `record` holds.
     """
     heard = list(observers)
     if record is not None:
+        from solidsph.results.checkpoint import checkpoint_path
+        from solidsph.results.checkpointer import Checkpointer
         from solidsph.results.recorder import Recorder  # brings the file library with it
 
-        heard.append(Recorder(record))
+        heard.append(Checkpointer(checkpoint_path(record), is_resumed=since is not None))
+        heard.append(Recorder(record, since))
     for listener in heard:
         simulation.manager.register(listener)
     hook = simulation.manager.hook
@@ -38,12 +49,18 @@ def session(
     try:
         hook.solidsph_setup(simulation=simulation)
         yield
-        outcome = "finished"
+        outcome = FINISHED
     except BaseException as cause:
-        kind = "diverged" if isinstance(cause, DivergedError) else type(cause).__name__
-        outcome = f"{kind}: {cause}"
+        outcome = _told(cause)
         raise
     finally:
         hook.solidsph_finish(simulation=simulation, outcome=outcome)
         for listener in heard:
             simulation.manager.unregister(listener)
+
+
+def _told(cause: BaseException) -> str:
+    if isinstance(cause, KeyboardInterrupt):
+        return INTERRUPTED
+    kind = "diverged" if isinstance(cause, DivergedError) else type(cause).__name__
+    return f"{kind}: {cause}"

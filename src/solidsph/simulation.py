@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Mapping, Sequence
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +14,13 @@ import pluggy
 
 from solidsph.dynamics import Dynamics
 from solidsph.engines.engine import Engine
-from solidsph.errors import BuildError, DivergedError
+from solidsph.errors import BuildError, DivergedError, SceneError
 from solidsph.interfaces.condition import Condition, Observation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.integrator import Integrator
 from solidsph.particles import Particles, State
 from solidsph.registry import Entry
+from solidsph.resumption import Resumption
 from solidsph.scene import Scene
 from solidsph.session import session
 from solidsph.setting import Setting
@@ -54,6 +56,7 @@ class Simulation:
     steps: int
     parts: tuple[Entry, ...]  # every plugin used
     manager: pluggy.PluginManager
+    halvings: int = 0  # of the step that the scene asks for
 
     @staticmethod
     def builder(scene: Scene | None = None) -> Builder:
@@ -79,7 +82,31 @@ class Simulation:
         """What carries out the steps."""
         return self.dynamics.internal.time_loop(self.dynamics, self.integrator, self.step_size)
 
-    def run(self, *, record: Path | str | None = None, observers: Sequence[object] = ()) -> Result:
+    def extended(self, steps: int) -> Simulation:
+        """The same, of so many steps in all: the step and the outputs up to now stay as they are.
+
+        Raises:
+            SceneError: the scene has more steps than that.
+        """
+        if steps < self.steps:
+            raise SceneError(f"{steps} steps in all are fewer than the {self.steps} that there are")
+        return attrs.evolve(self, steps=steps)
+
+    def halved(self) -> Simulation:
+        """The same scene, built anew with half the step."""
+        builder = self.builder(attrs.evolve(self.scene, time_step=0.5 * self.step_size))
+        finer = builder.build()
+        return attrs.evolve(
+            finer, scene=self.scene, steps=2 * self.steps, halvings=self.halvings + 1
+        )
+
+    def run(
+        self,
+        *,
+        record: Path | str | None = None,
+        observers: Sequence[object] = (),
+        since: Resumption | None = None,
+    ) -> Result:
         """Advance from the start to the end of the duration.
 
         This is the motion, also of a scene with [statics]: `solidsph.carry_out` heeds those.
@@ -87,6 +114,8 @@ class Simulation:
         Args:
             record: HDF5 file to write; the folder is made if it is missing.
             observers: objects with methods of `solidsph.hooks.Moments`, heard in this run only.
+            since: what is taken over from an earlier run that `record` holds; `solidsph.resume`
+                finds it.
 
         Raises:
             DivergedError: the run went wrong; what was recorded before stays readable.
@@ -94,11 +123,18 @@ class Simulation:
         path = None if record is None else Path(record)
         hook = self.manager.hook
         begun = clock.perf_counter()
-        with session(self, path, observers):
+        with session(self, path, observers, since):
             loop = self.time_loop()
-            state = self.start()
-            hook.solidsph_step_end(simulation=self, observation=self._observe(state))
+            if since is None or since.state is None:
+                state = self.start()
+                hook.solidsph_step_end(simulation=self, observation=self._observe(state))
+            else:
+                state = since.state
+                observation = self._observe(state)
+                hook.solidsph_resume(simulation=self, observation=observation, kept=since.kept)
             for stop in self.output_steps():
+                if stop <= state.step:
+                    continue
                 try:
                     state = loop.advance(state, stop)
                 except StepError as failed:
@@ -113,15 +149,21 @@ class Simulation:
 
     def output_steps(self) -> tuple[int, ...]:
         """Steps after which the state is observed, evenly spread, the last one among them."""
-        count = min(self.scene.outputs, self.steps)
-        marks = np.linspace(0, self.steps, count + 1)[1:]
-        return tuple(int(step) for step in np.unique(np.rint(marks)))
+        # In steps of the scene's own size, so that halving them changes no time.
+        size = 2**self.halvings
+        asked, steps = round(self.scene.duration / self.step_size) // size, self.steps / size
+        count = min(self.scene.outputs, asked)
+        marks = np.linspace(0, asked, count + 1)[1:]
+        if steps > asked:  # extended
+            apart = asked / count
+            further = np.arange(count + 1, ceil(steps / apart)) * apart
+            marks = np.concatenate([marks, further])
+        whole = np.append(size * np.rint(marks).astype(np.int64), self.steps)
+        return tuple(int(step) for step in np.unique(whole) if step <= self.steps)
 
     def _observe(self, state: State) -> Observation:
         observation = self.dynamics.observe(state)
-        with np.errstate(all="ignore"):
-            J = np.linalg.det(observation.deformation_gradients)
-        turned = ~(J > 0.0) & ~self.particles.ghosts
+        turned = ~(observation.volume_ratios > 0.0) & ~self.particles.ghosts
         if turned.any():
             raise self._diverged(state, "the volume has vanished or turned inside out")
         return observation
@@ -136,10 +178,12 @@ class Simulation:
         finite = np.isfinite(J[real])
         # The first particle whose volume ratio is no number, or else the most compressed one.
         worst = real[np.argmin(finite)] if not finite.all() else real[np.argmin(J[real])]
-        return DivergedError(
+        error = DivergedError(
             step=state.step,
             time=state.time,
             particle=int(worst),
             volume_ratio=float(J[worst]),
             cause=cause,
         )
+        self.manager.hook.solidsph_failure(simulation=self, state=state, error=error)
+        return error

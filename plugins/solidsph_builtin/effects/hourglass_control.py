@@ -12,7 +12,12 @@ from solidsph.arrays import Array
 from solidsph.body import Body
 from solidsph.engines.select import mismatch_operator
 from solidsph.errors import SceneError
-from solidsph.interfaces.condition import FieldCondition, ForceCondition, Observation
+from solidsph.interfaces.condition import (
+    FieldCondition,
+    ForceCondition,
+    Observation,
+    StoringCondition,
+)
 from solidsph.interfaces.declared import MismatchForce
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Configuration
@@ -125,13 +130,19 @@ def _reach(body: Body) -> float:
 
 @final
 @attrs.frozen(eq=False)
-class _Control(MismatchForce, FieldCondition):
+class _Control(MismatchForce, FieldCondition, StoringCondition):
     label: str
     reference: Array  # (n, d)
     operators: Sequence[MismatchOperator]
 
     def energies(self, observation: Observation) -> Array:
         """The penalty's energy, particle by particle, (n,) [J]: half of each pair's."""
+        if self not in observation.made:
+            observation.made[self] = self._energies(observation)
+        found: Array = observation.made[self]
+        return found
+
+    def _energies(self, observation: Observation) -> Array:
         u = observation.state.positions - self.reference
         H = observation.deformation_gradients - np.eye(u.shape[1])
         squares = [

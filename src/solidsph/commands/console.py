@@ -71,7 +71,9 @@ class ProgressObserver:
     @implementation
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
         # By time, and not by counting: load steps are halved and doubled on the way.
-        part = observation.state.time / simulation.scene.duration
+        moves = simulation.scene.statics is None
+        end = simulation.steps * simulation.step_size if moves else simulation.scene.duration
+        part = observation.state.time / end
         self._display.update(self._task, completed=round(part * self._steps))
 
 

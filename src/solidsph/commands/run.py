@@ -7,15 +7,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from rich.markup import escape
 
-from solidsph.commands.console import ProgressObserver, progress, say, show_json, show_table
+from solidsph.commands.console import ProgressObserver, err, progress, say, show_json, show_table
 from solidsph.commands.target import resolve
+from solidsph.errors import SceneError
 from solidsph.interfaces.case import Case, Measurement
 from solidsph.scene import Scene
 
 if TYPE_CHECKING:
     from solidsph.costs.model import Prediction
     from solidsph.costs.work import Compilation
+    from solidsph.watch import Finding
 
 
 @click.command()
@@ -31,6 +34,15 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path, dir_okay=False),
     help="Write the scene to this file instead of running it.",
 )
+@click.option("--watch", is_flag=True, help="Look for signs of failure at every output.")
+@click.option(
+    "--roll-back",
+    "roll_backs",
+    type=click.IntRange(min=0),
+    default=0,
+    metavar="N",
+    help="With --watch: go back to the last sound output and halve the step, up to N times.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def run(
@@ -38,6 +50,8 @@ def run(
     settings: tuple[str, ...],
     output: Path | None,
     write: Path | None,
+    watch: bool,
+    roll_backs: int,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -49,9 +63,19 @@ def run(
     folder = output or Path("results") / Path(target).stem
     shown = not (as_json or quiet)
     if isinstance(wanted, Case):
+        if watch or roll_backs:
+            raise SceneError(
+                "--watch is for one scene, and a case is several, some of which diverge on "
+                "purpose; write them to files (--write) and run one"
+            )
         _run_case(target, wanted, folder, shown=shown, as_json=as_json)
-    else:
-        _run_scene(target, wanted, folder, shown=shown, as_json=as_json)
+        return
+    if roll_backs and not watch:
+        raise SceneError("--roll-back needs --watch, which finds the last sound output")
+    if watch and wanted.statics is not None:
+        raise SceneError("--watch is for motions; an equilibrium is tested by itself")
+    watched = roll_backs if watch else None
+    _run_scene(target, wanted, folder, watched=watched, shown=shown, as_json=as_json)
 
 
 def _write(wanted: Scene | Case, path: Path) -> None:
@@ -63,7 +87,15 @@ def _write(wanted: Scene | Case, path: Path) -> None:
         say(f"wrote {own}")
 
 
-def _run_scene(target: str, scene: Scene, folder: Path, *, shown: bool, as_json: bool) -> None:
+def _run_scene(
+    target: str,
+    scene: Scene,
+    folder: Path,
+    *,
+    watched: int | None,
+    shown: bool,
+    as_json: bool,
+) -> None:
     from solidsph.carry_out import carry_out
     from solidsph.commands import prediction as told
     from solidsph.costs.process import peak_memory
@@ -76,9 +108,17 @@ def _run_scene(target: str, scene: Scene, folder: Path, *, shown: bool, as_json:
     path = folder / "record.h5"
     with progress(shown) as display:
         observers = [ProgressObserver(display, Path(target).stem, simulation)] if display else []
-        result = carry_out(simulation, record=path, observers=observers)
+        if watched is None:
+            result = carry_out(simulation, record=path, observers=observers)
+        else:
+            from solidsph.watch import run_watched
+
+            result = run_watched(
+                simulation, record=path, roll_backs=watched, observers=observers, told=_Once()
+            )
     with Record(path) as record:
         history = {name: float(values[-1]) for name, values in record.history.items()}
+        notes = record.notes
     memory = peak_memory()
     facts: dict[str, Any] = {
         "particles": simulation.particles.count,
@@ -91,11 +131,32 @@ def _run_scene(target: str, scene: Scene, folder: Path, *, shown: bool, as_json:
         **told.scored(prediction, result.seconds, memory),
     }
     if as_json:
-        show_json({"scene": target, "record": str(path), **facts, "final": history})
+        noted = {"notes": list(notes)} if notes else {}
+        show_json({"scene": target, "record": str(path), **facts, **noted, "final": history})
         return
     show_table(target, ["", "value"], [[key, value] for key, value in facts.items()])
     show_table("at the end", ["quantity", "value"], [[k, v] for k, v in history.items()])
+    for note in notes:
+        say(f"note: {note}")
     say(f"record: {path} (ParaView opens it; so does: solidsph plot {path})")
+
+
+class _Once:
+    """Tells what a watchdog finds, the first time of each remedy."""
+
+    def __init__(self) -> None:
+        self._told: set[str] = set()
+
+    def __call__(self, time: float, finding: Finding) -> None:
+        if finding.remedy not in self._told:
+            self._told.add(finding.remedy)
+            err.print(
+                escape(
+                    f"watchdog, {finding.grade.value} at t = {time:.6g} s: {finding.cause} at "
+                    f"particle {finding.particle}; try {finding.remedy}"
+                ),
+                soft_wrap=True,
+            )
 
 
 def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bool) -> None:

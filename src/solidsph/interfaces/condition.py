@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from typing import Any
 
 import attrs
+import numpy as np
 
 from solidsph.arrays import Array, Indices, Mask
 from solidsph.particles import Particles, State
@@ -26,6 +28,25 @@ class Observation:
     deformation_gradients: Array  # (n, d, d) F [-]
     stresses: Array  # (n, d, d) first Piola-Kirchhoff stress P [Pa]
     energy_densities: Array  # (n,) psi [J/m^3]
+    # What several listeners need, made once by keys of theirs.
+    made: dict[object, Any] = attrs.field(factory=dict, init=False, repr=False)
+
+    @property
+    def volume_ratios(self) -> Array:
+        """J = det F of every particle, (n,)."""
+        if "J" not in self.made:
+            with np.errstate(all="ignore"):
+                self.made["J"] = np.linalg.det(self.deformation_gradients)
+        found: Array = self.made["J"]
+        return found
+
+    @property
+    def squared_speeds(self) -> Array:
+        """v^2 of every particle, (n,) [m^2/s^2]."""
+        if "v^2" not in self.made:
+            self.made["v^2"] = np.sum(self.state.velocities**2, axis=1)
+        found: Array = self.made["v^2"]
+        return found
 
 
 class Condition(ABC):
@@ -39,6 +60,14 @@ class Condition(ABC):
     @abstractmethod
     def report(self, observation: Observation) -> Mapping[str, float]:
         """What was asked for and what was achieved: columns "quantity [unit]" of numbers."""
+
+
+class StoringCondition(Condition):
+    """Stores energy beside that of the strain."""
+
+    @abstractmethod
+    def energies(self, observation: Observation) -> Array:
+        """What it stores of every particle, (n,) [J]: minus its work, from where it was zero."""
 
 
 class FieldCondition(Condition):

@@ -2,33 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.condition import Condition, Observation, StoringCondition
+
+KINETIC, STRAIN, RESIDUAL = "kinetic energy [J]", "strain energy [J]", "energy residual [J]"
+"""Columns of every record."""
 
 
 def kinetic_energy(observation: Observation) -> float:
     """Sum of m v^2 / 2 [J, per unit of the missing dimensions]."""
-    speeds = np.sum(observation.state.velocities**2, axis=1)
-    return 0.5 * float(observation.masses @ speeds)
+    return 0.5 * float(observation.masses @ observation.squared_speeds)
 
 
 def strain_energy(observation: Observation) -> float:
     """Sum of V psi over the particles that have a mass [J]."""
-    particles = observation.particles
-    real = ~particles.ghosts
-    return float(particles.volumes[real] @ observation.energy_densities[real])
+    if "strain energy" not in observation.made:
+        particles = observation.particles
+        real = ~particles.ghosts
+        own = float(particles.volumes[real] @ observation.energy_densities[real])
+        observation.made["strain energy"] = own
+    found: float = observation.made["strain energy"]
+    return found
 
 
-def ledger(observation: Observation, initial: float) -> Mapping[str, float]:
-    """Columns "quantity [unit]" of the accounts; `initial` is the energy at the start [J]."""
+def ledger(
+    observation: Observation, initial: float, conditions: Sequence[Condition] = ()
+) -> Mapping[str, float]:
+    """Columns "quantity [unit]" of the accounts; `initial` is the energy at the start [J].
+
+    Of several bodies also what each has, and what `conditions` store in each.
+    """
     kinetic, strain = kinetic_energy(observation), strain_energy(observation)
     work = observation.state.work
     return {
-        "kinetic energy [J]": kinetic,
-        "strain energy [J]": strain,
+        KINETIC: kinetic,
+        STRAIN: strain,
         **{f"work of {name} [J]": value for name, value in work.items()},
-        "energy residual [J]": kinetic + strain - initial - sum(work.values()),
+        RESIDUAL: kinetic + strain - initial - sum(work.values()),
+        **_by_body(observation, conditions),
+    }
+
+
+def _by_body(observation: Observation, conditions: Sequence[Condition]) -> Mapping[str, float]:
+    particles = observation.particles
+    if len(particles.bodies) < 2:
+        return {}
+    energies = {
+        "kinetic": 0.5 * observation.masses * observation.squared_speeds,
+        "strain": np.where(particles.ghosts, 0.0, particles.volumes * observation.energy_densities),
+        **{c.label: c.energies(observation) for c in conditions if isinstance(c, StoringCondition)},
+    }
+    return {
+        f"{name} energy of {body} [J]": float(values[rows].sum())
+        for name, values in energies.items()
+        for body, rows in particles.bodies.items()
     }

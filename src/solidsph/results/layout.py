@@ -96,4 +96,4 @@ def reason(error: BaseException) -> str:
     """What an error of HDF5 or of the system says, in one line and without internals."""
     text = " ".join(str(error).split())
     system = re.search("error message = '([^']*)'", text)
-    return system[1] if system else text
+    return system[1] if system else re.sub(r"^\[Errno \d+\] ", "", text)

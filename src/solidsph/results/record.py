@@ -101,6 +101,7 @@ class Record:
         scene: what was asked for, as TOML text.
         plugins: every part used.
         versions: of the software that produced the run, by its name.
+        notes: what happened to the run: that it was extended, or rolled back.
         outcome: "finished", "diverged: ...", "stopped: ..."; "running" if it runs or was killed.
 
         is_closed_by_writer: False while the run goes on, and for ever if it was killed.
@@ -140,6 +141,11 @@ class Record:
                 f"the record {self.path} has format {written}, this solidsph reads up to {FORMAT}; "
                 "update solidsph"
             )
+        if written < FORMAT:  # none was ever given out, so there is nothing to translate from
+            raise RecordError(
+                f"the record {self.path} has the older format {written}, this solidsph reads "
+                f"{FORMAT}; run its scene again"
+            )
         grid = self._file["VTKHDF"]
         announced = int(grid["Steps"].attrs["NSteps"])  # first, since the run goes on meanwhile
         self.dimension = int(run.attrs["dimension"])
@@ -148,6 +154,7 @@ class Record:
             PluginUsed(*(text.decode() for text in row)) for row in run["plugins"][()]
         )
         self.versions = dict(line.rsplit(" ", 1) for line in _lines(run, "versions"))
+        self.notes = tuple(line.decode() for line in run.attrs.get("notes", ()))
         self.outcome = bytes(run["outcome"][()]).decode(errors="ignore")
         self.particles = self._particles(run, grid["PointData"])
         self.field_names = _lines(run, "fields")

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import platform
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
@@ -32,16 +33,29 @@ from solidsph.results.layout import (
     static_fields,
     tag_name,
 )
+from solidsph.uninterrupted import uninterrupted
 
-__all__ = ["Field", "PluginUsed", "RecordWriter"]
+__all__ = ["EarlierStep", "Field", "PluginUsed", "RecordWriter"]
 
 _VERTEX = 1  # VTK's number for a cell of one point
 _PAGE = 4096  # bytes; a chunk holds at least about as much
 _LARGEST_CHUNK = 2**30  # bytes; HDF5 allows just under 4 GiB
 _SPARE = 2**18  # bytes; that much must be free beyond a step's arrays, for HDF5's indices
+_AT_ONCE = 2**24  # bytes; room is tried for by so much
 _ABANDONED: list[Any] = []  # kept from being closed
 # HDF5 1.10 is the first that can be read while it is written; newer formats open in fewer tools.
 _FILE_FORMAT = ("v110", "v110")
+
+
+@attrs.frozen(eq=False)
+class EarlierStep:
+    """One step of an earlier record, as `RecordWriter.append` takes it."""
+
+    time: float
+    step: int
+    positions: Array
+    fields: Mapping[str, Array]
+    history: Mapping[str, float]
 
 
 class RecordWriter:
@@ -66,6 +80,8 @@ class RecordWriter:
         columns: unit of each column of the history, by its name.
         overwrite: whether an existing file may be replaced.
         versions: of the software that produced the run; by default what is installed here.
+        earlier: steps that the record begins with; they are in the file when it appears.
+        notes: what happened to the run, one line each.
 
     Raises:
         RecordError: the file cannot be created, or the fields do not fit the particles.
@@ -82,6 +98,8 @@ class RecordWriter:
         columns: Mapping[str, str],
         overwrite: bool = True,
         versions: Mapping[str, str] | None = None,
+        earlier: Iterable[EarlierStep] = (),
+        notes: Sequence[str] = (),
     ) -> None:
         self.path = Path(os.path.realpath(path))  # through a link to the file itself
         self._particles = particles
@@ -89,6 +107,7 @@ class RecordWriter:
         self._history = np.dtype([(name, np.float64) for name in columns])
         self._count = 0
         self._last_time = -np.inf
+        self._assured = 0  # bytes by which the file can grow, as far as is known
         _check_fields(fields, particles)
         draft = self.path.with_name(f"{self.path.name}.{os.getpid()}.partial")
         remedy = "choose a path in a folder that you may write to"
@@ -96,23 +115,45 @@ class RecordWriter:
             with _explained(f"cannot create the record {self.path}", remedy):
                 _check_free(self.path, overwrite)
                 self.path.parent.mkdir(parents=True, exist_ok=True)
+                _try_room(draft, _reference_bytes(particles) + len(scene.encode()) + _SPARE)
                 with h5py.File(draft, "w", libver=_FILE_FORMAT, locking=False) as file:
                     _write_grid(file, particles, fields)
-                    _write_run(file, particles, scene, plugins, fields, columns, versions)
+                    _write_run(file, particles, scene, plugins, fields, columns, versions, notes)
+            self._take_over(draft, earlier)
+            with _explained(f"cannot create the record {self.path}", remedy):
                 draft.replace(self.path)
-                self._file: Any = h5py.File(self.path, "r+", libver=_FILE_FORMAT, locking=False)
-                # From here on HDF5 writes what is pointed at before what points at it.
-                self._file.swmr_mode = True
+                self._open(self.path)
         finally:
             with suppress(OSError):  # it is gone after a success
                 draft.unlink()
+
+    def _open(self, path: Path) -> None:
+        self._file: Any = h5py.File(path, "r+", libver=_FILE_FORMAT, locking=False)
+        # From here on HDF5 writes what is pointed at before what points at it.
+        self._file.swmr_mode = True
         self._datasets: dict[str, Any] = {}
         self._announced: Any = h5py.h5a.open(self._file["VTKHDF/Steps"].id, b"NSteps")
+
+    def _take_over(self, draft: Path, earlier: Iterable[EarlierStep]) -> None:
+        """Write steps into a file that nobody sees yet."""
+        for one in earlier:
+            if self._count == 0:
+                with _explained(f"cannot create the record {self.path}", "choose another path"):
+                    self._open(draft)
+            self.append(one.time, one.step, one.positions, one.fields, one.history)
+        if self._count:
+            file, self._file = self._file, None
+            file.close()
 
     @property
     def count(self) -> int:
         """Number of steps written."""
         return self._count
+
+    @property
+    def last_time(self) -> float:
+        """t of the last step written [s]; minus infinity if there is none."""
+        return self._last_time
 
     def append(
         self,
@@ -166,7 +207,8 @@ class RecordWriter:
         with _explained(problem, remedy):
             if shutil.disk_usage(self.path.parent).free < needed:
                 raise OSError("the disk is full")
-        with _explained(problem, remedy), self._abandoned_on_failure():
+            self._assure(needed)
+        with uninterrupted(), _explained(problem, remedy), self._abandoned_on_failure():
             for name, values in rows.items():
                 self._extend(name, count * particles.count, particles.count, values)
             for name, value in single.items():
@@ -186,7 +228,7 @@ class RecordWriter:
         if self._file is None:
             return
         remedy = f"the {self._count} steps in it remain"
-        with _explained(f"cannot complete the record {self.path}", remedy):
+        with uninterrupted(), _explained(f"cannot complete the record {self.path}", remedy):
             with self._abandoned_on_failure():
                 self._end_with(outcome)
                 self._file.flush()
@@ -212,6 +254,19 @@ class RecordWriter:
         with suppress(RecordError):  # the error that stopped the run is the one to be told
             self.close(outcome)
 
+    def _assure(self, needed: int) -> None:
+        """That the file can grow by so much; tried for many steps at once, since it takes time."""
+        self._assured -= needed
+        if self._assured >= 0:
+            return
+        path = Path(self._file.filename)
+        try:
+            _try_room(path, max(needed, _AT_ONCE))
+            self._assured = max(needed, _AT_ONCE) - needed
+        except OSError:
+            _try_room(path, needed)
+            self._assured = 0
+
     def _end_with(self, outcome: str) -> None:
         text = outcome.encode(errors="replace")[:OUTCOME_BYTES]
         self._file["solidsph/outcome"][()] = text
@@ -228,7 +283,7 @@ class RecordWriter:
         except HDF5_ERRORS:
             with suppress(*HDF5_ERRORS):
                 self._end_with("stopped: a step could not be written")
-            _ABANDONED.append(self._file)
+            _ABANDONED.append((self._file, self._datasets, self._announced))
             self._file = None
             raise
 
@@ -260,6 +315,36 @@ def _explained(problem: str, remedy: str) -> Iterator[None]:
         yield
     except HDF5_ERRORS as error:
         raise RecordError(f"{problem}: {reason(error)}; {remedy}") from None
+
+
+def _try_room(path: Path, size: int) -> None:
+    """That a file can grow by so much, found out without HDF5, which a failed write would hurt.
+
+    Raises:
+        OSError: the device is full, or a quota or a limit does not allow it.
+    """
+    if not hasattr(os, "posix_fallocate"):
+        return
+    with path.open("ab") as file:
+        end = os.fstat(file.fileno()).st_size
+        try:
+            os.posix_fallocate(file.fileno(), end, size)
+        except OSError as error:
+            if error.errno in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+                raise
+        finally:
+            os.ftruncate(file.fileno(), end)
+
+
+def _reference_bytes(particles: Particles) -> int:
+    """What the particles take in a file, before any step."""
+    cells, tags, vector = 17, len(particles.tags), 24
+    each = cells + tags + 3 * vector + 3 * 8 + 5
+    faces = sum(
+        face.particles.nbytes + face.area_vectors.nbytes + face.areas.nbytes
+        for face in particles.faces.values()
+    )
+    return each * particles.count + faces
 
 
 def _check_free(path: Path, overwrite: bool) -> None:
@@ -364,12 +449,15 @@ def _write_run(
     fields: Sequence[Field],
     columns: Mapping[str, str],
     versions: Mapping[str, str] | None,
+    notes: Sequence[str],
 ) -> None:
     """All that VTK does not see."""
     n = particles.count
     run = file.create_group("solidsph")
     run.attrs["format"] = FORMAT
     run.attrs["dimension"] = particles.dimension
+    if notes:
+        run.attrs["notes"] = _text(notes)
     run["scene"] = _text([scene]).reshape(())
     names = [column.name for column in attrs.fields(PluginUsed)]
     texts = {name: _text([getattr(plugin, name) for plugin in plugins]) for name in names}

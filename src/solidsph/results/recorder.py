@@ -2,61 +2,86 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solidsph.errors import SceneError
+from solidsph.errors import RecordError, SceneError
 from solidsph.hooks import implementation
 from solidsph.interfaces.condition import FieldCondition, Observation
-from solidsph.results.energy import kinetic_energy, ledger, strain_energy
+from solidsph.results.energy import KINETIC, STRAIN, kinetic_energy, ledger, strain_energy
 from solidsph.results.layout import field_name
-from solidsph.results.record_writer import Field, PluginUsed, RecordWriter
+from solidsph.results.record import Record
+from solidsph.results.record_writer import EarlierStep, Field, PluginUsed, RecordWriter
+from solidsph.resumption import Resumption
 
 if TYPE_CHECKING:
     from solidsph.arrays import Array
     from solidsph.simulation import Simulation
 
 
-class Recorder:
-    """Writes every observation to one HDF5 file."""
+COMPOSED = "# this scene was composed in Python"
+"""How the text of a scene begins that has no file form."""
 
-    def __init__(self, path: Path) -> None:
+# What comes out the same again if a run repeats an output that its record holds.
+_REPEATED = ("velocity", "cauchy_stress")
+
+
+class Recorder:
+    """Writes every observation to one HDF5 file, behind those of an earlier run if it has any."""
+
+    def __init__(self, path: Path, since: Resumption | None = None) -> None:
         self._path = path
+        self._since = since
         self._writer: RecordWriter | None = None
         self._initial_energy = 0.0
+        self._recorded: Record | None = None  # outputs that the run has to repeat
 
     @implementation
     def solidsph_setup(self, simulation: Simulation) -> None:
         # A run that fails before its first output must not seem to have left an older record.
-        self._path.unlink(missing_ok=True)
+        if self._since is None:
+            remove(self._path)
+
+    @implementation
+    def solidsph_resume(
+        self, simulation: Simulation, observation: Observation, kept: Mapping[str, Array]
+    ) -> None:
+        self._writer = self._open(simulation, observation)
 
     @implementation
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
         if self._writer is None:
-            self._initial_energy = kinetic_energy(observation) + strain_energy(observation)
             self._writer = self._open(simulation, observation)
         state = observation.state
-        self._writer.append(
-            state.time,
-            state.step,
-            state.positions,
-            _fields(observation)
-            | {name: values for name, _, values in _conditions_fields(simulation, observation)},
-            self._history(simulation, observation),
-        )
+        fields = _fields(observation) | {
+            name: values for name, _, values in _conditions_fields(simulation, observation)
+        }
+        if state.time <= self._writer.last_time:
+            self._check_repeated(observation, fields)
+            return
+        history = self._history(simulation, observation)
+        self._writer.append(state.time, state.step, state.positions, fields, history)
 
     @implementation
     def solidsph_finish(self, simulation: Simulation, outcome: str) -> None:
+        if self._recorded is not None:
+            self._recorded.close()
         if self._writer is not None:
             self._writer.close(outcome)
 
     def _open(self, simulation: Simulation, observation: Observation) -> RecordWriter:
         d = simulation.particles.dimension
+        earlier = self._earlier()
+        if earlier is None:
+            self._initial_energy = kinetic_energy(observation) + strain_energy(observation)
+        else:
+            first = (earlier.history[name][0] for name in (KINETIC, STRAIN))
+            self._initial_energy = float(sum(first))
         columns = self._history(simulation, observation)
-        return RecordWriter(
+        writer = RecordWriter(
             self._path,
             simulation.particles,
             scene=scene_text(simulation),
@@ -74,10 +99,53 @@ class Recorder:
                 ),
             ],
             columns={name: _parted(name)[1] for name in columns},
+            earlier=() if earlier is None else _steps(earlier, self._kept_until),
+            notes=() if self._since is None else self._since.notes,
         )
+        if earlier is not None and observation.state.time < writer.last_time:
+            self._recorded = Record(self._path)
+        return writer
+
+    @property
+    def _kept_until(self) -> float:
+        return -np.inf if self._since is None else self._since.until
+
+    def _earlier(self) -> Record | None:
+        """The record of the earlier run, if it holds a step that stays."""
+        if self._since is None or not self._path.exists():
+            return None
+        record = Record(self._path)
+        if not record.count or record.times[0] > self._kept_until:
+            record.close()
+            return None
+        return record
+
+    def _check_repeated(self, observation: Observation, fields: Mapping[str, Array]) -> None:
+        """That an output which the record holds has come out the same again."""
+        if self._recorded is None or self._since is None or not self._since.repeats:
+            return
+        state, recorded = observation.state, self._recorded
+        place = int(np.searchsorted(recorded.times, state.time))
+        same = place < recorded.count and recorded.times[place] == state.time
+        if same:
+            values = {"": state.positions, **{name: fields[name] for name in _REPEATED}}
+            same = all(
+                np.array_equal(
+                    recorded.field(name)[place] if name else recorded.positions[place],
+                    value,
+                    equal_nan=True,
+                )
+                for name, value in values.items()
+            )
+        if not same:
+            raise RecordError(
+                f"the run does not repeat its record {self._path} at t = {state.time:.9g} s: "
+                "something that decides its bits is not as it was; what is recorded stays. To go "
+                "on all the same, force it; to be sure, run the scene anew into another record"
+            )
 
     def _history(self, simulation: Simulation, observation: Observation) -> dict[str, float]:
-        columns = dict(ledger(observation, self._initial_energy))
+        columns = dict(ledger(observation, self._initial_energy, simulation.conditions))
         for condition in simulation.conditions:
             columns |= condition.report(observation)
         return columns
@@ -94,10 +162,39 @@ def _conditions_fields(
                 yield field_name(quantity), unit, values
 
 
+def _steps(record: Record, until: float) -> Iterator[EarlierStep]:
+    """The steps of a record up to a time; the record is closed then."""
+    with record:
+        for place, time in enumerate(record.times):
+            if time <= until:
+                yield EarlierStep(
+                    time=float(time),
+                    step=int(record.steps[place]),
+                    positions=record.positions[place],
+                    fields={name: record.field(name)[place] for name in record.field_names},
+                    history={name: float(one[place]) for name, one in record.history.items()},
+                )
+
+
 def _parted(name: str) -> tuple[str, str]:
     """Quantity and unit of "quantity [unit]"."""
     quantity, _, unit = name.rpartition(" [")
     return quantity, unit.rstrip("]")
+
+
+def remove(path: Path) -> None:
+    """Remove what an older run left at `path`, if it left anything.
+
+    Raises:
+        RecordError: there can be no file of that name, or it may not be removed.
+    """
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as cause:
+        raise RecordError(
+            f"cannot create {path}: {cause.strerror or cause}; choose a path in a folder that you "
+            "may write to"
+        ) from None
 
 
 def scene_text(simulation: Simulation) -> str:
@@ -106,12 +203,12 @@ def scene_text(simulation: Simulation) -> str:
         return simulation.scene.to_toml()
     except SceneError as cause:
         # A scene of Python objects runs all the same; its record says why it cannot be rerun.
-        return f"# this scene was composed in Python and has no file form: {cause}\n"
+        return f"{COMPOSED} and has no file form: {cause}\n"
 
 
 def _fields(observation: Observation) -> dict[str, Array]:
     F, P = observation.deformation_gradients, observation.stresses
-    J = np.linalg.det(F)
+    J = observation.volume_ratios
     sigma = np.einsum("pik,pjk->pij", P, F) / J[:, None, None]
     return {
         "velocity": observation.state.velocities,

@@ -33,6 +33,7 @@ def repaired(path: Path, target: Path) -> int:
             fields=[Field(name, each.shape[2:], each.unit) for name, each in fields.items()],
             columns=record.history_units,
             versions=record.versions,
+            notes=record.notes,
         )
         with writer:
             for i, time in enumerate(record.times):

@@ -9,6 +9,7 @@ from pathlib import Path
 import attrs
 
 from solidsph.particles import State
+from solidsph.resumption import Resumption
 from solidsph.scene import StaticsScene
 from solidsph.session import session
 from solidsph.simulation import Result, Simulation
@@ -21,12 +22,13 @@ def run_statics(
     *,
     record: Path | str | None = None,
     observers: Sequence[object] = (),
+    since: Resumption | None = None,
 ) -> Result:
     """Find the equilibrium; the unloaded body and every load step are outputs.
 
     The time of an output is its load factor times the duration, its step the number of load
     steps. Work is the trapezoidal rule over load steps: the energy residual is that of a path
-    followed in so few.
+    followed in so few. An earlier run is taken up from its beginning: what it recorded stays.
 
     Raises:
         ConvergenceError: none was found; the load steps up to there stay readable.
@@ -38,7 +40,7 @@ def run_statics(
         observation = simulation.dynamics.observe(state)
         simulation.manager.hook.solidsph_step_end(simulation=simulation, observation=observation)
 
-    with session(simulation, path, observers):
+    with session(simulation, path, observers, since):
         found = equilibrium(simulation, **attrs.asdict(wanted), observer=observe)
     return Result(
         state=found.state,

@@ -1,0 +1,7 @@
+"""Watching a run: symptoms of one that goes wrong, what to leave behind, and going back."""
+
+from solidsph.watch.roll_back import run_watched
+from solidsph.watch.symptom import Finding, Grade, Symptom
+from solidsph.watch.watchdog import SYMPTOMS, Watchdog
+
+__all__ = ["SYMPTOMS", "Finding", "Grade", "Symptom", "Watchdog", "run_watched"]

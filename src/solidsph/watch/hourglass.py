@@ -1,0 +1,47 @@
+"""Motions that the gradient does not see."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, final
+
+import attrs
+import numpy as np
+
+from solidsph.interfaces.condition import Observation, StoringCondition
+from solidsph.results.energy import strain_energy
+from solidsph.watch.accounts import Accounts
+from solidsph.watch.residual import rounding
+from solidsph.watch.symptom import Finding, Symptom, graded
+
+if TYPE_CHECKING:
+    from solidsph.simulation import Simulation
+
+
+@final
+@attrs.frozen
+class StoredBesides(Symptom):
+    """What conditions store, as hourglass control does, is much beside the strain energy."""
+
+    warning: float = 0.1  # share of both [-]
+    failure: float = 0.6  # [-]
+
+    def look(
+        self, simulation: Simulation, observation: Observation, accounts: Accounts
+    ) -> Finding | None:
+        strain = strain_energy(observation)
+        for condition in simulation.conditions:
+            if not isinstance(condition, StoringCondition):
+                continue
+            energies = condition.energies(observation)
+            own = float(energies.sum())
+            # Energies of both that are small beside all that there is are of no consequence.
+            share = own / (own + strain + 1e-3 * accounts.paid + rounding(simulation))
+            grade = graded(share, self.warning, self.failure)
+            if grade is not None:
+                return Finding(
+                    grade,
+                    int(np.argmax(energies)),
+                    f"{condition.label} holds {share:.3g} of the elastic energy, most of it",
+                    "a finer spacing, or a gradient that sees these motions such as 'quadratic'",
+                )
+        return None

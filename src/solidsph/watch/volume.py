@@ -1,0 +1,40 @@
+"""Volume that vanishes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, final
+
+import attrs
+import numpy as np
+
+from solidsph.interfaces.condition import Observation
+from solidsph.watch.accounts import Accounts
+from solidsph.watch.symptom import Finding, Grade, Symptom
+
+if TYPE_CHECKING:
+    from solidsph.simulation import Simulation
+
+
+@final
+@attrs.frozen
+class VanishingVolume(Symptom):
+    """J of a particle is near zero, below it, or no number."""
+
+    warning: float = 0.2  # J below which there is a warning [-]
+
+    def look(
+        self, simulation: Simulation, observation: Observation, accounts: Accounts
+    ) -> Finding | None:
+        if observation.volume_ratios.min() >= self.warning:  # which no NaN is; of ghosts J = 1
+            return None
+        J = np.where(observation.particles.ghosts, 1.0, observation.volume_ratios)
+        worst = int(np.argmin(np.where(np.isfinite(J), J, -np.inf)))
+        if J[worst] >= self.warning:
+            return None
+        return Finding(
+            Grade.WARNING if J[worst] > 0.0 else Grade.FAILURE,
+            worst,
+            f"the volume vanishes, J = {J[worst]:.3g}",
+            "a smaller step, a smoother or smaller load, artificial-viscosity where something "
+            "strikes, or a finer spacing where the body is crushed",
+        )

@@ -1,0 +1,141 @@
+"""Watchdog: an observer that looks for symptoms, stops a run that is lost, and says why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import attrs
+
+from solidsph.errors import DivergedError, RecordError
+from solidsph.hooks import implementation
+from solidsph.interfaces.condition import Observation
+from solidsph.particles import State
+from solidsph.watch.accounts import Accounts
+from solidsph.watch.crowding import CollapsingNeighbours
+from solidsph.watch.hourglass import StoredBesides
+from solidsph.watch.residual import EnergyFromNowhere
+from solidsph.watch.speed import FasterThanSound
+from solidsph.watch.symptom import Finding, Grade, Symptom
+from solidsph.watch.volume import VanishingVolume
+
+if TYPE_CHECKING:
+    from solidsph.arrays import Array
+    from solidsph.simulation import Simulation
+
+SYMPTOMS: Sequence[Symptom] = (
+    VanishingVolume(),
+    FasterThanSound(),
+    CollapsingNeighbours(),
+    EnergyFromNowhere(),
+    StoredBesides(),
+)
+"""What is looked for unless something else is asked for."""
+
+_ACCOUNTS = "watchdog accounts"
+
+
+@attrs.frozen(eq=False)
+class Good:
+    """An output at which nothing was wrong, and what listeners keep of it."""
+
+    state: State
+    kept: Mapping[str, Array]
+
+
+class Watchdog:
+    """Looks at every output of a run; a failure stops it with the particle, cause and remedy.
+
+    A recorded run that is stopped leaves its last sound output as a checkpoint, and a picture of
+    what surrounds the particle, at `picture`.
+
+    Attributes:
+        findings: time [s] and finding, of every output that had one.
+        good: the last output without any finding; or if there is none, without a failure.
+
+    Args:
+        symptoms: what to look for.
+        picture: the file to draw a failure to, if one is wanted.
+        told: called with the time [s] of every finding, and the finding.
+    """
+
+    def __init__(
+        self,
+        symptoms: Sequence[Symptom] = SYMPTOMS,
+        *,
+        picture: Path | None = None,
+        told: Callable[[float, Finding], None] = lambda time, finding: None,
+    ) -> None:
+        self.findings: list[tuple[float, Finding]] = []
+        self.good: Good | None = None
+        self._symptoms = tuple(symptoms)
+        self._picture = picture
+        self._told = told
+        self._accounts = Accounts()
+        self._is_clean = False  # whether `good` had no finding at all
+
+    @implementation
+    def solidsph_resume(
+        self, simulation: Simulation, observation: Observation, kept: Mapping[str, Array]
+    ) -> None:
+        if _ACCOUNTS in kept:
+            self._accounts = Accounts.taken(kept[_ACCOUNTS])
+        else:  # nobody watched until here
+            self._accounts.add(observation)
+        self.good, self._is_clean = Good(observation.state, kept), True
+
+    @implementation
+    def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
+        self._accounts.add(observation)
+        looks = (one.look(simulation, observation, self._accounts) for one in self._symptoms)
+        found = [one for one in looks if one is not None]
+        state = observation.state
+        self.findings += [(state.time, one) for one in found]
+        for one in found:
+            self._told(state.time, one)
+        for one in found:
+            if one.grade is Grade.FAILURE:
+                raise self._failed(simulation, observation, one)
+        if not found or not self._is_clean:
+            kept: dict[str, Array] = {}
+            simulation.manager.hook.solidsph_keep(simulation=simulation, kept=kept)
+            self.good, self._is_clean = Good(state, kept), not found
+
+    @implementation
+    def solidsph_keep(self, simulation: Simulation, kept: dict[str, Array]) -> None:
+        kept[_ACCOUNTS] = self._accounts.kept()
+
+    @implementation
+    def solidsph_failure(self, simulation: Simulation, state: State, error: DivergedError) -> None:
+        # The run has found out for itself; what it does not know is what came before.
+        if self.findings:
+            time, before = self.findings[-1]
+            error.remedy = before.remedy
+            error.cause += f" (before, at t = {time:.6g} s: {before.cause})"
+        self._draw(simulation, state, error)
+
+    def _failed(
+        self, simulation: Simulation, observation: Observation, found: Finding
+    ) -> DivergedError:
+        state = observation.state
+        error = DivergedError(
+            step=state.step,
+            time=state.time,
+            particle=found.particle,
+            volume_ratio=float(observation.volume_ratios[found.particle]),
+            cause=found.cause,
+            remedy=found.remedy,
+        )
+        self._draw(simulation, state, error)
+        return error
+
+    def _draw(self, simulation: Simulation, state: State, error: DivergedError) -> None:
+        if self._picture is None:
+            return
+        from solidsph.watch.picture import draw_failure  # brings matplotlib with it
+
+        try:
+            draw_failure(simulation, state, error, self._picture)
+        except (OSError, RecordError):
+            return  # a picture that cannot be written must not hide what it would have shown
