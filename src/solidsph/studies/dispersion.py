@@ -108,9 +108,17 @@ def lattice_response(dynamics: Dynamics, state: State) -> LatticeResponse:
             "the particles do not stand in rows one spacing apart, so waves have no wave vector; "
             "take a 'lattice' whose spacing divides the body, or `spectrum`"
         )
-    blocks = _blocks(dynamics, state, middle, spacing)
-    answering = np.any(blocks != 0.0, axis=(1, 2))
+    # At a surface the state may be no state at all: only what reaches the middle must be one.
+    with np.errstate(all="ignore"):
+        blocks = _blocks(dynamics, state, middle, spacing)
+    finite = np.all(np.isfinite(blocks), axis=(1, 2))
+    answering = np.any(blocks != 0.0, axis=(1, 2)) & finite
     found = LatticeResponse(places[answering], blocks[answering])
+    if np.any(np.abs(places[~finite]).max(axis=1, initial=0) <= found.reach):
+        raise SolidsphError(
+            "forces about this state are not finite; take a stretch at which the scheme and the "
+            "material have a response"
+        )
     depth = int(min(-places.min(axis=0).max(), places.max(axis=0).min()))
     # A particle that answers to the middle one looks as far to its other side.
     if 2 * found.reach >= depth:
