@@ -220,6 +220,13 @@ def test_a_surface_without_a_state_is_left_aside() -> None:
     assert certificate(scheme, 1, 1.33).growing == ()
 
 
+def test_growth_faster_than_any_wave_is_that_of_a_run_too() -> None:
+    """Near the end of the support: ten e-foldings while a wave crosses a single spacing."""
+    found = certified(1, "modified-mollifier", 1.62, 1, 1.5, False, False)
+    assert found.growth_rate > 5.0
+    assert measured_growth(found) == pytest.approx(found.growth_rate, rel=AGREEMENT)
+
+
 def test_particles_off_the_lattice_are_refused() -> None:
     simulation = (
         Builder()
