@@ -12,8 +12,9 @@ import pytest
 from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 
-from solidsph import SceneError, SolidsphError
+from solidsph import SceneError, SolidsphError, registry
 from solidsph.builder import Builder
+from solidsph.interfaces.formulation import Configuration
 from solidsph.parts import construct
 from solidsph.scene import Scene
 from solidsph.smoothing import smoothing_kernel
@@ -25,6 +26,7 @@ from solidsph.studies.ellipticity import acoustic_tensors
 from solidsph.studies.scheme import Scheme, stretched
 from solidsph.studies.spectrum import spectrum
 from solidsph.studies.stability_map import stability_map
+from solidsph.testing import example_part
 from tests.scenes import SCENE_TOML
 
 PAPER = {"type": "updated-lagrangian", "gradient": "difference", "divergence": "plain"}
@@ -225,6 +227,28 @@ def test_growth_faster_than_any_wave_is_that_of_a_run_too() -> None:
     found = certified(1, "modified-mollifier", 1.62, 1, 1.5, False, False)
     assert found.growth_rate > 5.0
     assert measured_growth(found) == pytest.approx(found.growth_rate, rel=AGREEMENT)
+
+
+@pytest.mark.parametrize("dimension", [1, 2])
+@pytest.mark.parametrize("divergence", registry.names("divergences"))
+@pytest.mark.parametrize("gradient", registry.names("gradients"))
+@pytest.mark.parametrize("form", registry.names("formulations"))
+def test_every_combination_has_a_certificate_or_is_refused(
+    form: str, gradient: str, divergence: str, dimension: int
+) -> None:
+    formulation = example_part("formulations", form, gradient=gradient, divergence=divergence)
+    scheme = Scheme(cover=2.6 if dimension == 2 else 3.2, formulation=formulation)
+    # Of the built-in ones, one knows its body, and one, where neighbours follow the motion, where
+    # the body stands: its strain is of displacements, not of their differences.
+    moving = formulation.configuration is Configuration.CURRENT
+    if gradient == "consistent" or (gradient == "standard" and moving):
+        with pytest.raises(SolidsphError, match="body"):
+            certificate(scheme, dimension, 1.1)
+        return
+    found = certificate(scheme, dimension, 1.1)
+    assert 0.5 < found.critical_step < 4.0
+    if formulation.divergence.adjoint and not moving:  # a sum of squares, whatever the weights are
+        assert found.growing == ()
 
 
 def test_particles_off_the_lattice_are_refused() -> None:

@@ -49,9 +49,9 @@ def measured_growth(certificate: Certificate) -> float:
         raise SolidsphError("no wave grows, so there is no growth to be run; take another stretch")
     wave = certificate.growing[0]
     duration = _FOLDINGS / wave.growth_rate  # [transits]
-    # No wave is faster than the material's, by as much as the stretch stiffens it: half as much. But
-    # fast growth is over before any has gone a spacing, while a particle feels others as far as it
-    # reaches at once, and theirs a little later.
+    # No wave is faster than the material's, by as much as the stretch stiffens it: half as much.
+    # But fast growth is over before any has gone a spacing, while a particle feels others as far as
+    # it reaches at once, and theirs a little later.
     layers = ceil(1.5 * duration * max(1.0, *certificate.stretches))
     layers += certificate.scheme.depth(min(certificate.stretches))
     simulation, start = _block(certificate, layers)
