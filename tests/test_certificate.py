@@ -239,8 +239,8 @@ def test_every_combination_has_a_certificate_or_is_refused(
     formulation = example_part("formulations", form, gradient=gradient, divergence=divergence)
     scheme = Scheme(cover=2.6 if dimension == 2 else 3.2, formulation=formulation)
     # Of the built-in ones, one knows its body, if not in a row, where its change of the weights is
-    # the same everywhere inside; and one, where neighbours follow the motion, where the body stands:
-    # its strain is of displacements, not of their differences.
+    # the same everywhere inside; and one, where neighbours follow the motion, knows where the body
+    # stands: its strain is of displacements, not of their differences.
     moving = formulation.configuration is Configuration.CURRENT
     of_body = gradient == "consistent" and (moving or dimension > 1)
     if of_body or (gradient == "standard" and moving):

@@ -108,7 +108,7 @@ def _finish(figure: Figure, axes: np.ndarray, mesh: ScalarMappable, title: str, 
     figure.colorbar(
         mesh,
         ax=axes,
-        extend="max",
+        extend="max" if mesh.norm.vmax == _LARGEST_RATE else "neither",
         label="growth rate of the fastest mode [1 / transit of a spacing]",
     )
     figure.suptitle(title, fontsize=11)
