@@ -104,6 +104,55 @@ def test_check_certifies_a_third_partys_kernel(tmp_path: Path) -> None:
     assert facts["distribution"].startswith("solidsph-wendland")
 
 
+def test_check_shows_a_badge_for_every_part_of_a_kind(tmp_path: Path) -> None:
+    done = solidsph("check", "--all", "--kind", "kernel", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert facts["passed"]
+    badges = {row["part"]: row for row in facts["parts"]}
+    assert {"wendland-c2", "cubic-spline"} <= set(badges)
+    assert all(row["passed"] == row["checks"] > 10 for row in badges.values())
+    assert (
+        "all certified" in solidsph("check", "--all", "--kind", "divergence", cwd=tmp_path).stdout
+    )
+
+
+def test_check_certifies_a_scheme(tmp_path: Path) -> None:
+    scheme = ("--gradient", "difference", "--divergence", "plain", "--cover", "2.5")
+    done = solidsph("check", *scheme, "--stretch", "1.2,1", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert (facts["passed"], facts["dimension"], facts["stretches"]) == (True, 2, [1.2, 1.0])
+    assert len(facts["zero_energy_waves"]) == 3
+
+    scheme = (*scheme, "--formulation", "updated-lagrangian")
+    done = solidsph("check", *scheme, "--stretch", "1.1", "--dimension", "1", "--run", cwd=tmp_path)
+    assert done.returncode == 1, done.stderr
+    assert "tensile instability" in done.stdout
+    assert "confirmed by runs" in done.stdout
+    assert "NOT certified" in done.stdout
+
+
+def test_check_takes_a_cases_scheme_with_hourglass_control_added(tmp_path: Path) -> None:
+    case = ("check", "--scheme", "tensile-instability", "--set", "cover=3.0", "--dimension", "1")
+    done = solidsph(*case, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "cover 3," in done.stdout
+    assert "hourglass-control resists them" in done.stdout
+    controlled = solidsph(*case, "--hourglass", "0.5", cwd=tmp_path).stdout
+    assert "none beyond translations" in controlled
+
+
+def test_stability_draws_a_map(tmp_path: Path) -> None:
+    arguments = ("--gradient", "difference", "--divergence", "plain", "--points", "6", "4")
+    done = solidsph("stability", "--map", *arguments, "--output", "map.png", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    total, updated = json.loads(done.stdout)["maps"]
+    assert total["unstable_in_tension"] == total["unstable_in_compression"] == 0.0
+    assert updated["unstable_in_tension"] > 0.5
+    assert (tmp_path / "map.png").stat().st_size > 20_000
+
+
 def test_write_a_cases_scenes_and_run_one(tmp_path: Path) -> None:
     done = solidsph(
         "run", "tensile-instability", "--set", "stretches=[]", "--write", "scene.toml", cwd=tmp_path
@@ -129,6 +178,14 @@ def test_write_a_cases_scenes_and_run_one(tmp_path: Path) -> None:
         (("fly",), "No such command"),
         (("check", "wendland"), "did you mean 'wendland-c2'"),
         (("check", "modified-mollifier", "--kind", "colour"), "unknown kind"),
+        (("check",), "nothing to check"),
+        (("check", "wendland-c2", "--cover", "3"), "check one at a time"),
+        (("check", "--all", "--cover", "3"), "leave out the name"),
+        (("check", "--all", "--kind", "colour"), "kinds with a kit"),
+        (("check", "--cover", "3", "--stretch", "wide"), "is no number"),
+        (("check", "--cover", "0.5"), "too small in 2D"),
+        (("check", "--cover", "3", "--set", "a=1"), "name one"),
+        (("stability",), "Missing option '--map'"),
         (("plot", "absent.h5"), "absent.h5"),
         (("plot", "pull.toml"), "pull.toml"),
     ],

@@ -523,7 +523,16 @@ def wait_for_outputs(path: Path, count: int) -> None:
     raise AssertionError("no output came")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number",
+    [
+        signal.SIGTERM,
+        *(
+            pytest.param(one, marks=pytest.mark.validation)
+            for one in (signal.SIGINT, signal.SIGKILL)
+        ),
+    ],
+)
 def test_a_command_that_is_stopped_can_be_resumed(tmp_path: Path, number: signal.Signals) -> None:
     folder, scene = tmp_path / "out", scene_file(tmp_path)
     with command("run", str(scene), "--output", str(folder), "--quiet") as process:

@@ -62,7 +62,8 @@ class CantileverPlate(Case):
     }
     trials: ClassVar[Mapping[str, Trial]] = {
         "Poisson's ratio 0.4999": Trial(
-            {"poissons_ratio": 0.4999, "across": 7, "tolerance": 0.05}, {"across": 5}
+            {"poissons_ratio": 0.4999, "across": 7, "tolerance": 0.05},
+            {"across": 4, "engine": "matrix", "tolerance": 0.1},
         ),
     }
 

@@ -51,7 +51,7 @@ class Crease(Case):
         "gradient": ("consistent", "quadratic", "corrected"),
     }
     trials: ClassVar[Mapping[str, Trial]] = {
-        "to a stretch of 0.7": Trial({"stretch": 0.7}, {"across": 9}),
+        "to a stretch of 0.7": Trial({"stretch": 0.7}, {"across": 8, "transits": 15.0}),
         "to a stretch of 0.45": Trial(brief={"across": 9, "transits": 20.0}),
     }
 

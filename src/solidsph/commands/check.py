@@ -23,6 +23,7 @@ from solidsph.errors import SceneError
 
 @click.command()
 @click.argument("name", metavar="[PLUGIN]", required=False)
+@click.option("--all", "everything", is_flag=True, help="Every installed part, or all of a kind.")
 @click.option("--kind", help="Kind of part, where parts of several kinds have the name.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A part's parameter.")
 @scheme_options
@@ -32,6 +33,7 @@ from solidsph.errors import SceneError
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
 def check(
     name: str | None,
+    everything: bool,
     kind: str | None,
     settings: tuple[str, ...],
     stretch: str,
@@ -43,11 +45,17 @@ def check(
     """Certify a part by name: the conformance kit that every built-in part passes. Or a scheme, by
     the waves of its lattice: zero-energy and growing ones, critical step, wave speeds."""
     scheme = SchemeOptions(**options)
+    if everything:
+        if name is not None or scheme.given:
+            raise SceneError("--all checks every part; leave out the name and the scheme's options")
+        _conform_all(kind, as_json)
+        return
     if name is None:
         if not scheme.given and dimension is None and stretch == "1":
             raise SceneError(
-                "there is nothing to check; name a part, such as `solidsph check cubic-spline`, or "
-                "a scheme, such as `solidsph check --scheme SCENE` or `--kernel NAME --cover 3`"
+                "there is nothing to check; name a part, such as `solidsph check cubic-spline`, "
+                "all of them with --all, or a scheme, such as `solidsph check --scheme SCENE` or "
+                "`--kernel NAME --cover 3`"
             )
         _certify(scheme, settings, stretch, dimension or 2, confirm, as_json)
         return
@@ -122,6 +130,61 @@ def _conform(name: str, kind: str | None, settings: tuple[str, ...], as_json: bo
         say("certified" if good else f"NOT certified: {count} of {len(results)} checks failed")
     if not good:
         raise SystemExit(1)
+
+
+def _conform_all(kind: str | None, as_json: bool) -> None:
+    """A badge for every part: how many of its checks it passes."""
+    from solidsph.testing import conformance, example_part, kits
+
+    rows: list[dict[str, Any]] = []
+    for one in kits() if kind is None else [_kind(kind)]:
+        for name in registry.names(one):
+            entry = registry.find(one, name)
+            results = conformance(one, example_part(one, name))
+            failed = [result.name for result in results if not result.passed]
+            rows.append(
+                {
+                    "kind": registry.singular(one),
+                    "part": name,
+                    "distribution": f"{entry.distribution} {entry.version}",
+                    "passed": len(results) - len(failed),
+                    "checks": len(results),
+                    "failed": failed,
+                }
+            )
+    good = not any(row["failed"] for row in rows)
+    if as_json:
+        show_json({"passed": good, "parts": rows})
+    else:
+        show_table(
+            "conformance",
+            ["kind", "part", "distribution", "", "checks", "failed"],
+            [
+                [
+                    row["kind"],
+                    row["part"],
+                    row["distribution"],
+                    "FAIL" if row["failed"] else "pass",
+                    f"{row['passed']} of {row['checks']}",
+                    ", ".join(row["failed"]),
+                ]
+                for row in rows
+            ],
+        )
+        say("all certified" if good else "NOT all certified")
+    if not good:
+        raise SystemExit(1)
+
+
+def _kind(word: str) -> str:
+    """A kind that has a kit, from its name or that of one part."""
+    from solidsph.testing import kits
+
+    found = [one for one in kits() if word in (one, registry.singular(one))]
+    if not found:
+        known = ", ".join(registry.singular(one) for one in kits())
+        raise SceneError(f"unknown kind {word!r}; kinds with a kit: {known}")
+    return found[0]
 
 
 def _kind_of(name: str, kind: str | None) -> str:

@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 from solidsph.arrays import Array
 from solidsph.errors import SceneError
 from solidsph.simulation import Simulation
-from solidsph.studies.dispersion import LatticeResponse, lattice_response
+from solidsph.studies.dispersion import LatticeResponse, check_uniform, lattice_response
 from solidsph.studies.ellipticity import acoustic_tensors, least_stiffness
 from solidsph.studies.scheme import Scheme, deformation, stretched
 from solidsph.studies.spectrum import spectrum
@@ -156,7 +156,8 @@ def certificate(
 
     Raises:
         SceneError: a stretch is not positive, or the block of particles would be too large.
-        BuildError: parts of the scheme do not fit each other.
+        BuildError: parts of the scheme do not fit each other, or no neighbours are left.
+        SolidsphError: a part depends on the body as a whole.
     """
     stretches = _checked(dimension, stretch)
     response, simulation_step, rate = _response(scheme, stretches)
@@ -324,7 +325,9 @@ def _response(scheme: Scheme, stretches: Sequence[float]) -> tuple[LatticeRespon
     bodies = simulation.setting.bodies
     rate = sum(effect.damping_rate(bodies) for effect in simulation.effects.values())
     state = stretched(simulation, stretches)
-    return lattice_response(simulation.dynamics, state), simulation.step_size, rate
+    response = lattice_response(simulation.dynamics, state)
+    check_uniform(simulation.dynamics, state, response)
+    return response, simulation.step_size, rate
 
 
 def _mean_stress(scheme: Scheme, F: Array) -> float:

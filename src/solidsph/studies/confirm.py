@@ -33,6 +33,12 @@ _STEPS = 60
 _MOVING = {1: 24, 2: 14, 3: 8}
 
 
+def _advanced(simulation: Simulation, state: State, step: float) -> State:
+    # At the surface of the outer layers the state may be no state at all; they are held.
+    with np.errstate(all="ignore"):
+        return simulation.integrator.advance(state, simulation.dynamics, step)
+
+
 def measured_growth(certificate: Certificate) -> float:
     """Rate at which the certificate's fastest growing wave grows in a run [1/transit].
 
@@ -44,13 +50,16 @@ def measured_growth(certificate: Certificate) -> float:
     wave = certificate.growing[0]
     duration = _FOLDINGS / wave.growth_rate  # [transits]
     # No wave is faster than the material's, by as much as the stretch stiffens it: half as much.
+    # But fast growth is over before any has gone a spacing, while a particle feels others as far as
+    # it reaches at once, and theirs a little later.
     layers = ceil(1.5 * duration * max(1.0, *certificate.stretches))
+    layers += certificate.scheme.depth(min(certificate.stretches))
     simulation, start = _block(certificate, layers)
     # A hundred steps, or what is stable: the scheme's own error is then (0.04)^2 / 24 and less.
     step = min(0.25 * certificate.critical_step, 0.01 * duration) * certificate.scheme.transit
     state, first = _begun(certificate, simulation, start, wave, step)
     for _ in range(ceil(duration * certificate.scheme.transit / step)):
-        state = simulation.integrator.advance(state, simulation.dynamics, step)
+        state = _advanced(simulation, state, step)
     last = _amplitude(certificate, simulation, start, state, wave)
     return log(last / first) / (state.time - start.time) * certificate.scheme.transit
 
@@ -65,7 +74,7 @@ def amplification(certificate: Certificate, part: float) -> float:
     state, first = _begun(certificate, simulation, start, still, step)
     largest = first
     for _ in range(_STEPS):
-        state = simulation.integrator.advance(state, simulation.dynamics, step)
+        state = _advanced(simulation, state, step)
         deviation = state.positions - start.positions
         largest = max(largest, float(np.abs(deviation).max()) / certificate.scheme.spacing)
         if largest > 1e-2:  # beyond, nothing is linear any more
@@ -108,7 +117,8 @@ def _begun(
         velocities=simulation.dynamics.carry(start.time, rate * deviation),
     )
     first = _amplitude(certificate, simulation, start, begun, wave)
-    return simulation.integrator.start(begun, simulation.dynamics, step), first
+    with np.errstate(all="ignore"):
+        return simulation.integrator.start(begun, simulation.dynamics, step), first
 
 
 def _amplitude(

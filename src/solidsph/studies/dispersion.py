@@ -18,8 +18,11 @@ from numpy.typing import NDArray
 from solidsph.arrays import Array
 from solidsph.dynamics import Dynamics
 from solidsph.errors import SolidsphError
-from solidsph.particles import State
+from solidsph.particles import Particles, State
 from solidsph.studies.spectrum import RELATIVE_STEP
+
+# Beside the largest derivative: differences leave 1e-11 of it.
+_UNIFORM = 1e-7
 
 # Wave vectors times particles that answer, at a time: complex numbers of 16 bytes.
 _PHASES = 1 << 22
@@ -97,10 +100,7 @@ def lattice_response(dynamics: Dynamics, state: State) -> LatticeResponse:
             few that the surface reaches the middle.
     """
     particles = dynamics.particles
-    X = particles.positions
-    middle = int(np.argmin(np.linalg.norm(X - 0.5 * (X.min(axis=0) + X.max(axis=0)), axis=1)))
-    spacing = float(particles.spacings[middle])
-    exact = (X - X[middle]) / spacing
+    middle, spacing, exact = _middle(particles)
     places = np.rint(exact).astype(np.int64)
     # A lattice is placed to rounding; a jitter worth the name moves its particles farther.
     if np.abs(exact - places).max() > 1e-6:
@@ -108,9 +108,17 @@ def lattice_response(dynamics: Dynamics, state: State) -> LatticeResponse:
             "the particles do not stand in rows one spacing apart, so waves have no wave vector; "
             "take a 'lattice' whose spacing divides the body, or `spectrum`"
         )
-    blocks = _blocks(dynamics, state, middle, spacing)
-    answering = np.any(blocks != 0.0, axis=(1, 2))
+    # At a surface the state may be no state at all: only what reaches the middle must be one.
+    with np.errstate(all="ignore"):
+        blocks = _columns(dynamics, state, middle, spacing, particles.dimension)
+    finite = np.all(np.isfinite(blocks), axis=(1, 2))
+    answering = np.any(blocks != 0.0, axis=(1, 2)) & finite
     found = LatticeResponse(places[answering], blocks[answering])
+    if np.any(np.abs(places[~finite]).max(axis=1, initial=0) <= found.reach):
+        raise SolidsphError(
+            "forces about this state are not finite; take a stretch at which the scheme and the "
+            "material have a response"
+        )
     depth = int(min(-places.min(axis=0).max(), places.max(axis=0).min()))
     # A particle that answers to the middle one looks as far to its other side.
     if 2 * found.reach >= depth:
@@ -123,12 +131,47 @@ def lattice_response(dynamics: Dynamics, state: State) -> LatticeResponse:
     return found
 
 
-def _blocks(dynamics: Dynamics, state: State, moved: int, spacing: float) -> Array:
-    """Derivative of all accelerations by the position of one particle, (n, d, d) [1/s^2]."""
+def check_uniform(dynamics: Dynamics, state: State, response: LatticeResponse) -> None:
+    """That a particle beside the middle is answered like the middle one.
+
+    Raises:
+        SolidsphError: it is not, so what is found from one particle does not hold for the others.
+    """
+    _, spacing, exact = _middle(dynamics.particles)
+    places = np.rint(exact).astype(np.int64)
+    beside = np.zeros(places.shape[1], dtype=np.int64)
+    beside[0] = 1
+    other = int(np.flatnonzero(np.all(places == beside, axis=1))[0])
+    with np.errstate(all="ignore"):
+        found = _columns(dynamics, state, other, spacing, 1)[:, :, 0]
+    index = {tuple(place): k for k, place in enumerate(places.tolist())}
+    shifted = found[[index[tuple(place)] for place in (response.places + beside).tolist()]]
+    expected = response.blocks[:, :, 0]
+    error = float(np.abs(shifted - expected).max() / np.abs(expected).max())
+    if not error <= _UNIFORM:
+        raise SolidsphError(
+            f"two particles of the lattice are answered differently, by {error:.1e}: a part "
+            "depends on the body as a whole, or on where it stands, so waves have no wave vector; "
+            "take `spectrum` of a body, or another gradient: of one that wraps another the inner "
+            "one, which it is on a lattice"
+        )
+
+
+def _middle(particles: Particles) -> tuple[int, float, Array]:
+    """The particle nearest to the middle, its spacing [m], and from it all in spacings (n, d)."""
+    X = particles.positions
+    middle = int(np.argmin(np.linalg.norm(X - 0.5 * (X.min(axis=0) + X.max(axis=0)), axis=1)))
+    spacing = float(particles.spacings[middle])
+    return middle, spacing, (X - X[middle]) / spacing
+
+
+def _columns(dynamics: Dynamics, state: State, moved: int, spacing: float, axes: int) -> Array:
+    """Derivative of all accelerations by the position of one particle along the first axes,
+    (n, d, axes) [1/s^2]."""
     h = RELATIVE_STEP * spacing
     rest = np.zeros_like(state.velocities)
     columns = []
-    for axis in range(state.positions.shape[1]):
+    for axis in range(axes):
         values = []
         for k in (-2, -1, 1, 2):
             positions = state.positions.copy()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import ceil
+from math import floor
 
 import attrs
 import numpy as np
@@ -30,6 +30,9 @@ _MATERIAL = {
 
 # Transits of a spacing: so many steps that rounding them to a whole number does not show.
 _LONG = 1e4
+
+# In spacings: by rounding, a particle so far beyond the support may count as a neighbour.
+_EDGE = 1e-9
 
 # Particles of a block beyond which a certificate would take many minutes, and gigabytes.
 _MOST_PARTICLES = 120_000
@@ -107,9 +110,9 @@ class Scheme:
         # Forces from stresses, stresses from gradients: two supports. In the current configuration
         # volumes by the crowding of neighbours are a third, and stretch moves neighbours.
         if self.formulation.configuration is Configuration.REFERENCE:
-            reach = 2 * (ceil(self.cover) - 1) + 2 * bool(self.effects)
+            reach = 2 * floor(self.cover + _EDGE) + 2 * bool(self.effects)
         else:
-            reach = 3 * (ceil(self.cover / min(1.0, least_stretch)) - 1)
+            reach = 3 * floor(self.cover / min(1.0, least_stretch) + _EDGE)
         return 2 * max(reach, 1) + 1
 
     def simulation(

@@ -12,7 +12,7 @@ from solidsph.arrays import Array, Mask
 from solidsph.errors import BuildError
 from solidsph.interfaces.formulation import Configuration
 from solidsph.studies.certificate import GROWS
-from solidsph.studies.dispersion import dispersion
+from solidsph.studies.dispersion import check_uniform, dispersion, lattice_response
 from solidsph.studies.scheme import Scheme, stretched
 
 
@@ -43,6 +43,8 @@ def stability_map(
     for row, cover in enumerate(covers):
         wider = attrs.evolve(scheme, cover=cover)
         simulation = wider.simulation(1, [wider.depth(min(1.0, *stretches))])
+        start = stretched(simulation, [1.0])
+        check_uniform(simulation.dynamics, start, lattice_response(simulation.dynamics, start))
         limit = scheme.integrator.stability_limit / simulation.step_size
         for column, stretch in enumerate(stretches):
             uniform = stretched(simulation, [stretch])

@@ -18,6 +18,9 @@ from solidsph.studies.stability_map import StabilityMap
 # Steps beyond so many CFL steps are told apart no longer.
 _LARGEST_FACTOR = 5.0
 
+# And faster growth than this, which neighbours about to be lost have, neither.
+_LARGEST_RATE = 10.0
+
 
 def draw_growth(
     maps: Mapping[str, StabilityMap], path: Path, *, title: str, mark: tuple[float, str]
@@ -63,7 +66,7 @@ def draw_certificates(maps: Mapping[str, StabilityMap], path: Path, *, title: st
 
 def _growth_row(axes: np.ndarray, maps: Mapping[str, StabilityMap]) -> ScalarMappable:
     largest = max(float(np.nanmax(one.rates)) for one in maps.values())
-    norm = LogNorm(GROWS, max(largest, 10.0 * GROWS))
+    norm = LogNorm(GROWS, min(max(largest, 10.0 * GROWS), _LARGEST_RATE))
     for axis, (name, one) in zip(axes, maps.items(), strict=True):
         shown = np.where(one.grows, one.rates, np.nan)
         mesh: ScalarMappable = axis.pcolormesh(
@@ -103,7 +106,10 @@ def _finish(figure: Figure, axes: np.ndarray, mesh: ScalarMappable, title: str, 
         framealpha=1.0,
     )
     figure.colorbar(
-        mesh, ax=axes, label="growth rate of the fastest mode [1 / transit of a spacing]"
+        mesh,
+        ax=axes,
+        extend="max" if mesh.norm.vmax == _LARGEST_RATE else "neither",
+        label="growth rate of the fastest mode [1 / transit of a spacing]",
     )
     figure.suptitle(title, fontsize=11)
     path.parent.mkdir(parents=True, exist_ok=True)
