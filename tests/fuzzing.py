@@ -7,6 +7,7 @@ import signal
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import deepcopy
 from typing import Any
 
 import tomli_w
@@ -163,7 +164,7 @@ def _spoil(table: dict[str, Any], chance: random.Random) -> None:
     if kind < 0.15:
         del holder[key]
     elif kind < 0.3 and isinstance(holder, dict):
-        holder[chance.choice(WORDS)] = chance.choice([*VALUES, *PARTS])
+        holder[chance.choice(WORDS)] = deepcopy(chance.choice([*VALUES, *PARTS]))
     elif kind < 0.4 and isinstance(holder, dict):
         holder[chance.choice(WORDS)] = holder.pop(key)
     elif kind < 0.55:
@@ -176,7 +177,7 @@ def _spoil(table: dict[str, Any], chance: random.Random) -> None:
     elif isinstance(holder[key], float) and kind < 0.9:
         holder[key] *= chance.choice((-1.0, 1e-9, 1e-3, 0.1, 3.0, 1e3, 1e9))
     else:
-        holder[key] = chance.choice(VALUES)
+        holder[key] = deepcopy(chance.choice(VALUES))
 
 
 def _places(value: Any) -> Iterator[tuple[Any, Any]]:

@@ -232,3 +232,19 @@ def test_no_scene_in_a_record_runs_code(tmp_path: Path, records: dict[str, bytes
     path.write_bytes(records["killed"].replace(old, new))
     with pytest.raises(BuildError, match="is not allowed"):
         resume(path)
+
+
+@pytest.mark.parametrize("value", ["1" + "0" * 400, "-1" + "0" * 30, "inf", "nan"])
+def test_numbers_without_end(value: str) -> None:
+    """A whole number that no double holds is refused; one that a double holds is a number."""
+    text = SCENE_TOML.replace('{x = "1e3*min(t/0.005, 1)"}', f"{{x = {value}}}")
+    assert text != SCENE_TOML
+    expected = "built" if value.endswith("0" * 30) and len(value) < 40 else "refused"
+    assert tried(text.encode(), SECONDS) == expected
+
+
+def test_a_cover_beyond_all_use_is_refused() -> None:
+    with pytest.raises(BuildError, match=r"cover must not exceed 50, got 3000"):
+        Simulation.builder(
+            Scene.from_toml(SCENE_TOML.replace("cover = 3.0", "cover = 3e3"))
+        ).build()

@@ -40,7 +40,9 @@ def session(
         from solidsph.results.checkpointer import Checkpointer
         from solidsph.results.recorder import Recorder  # brings the file library with it
 
-        heard.append(Checkpointer(checkpoint_path(record), is_resumed=since is not None))
+        # Carried out from the first state, a run has no use for a checkpoint of another.
+        goes_on = since is not None and since.state is not None
+        heard.append(Checkpointer(checkpoint_path(record), is_resumed=goes_on))
         heard.append(Recorder(record, since))
     for listener in heard:
         simulation.manager.register(listener)

@@ -102,7 +102,7 @@ class Recorder:
             earlier=() if earlier is None else _steps(earlier, self._kept_until),
             notes=() if self._since is None else self._since.notes,
         )
-        if earlier is not None and observation.state.time < writer.last_time:
+        if earlier is not None and observation.state.time <= writer.last_time:
             self._recorded = Record(self._path)
         return writer
 
