@@ -145,12 +145,12 @@ def test_check_takes_a_cases_scheme_with_hourglass_control_added(tmp_path: Path)
 
 def test_stability_draws_a_map(tmp_path: Path) -> None:
     arguments = ("--gradient", "difference", "--divergence", "plain", "--points", "6", "4")
-    done = solidsph("stability", "--map", *arguments, "--output", "map.png", "--json", cwd=tmp_path)
+    done = solidsph("stability", "--map", *arguments, "--output", "maps", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     total, updated = json.loads(done.stdout)["maps"]
     assert total["unstable_in_tension"] == total["unstable_in_compression"] == 0.0
     assert updated["unstable_in_tension"] > 0.5
-    assert (tmp_path / "map.png").stat().st_size > 20_000
+    assert (tmp_path / "maps/map.png").stat().st_size > 20_000
 
 
 def test_write_a_cases_scenes_and_run_one(tmp_path: Path) -> None:
@@ -185,7 +185,6 @@ def test_write_a_cases_scenes_and_run_one(tmp_path: Path) -> None:
         (("check", "--cover", "3", "--stretch", "wide"), "is no number"),
         (("check", "--cover", "0.5"), "too small in 2D"),
         (("check", "--cover", "3", "--set", "a=1"), "name one"),
-        (("stability",), "Missing option '--map'"),
         (("plot", "absent.h5"), "absent.h5"),
         (("plot", "pull.toml"), "pull.toml"),
     ],

@@ -244,7 +244,7 @@ def test_numbers_without_end(value: str) -> None:
 
 
 def test_a_cover_beyond_all_use_is_refused() -> None:
-    with pytest.raises(BuildError, match=r"cover must not exceed 50, got 3000"):
+    with pytest.raises(BuildError, match=r"cover must not exceed 100, got 3000"):
         Simulation.builder(
             Scene.from_toml(SCENE_TOML.replace("cover = 3.0", "cover = 3e3"))
         ).build()

@@ -27,7 +27,7 @@ from solidsph.where import AXES, EVERYWHERE
 _TOUCHING = 1e-6
 
 # No kernel is of use so wide, and its pairs would fill any memory.
-MOST_COVER = 50.0
+MOST_COVER = 100.0
 
 
 def numbers(scene: Scene) -> Iterator[str]:
