@@ -103,6 +103,7 @@ def section(name: str, repeats: int, page: Path | None) -> Iterator[str]:
     draw_frontier(made, priced.title, picture)
     if page is not None:
         kept = page.with_suffix("") / picture.name
+        kept.parent.mkdir(parents=True, exist_ok=True)
         copied(picture, kept)
         yield f"![{name}]({kept.parent.name}/{kept.name})\n"
     yield table("The front", made, default)
