@@ -10,11 +10,11 @@ from matplotlib.ticker import ScalarFormatter
 
 from solidsph.results.pictures import largest_principal
 from solidsph.results.record import Record
+from solidsph_builtin.cases._energy import total_energy
 from solidsph_builtin.cases._field_picture import show_field
 from solidsph_builtin.cases.elastic_spin import (
     ANGULAR_VELOCITY,
     angular_momentum,
-    energy,
     smallest_distance,
 )
 
@@ -36,7 +36,7 @@ def draw_spin(record: Record, title: str, path: Path) -> None:
     body.set_aspect("equal")
     figure.colorbar(mesh, ax=body, location="bottom", label="largest principal Cauchy stress [MPa]")
 
-    momentum, total = angular_momentum(record), energy(record)
+    momentum, total = angular_momentum(record), total_energy(record)
     rows = (
         ("angular momentum\n(L - L$_0$) / L$_0$", momentum / momentum[0] - 1.0),
         ("energy\n(E - E$_0$) / E$_0$", total / total[0] - 1.0),

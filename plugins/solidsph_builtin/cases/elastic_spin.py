@@ -18,6 +18,7 @@ from solidsph.parameters import check_positive, number
 from solidsph.results.record import Record
 from solidsph.scene import Scene
 from solidsph_builtin.cases._compare import FINISHED
+from solidsph_builtin.cases._energy import total_energy
 from solidsph_builtin.cases._scheme import check_count, with_scheme
 
 SIDE = 1.0  # [m]
@@ -152,22 +153,9 @@ def angular_momentum(record: Record) -> Array:
     return result
 
 
-def energy(record: Record) -> Array:
-    """Kinetic, strain and, where there is one, the hourglass control's, (t,) [J per metre]."""
-    total: Array = np.sum(
-        [
-            values
-            for name, values in record.history.items()
-            if name.endswith("energy [J]") and not name.startswith("energy residual")
-        ],
-        axis=0,
-    )
-    return total
-
-
 def energy_drift(record: Record) -> float:
     """Change of the energy along the straight line that fits it best, over its start [-]."""
-    total = energy(record)
+    total = total_energy(record)
     times = record.times - record.times.mean()
     slope = float(times @ total / (times @ times))
     return slope * float(np.ptp(record.times)) / float(total[0])

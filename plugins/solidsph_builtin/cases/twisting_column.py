@@ -47,11 +47,22 @@ class TwistingColumn(Case):
         "gradient": ("quadratic", "corrected"),
     }
     trials: ClassVar[Mapping[str, Trial]] = {
-        f"{rate:g} rad/s, nu {nu:g}": Trial(
-            {"rate": rate, "poissons_ratio": nu, **more}, {"across": 4, "duration": 0.05}
-        )
-        for nu in (0.45, 0.495)
-        for rate, more in ((30.0, {}), (105.0, {}), (200.0, {}), (400.0, _FAST))
+        **{
+            f"{rate:g} rad/s, nu {nu:g}": Trial(
+                {"rate": rate, "poissons_ratio": nu}, {"across": 4, "duration": 0.05}
+            )
+            for nu in (0.45, 0.495)
+            for rate in (30.0, 105.0, 200.0)
+        },
+        "400 rad/s, nu 0.495": Trial(
+            {"rate": 400.0, "poissons_ratio": 0.495, **_FAST}, {"across": 4, "duration": 0.05}
+        ),
+        "400 rad/s, nu 0.45": Trial(
+            {"rate": 400.0, "poissons_ratio": 0.45, **_FAST},
+            {"across": 4, "time_step_factor": 0.1},
+            known="corners are faster than waves, and the run diverges even at a tenth of the "
+            "step; 200 rad/s come through",
+        ),
     }
 
     across: int = 6  # particles along each side of the square
@@ -97,7 +108,7 @@ class TwistingColumn(Case):
                 poissons_ratio=self.poissons_ratio,
                 density=DENSITY,
             )
-            .boundary("clamp", where="back")
+            .boundary("clamp", where="front")
             .initial(velocity={"x": f"-{profile}*Y", "y": f"{profile}*X"})
             .integrator(self.integrator, time_step_factor=self.time_step_factor)
             .duration(self.duration)

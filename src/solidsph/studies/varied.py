@@ -67,6 +67,10 @@ class Varied(Case):
             scenes[name] = scene
         return scenes
 
+    @property
+    def resolution(self) -> float:
+        return self.of.resolution  # no word changes a spacing
+
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         return self.of.measure(records)
 
