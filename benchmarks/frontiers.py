@@ -178,7 +178,10 @@ def by_search(case: Case, made: Frontier, accuracy: float) -> str:
 
     found = search(case, case.sweep, Accuracy(accuracy), run)
     cheapest = made.cheapest(accuracy)
-    grid = sum(point.time for point in made.points if isfinite(point.time))
+    grid, spent = (
+        sum(point.time for point in points if isfinite(point.time))
+        for points in (made.points, found.tried)
+    )
     if found.point is None:
         return f"A search for {100.0 * accuracy:g} % finds nothing: {found.sure}.\n"
     beside = (
@@ -189,7 +192,7 @@ def by_search(case: Case, made: Frontier, accuracy: float) -> str:
     return (
         f"A search for {100.0 * accuracy:g} % finds {found.point.label()}: "
         f"{100.0 * found.point.error:.2g} % in {found.point.time:.2g} s, {beside}, with "
-        f"{100.0 * found.spent / grid:.0f} % of the run time of the grid. {found.sure}.\n"
+        f"{100.0 * spent / grid:.0f} % of the run time of the grid. {found.sure}.\n"
     )
 
 

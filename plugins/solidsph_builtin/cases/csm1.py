@@ -35,9 +35,9 @@ class Csm1(Case):
     }
 
     clamp: str = "arc"  # or "straight", whose reference is our own
-    across: int = 9  # particles across the beam
+    across: int = 5  # particles across the beam
     kernel: str = "cubic-spline"
-    cover: float = number(default=2.6)  # [spacings]
+    cover: float = number(default=3.0)  # [spacings]
     gradient: str = "consistent"
     hourglass: float = number(default=0.0)  # strength [-]; 0 names none
     engine: str = "auto"
