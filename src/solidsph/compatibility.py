@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.arrays import Mask
+from solidsph.body import Body
 from solidsph.interfaces.condition import (
     ForceCondition,
     MotionCondition,
@@ -18,6 +19,7 @@ from solidsph.interfaces.condition import (
     SurfaceLoad,
 )
 from solidsph.interfaces.formulation import Formulation
+from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.shape import Shape
 from solidsph.particles import Particles
 from solidsph.scene import Scene
@@ -77,6 +79,21 @@ def statics(scene: Scene) -> Iterator[str]:
                 f"statics: {name} is named, but an equilibrium is found without moving in time; "
                 "leave it out, or leave out [statics]"
             )
+
+
+def history(bodies: Sequence[Body], scene: Scene, labels: Collection[str]) -> Iterator[str]:
+    """What remembers is moved in time, and its account has its name."""
+    for body in bodies:
+        if not isinstance(body.material, HistoryMaterial):
+            continue
+        if scene.statics is not None:
+            yield (
+                f"body {body.name!r}: {type(body.material).__name__} remembers what has been, and "
+                "[statics] finds equilibria without a past; leave out [statics], load slowly and "
+                "add 'mass-damping'"
+            )
+        if "history" in labels:
+            yield "the label 'history' is that of what materials remember; choose another"
 
 
 def names(bodies: Mapping[str, Particles]) -> Iterator[str]:

@@ -139,6 +139,22 @@ class MatrixForces(InternalForces):
                 all_operators.append(matrices)
         for condition in self.conditions:
             condition.impose_stress(time, stress)
+        return self._spread(all_operators, stress)
+
+    def gradients(self, displacements: Array) -> Array:
+        n, d = displacements.shape
+        H = np.empty((n, d, d))
+        for part in self.parts:
+            own = displacements[part.body.extent]
+            H[part.body.extent] = np.moveaxis(_gradient(part.operators(own), own), -1, 0)
+        return H
+
+    def spread(self, displacements: Array, stress: Array) -> Array:
+        own = [part.operators(displacements[part.body.extent]) for part in self.parts]
+        return self._spread(own, stress)
+
+    def _spread(self, all_operators: Sequence[Operators], stress: Array) -> Array:
+        d, _, n = stress.shape
         for part in self.parts:
             if not part.body.formulation.divergence.uses_ghost_stress:
                 stress[:, :, part.body.extent][:, :, part.body.particles.ghosts] = 0.0
@@ -175,10 +191,14 @@ class MatrixForces(InternalForces):
 
 
 def _deformation_gradient(body: Body, matrices: Operators, displacements: Array) -> Tensor:
+    return body.formulation.deformation_gradient(_gradient(matrices, displacements))
+
+
+def _gradient(matrices: Operators, displacements: Array) -> Array:
+    """H (d, d, n)."""
     n, d = displacements.shape
     along = (matrices.gradient @ displacements).reshape(d, n, d)
-    H = along.transpose(2, 0, 1)  # H[i][k] = du_i / dx_k
-    return body.formulation.deformation_gradient(H)
+    return along.transpose(2, 0, 1)  # H[i][k] = du_i / dx_k
 
 
 def _without_ghosts(F: Tensor, ghosts: Mask) -> Tensor:
