@@ -5,7 +5,7 @@ An effect may refuse a dimension or a formulation; it must not refuse all of the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import product
 from typing import Any
 
@@ -30,6 +30,9 @@ _FORMS = ("total-lagrangian", "updated-lagrangian")
 _MATERIAL = {"youngs_modulus": 1e6, "poissons_ratio": 0.3, "density": 1000.0}
 _SPEED = 37.0  # of its confined wave [m/s]
 
+# After so many, whatever remembers has something to remember.
+_FIRST_STEPS = 4
+
 # Sums that cancel pair by pair leave 1e-16; where a force is itself a small difference of large
 # terms, as hourglass control's on a smooth motion, 1e-12 of it.
 _CANCELLATION = 1e-11
@@ -41,6 +44,7 @@ class _Sample:
 
     simulation: Simulation
     rng: np.random.Generator
+    memory: Mapping[str, Array]  # of the body's first steps
 
     @property
     def condition(self) -> ForceCondition:
@@ -61,22 +65,25 @@ class _Sample:
     def forces(self, positions: Array, velocities: Array, time: float = 1e-3) -> Array:
         """On all particles, (n, d) [N]."""
         found = np.zeros_like(positions)
-        found[self.condition.particles] = self.condition.forces(time, positions, velocities)
+        force, _ = self.condition.advance(time, 0.0, positions, velocities, self.memory)
+        found[self.condition.particles] = force
         return found
 
 
 @made_once
-def _simulations(effect: Effect) -> list[Simulation]:
-    """Every body that is not refused.
+def _simulations(effect: Effect) -> list[tuple[Simulation, Mapping[str, Array]]]:
+    """Every body that is not refused, and what it remembers of its first steps.
 
     Raises:
         SceneError: all of them are.
     """
-    found: list[Simulation] = []
+    found: list[tuple[Simulation, Mapping[str, Array]]] = []
     refusals: list[str] = []
     for d, form in product(DIMENSIONS, _FORMS):
         try:
-            found.append(_scene(d, form).effect(effect, label=_LABEL).build())
+            made = _scene(d, form).effect(effect, label=_LABEL).build()
+            begun = made.time_loop().advance(made.start(), _FIRST_STEPS)
+            found.append((made, begun.memory))
         except (BuildError, SceneError) as refusal:
             refusals.append(f"{d}D, {form}: {refusal}")
     if not found:
@@ -86,7 +93,10 @@ def _simulations(effect: Effect) -> list[Simulation]:
 
 def _samples(effect: Effect) -> list[_Sample]:
     """The bodies, each with the same random numbers for every check."""
-    return [_Sample(one, np.random.default_rng(k)) for k, one in enumerate(_simulations(effect))]
+    return [
+        _Sample(one, np.random.default_rng(k), memory)
+        for k, (one, memory) in enumerate(_simulations(effect))
+    ]
 
 
 def _scene(d: int, form: str) -> Builder:
