@@ -76,6 +76,7 @@ class Assembly:
         handlers = self._labelled("boundaries", scene.boundaries)
         effects: dict[str, Effect] = self._labelled("effects", scene.effects)
         shapes, sets, materials = self._body_parts()
+        problems.add(compatibility.effects(effects))
         problems.stop_if_any()
 
         problems.add(compatibility.dimensions(shapes, scene.cover))
@@ -111,6 +112,8 @@ class Assembly:
         initial = problems.attempt(self._initial_state, particles)
         chosen_engine = problems.settled(engine)
         internal = problems.attempt(chosen_engine.prepare, setting.bodies, stresses, steps)
+        for effect in effects.values() if internal is not None else ():
+            internal = problems.attempt(effect.within, internal, setting, stresses) or internal
         problems.add(compatibility.history(made, scene, self._labels))
         problems.stop_if_any()
         remembered = [body for body in made if isinstance(body.material, HistoryMaterial)]

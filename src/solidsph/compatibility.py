@@ -18,6 +18,7 @@ from solidsph.interfaces.condition import (
     StressCondition,
     SurfaceLoad,
 )
+from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.shape import Shape
@@ -94,6 +95,17 @@ def history(bodies: Sequence[Body], scene: Scene, labels: Collection[str]) -> It
             )
         if "history" in labels:
             yield "the label 'history' is that of what materials remember; choose another"
+
+
+def effects(named: Mapping[str, Effect]) -> Iterator[str]:
+    """Nothing acts across what another effect parts."""
+    parting = [label for label, one in named.items() if one.parts_neighbours]
+    joining = [label for label, one in named.items() if one.joins_neighbours]
+    if parting and joining:
+        yield (
+            f"{parting[0]!r} parts neighbours, and {joining[0]!r} acts between them whether or not "
+            "they are parted; leave one of the two out"
+        )
 
 
 def names(bodies: Mapping[str, Particles]) -> Iterator[str]:

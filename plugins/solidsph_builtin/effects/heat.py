@@ -60,6 +60,7 @@ class Heat(Effect):
     """
 
     conserves_momentum: ClassVar[bool] = True
+    joins_neighbours: ClassVar[bool] = True
 
     conductivity: float = number()  # k [W/(m K)]
     heat_capacity: float = number()  # c per mass [J/(kg K)]

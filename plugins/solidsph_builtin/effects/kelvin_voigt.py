@@ -34,6 +34,7 @@ class KelvinVoigt(Effect):
     """
 
     conserves_momentum: ClassVar[bool] = True
+    joins_neighbours: ClassVar[bool] = True
 
     time: float = number()  # retardation time [s]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import attrs
 
@@ -32,6 +32,9 @@ class StressFields:
 
 class InternalForces(ABC):
     """The forces that bodies exert on themselves, as a function of where their particles are."""
+
+    advances_histories: ClassVar[bool] = False
+    """Whether it asks materials that remember itself."""
 
     @property
     @abstractmethod

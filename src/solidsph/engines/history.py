@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import ClassVar, final
 
 import attrs
 import numpy as np
@@ -77,7 +77,8 @@ def remembering(
     internal: InternalForces, bodies: Sequence[Body], conditions: Sequence[StressCondition]
 ) -> InternalForces:
     """Forces that also advance what the bodies' materials remember, where there are such."""
-    if not any(isinstance(body.material, HistoryMaterial) for body in bodies):
+    asked = internal.advances_histories
+    if asked or not any(isinstance(body.material, HistoryMaterial) for body in bodies):
         return internal
     return HistoryForces(internal, tuple(internal.law(body) for body in bodies), tuple(conditions))
 
@@ -86,6 +87,8 @@ def remembering(
 @attrs.frozen(eq=False)
 class HistoryForces(InternalForces):
     """The sums are the engine's; the law comes between its two passes."""
+
+    advances_histories: ClassVar[bool] = True
 
     sums: InternalForces
     laws: Sequence[Law]

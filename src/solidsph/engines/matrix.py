@@ -47,6 +47,11 @@ def operators(body: Body, pairs: Pairs, crowding: Array | float = 1.0) -> Operat
     cells, volumes = body.particles.cells * crowding, body.particles.volumes * crowding
     gradient = body.formulation.gradient.weights(pairs, kernel_gradients, cells)
     force = body.formulation.divergence.weights(pairs, gradient, volumes)
+    return assembled(pairs, gradient, force)
+
+
+def assembled(pairs: Pairs, gradient: Array, force: Array) -> Operators:
+    """The matrices of the weights (m, d) of a gradient and of the divergence."""
     axes = range(gradient.shape[1])
     return Operators(
         gradient=csr_array(vstack([pairs.matrix(gradient[:, k]) for k in axes], format="csr")),
@@ -205,6 +210,14 @@ def _without_ghosts(F: Tensor, ghosts: Mask) -> Tensor:
     one = identity(F)
     axes = range(len(F))
     return tuple(tuple(np.where(ghosts, one[i][k], F[i][k]) for k in axes) for i in axes)
+
+
+def fixed_forces(
+    bodies: Sequence[Body], constant: Sequence[Operators], conditions: Sequence[StressCondition]
+) -> MatrixForces:
+    """Internal forces of bodies by matrices that are given."""
+    parts = [_FixedBody(body, own) for body, own in zip(bodies, constant, strict=True)]
+    return MatrixForces(parts, conditions, sum(part.tally.pairs for part in parts))
 
 
 @final

@@ -14,6 +14,7 @@ import numpy as np
 
 from solidsph.arrays import Array
 from solidsph.builder import Builder
+from solidsph.engines.engine import InternalForces
 from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.condition import ForceCondition
 from solidsph.interfaces.effect import Effect
@@ -45,6 +46,7 @@ class _Sample:
     simulation: Simulation
     rng: np.random.Generator
     memory: Mapping[str, Array]  # of the body's first steps
+    engines: list[InternalForces] = attrs.field(factory=list)  # the plain one, once it is asked for
 
     @property
     def condition(self) -> ForceCondition:
@@ -67,7 +69,27 @@ class _Sample:
         found = np.zeros_like(positions)
         force, _ = self.condition.advance(time, 0.0, positions, velocities, self.memory)
         found[self.condition.particles] = force
+        if self.acts_within:
+            found += self.internal(time, positions) - self.plain(time, positions)
         return found
+
+    @property
+    def acts_within(self) -> bool:
+        """Whether the effect changes the internal forces."""
+        (effect,) = self.simulation.effects.values()
+        return type(effect).within is not Effect.within
+
+    def internal(self, time: float, positions: Array) -> Array:
+        """Internal forces as the effect lets them act, (n, d) [N]."""
+        u = positions - self.positions
+        return self.simulation.dynamics.internal.advance(time, 0.0, u, self.memory)[0]
+
+    def plain(self, time: float, positions: Array) -> Array:
+        """Internal forces without it, (n, d) [N]."""
+        if not self.engines:
+            prepare = self.simulation.engine.prepare
+            self.engines.append(prepare(self.simulation.setting.bodies, ()))
+        return self.engines[0].forces(time, positions - self.positions)
 
 
 @made_once
@@ -309,9 +331,19 @@ def _damping(sample: _Sample) -> float:
 
 
 def _stiffness(sample: _Sample) -> float:
-    """Largest square of an angular frequency about rest [1/s^2]."""
+    """Largest square of an angular frequency about rest [1/s^2]: of the effect's own forces, or
+    how much it raises that of the internal ones."""
     x, tiny = sample.positions, 1e-4 * _SPACING
     still = np.zeros_like(x)
+    if sample.acts_within:
+        with_it, without = (
+            -np.linalg.eigvals(_derivative(sample, one, tiny)).real.min()
+            for one in (
+                lambda u: sample.internal(0.0, x + u),
+                lambda u: sample.plain(0.0, x + u),
+            )
+        )
+        return float(with_it - without)
     matrix = _derivative(sample, lambda u: sample.forces(x + u, still), tiny)
     return float(-np.linalg.eigvals(matrix).real.min())
 

@@ -25,6 +25,7 @@ TYPICAL: Mapping[str, Any] = {
     "seed": 1,
     "prony": [{"share": 0.4, "time": 1e-2}, {"share": 0.2, "time": 1.0}],  # [-], [s]
     "time": 1e-5,  # [s]
+    "critical_stretch": 4e-4,  # [-]
     "conductivity": 50.0,  # [W/(m K)]
     "heat_capacity": 500.0,  # [J/(kg K)]
     "expansion": 1e-4,  # [1/K]
