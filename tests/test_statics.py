@@ -404,7 +404,7 @@ class Springs(ForceCondition):
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         return -self.constant * (positions - self.positions)
 
-    def stiffness(self, displacements: Array) -> csr_array | None:
+    def stiffness(self, displacements: Array, time: float) -> csr_array | None:
         return csr_array(self.constant * diags_array(np.ones(displacements.size)))
 
     def report(self, observation: Observation) -> Mapping[str, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import exp, sqrt
 from typing import Any, ClassVar
 
@@ -38,6 +38,7 @@ from solidsph.interfaces.condition import (
     StressCondition,
 )
 from solidsph.interfaces.formulation import Configuration
+from solidsph.interfaces.history import History
 from solidsph.interfaces.shape import Surface
 from solidsph.neighbours import Pairs
 from solidsph.particles import Particles
@@ -57,6 +58,7 @@ from solidsph.testing import checks, conformance, example_part, examples, kits
 from solidsph_builtin.boundaries.ghost_extension import Extension, GhostExtension
 from solidsph_builtin.discretisations.lattice import Lattice
 from solidsph_builtin.materials.neo_hookean import NeoHookean
+from solidsph_builtin.materials.viscoelastic import Viscoelastic
 from solidsph_builtin.shapes.box import Box
 
 # Kernels, each wrong in one respect
@@ -294,7 +296,89 @@ class Softening(GoodMaterial):
         return scale(-1.0, GoodMaterial.tangent(F, dF, params))
 
 
+class GoodMemory(Viscoelastic):
+    """One Maxwell element beside a neo-Hookean spring."""
+
+    def __init__(self) -> None:
+        super().__init__([(0.5, 1e-2)], 1e6, 0.3, 1000.0)
+
+
+class BornOld(GoodMemory):
+    def initial_history(self, dimension: int) -> Mapping[str, float]:
+        return dict.fromkeys(super().initial_history(dimension), 1e-3)
+
+
+class StressOfTheVirgin(GoodMemory):
+    @staticmethod
+    def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:
+        return Viscoelastic.first_piola(F, params)
+
+
+class GivesBack(GoodMemory):
+    @staticmethod
+    def dissipated(history: History) -> Scalar:
+        return -history[-1]
+
+
+class Silent(GoodMemory):
+    @staticmethod
+    def dissipated(history: History) -> Scalar:
+        return 0.0 * history[-1]
+
+
+class RemembersDirections(GoodMemory):
+    """Its viscous strain follows the left Cauchy-Green tensor, which turns with the body."""
+
+    @staticmethod
+    def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
+        return Viscoelastic.advance(transpose(F), history, step, params)
+
+
+class TurnedMemory(GoodMemory):
+    @staticmethod
+    def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:
+        return transpose(Viscoelastic.stress(F, history, params))
+
+
+class FlatMemory(GoodMemory):
+    """Relaxes sooner where dimensions are missing."""
+
+    @staticmethod
+    def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
+        return Viscoelastic.advance(F, history, step * 3.0 / len(F), params)
+
+
+class Hasty(GoodMemory):
+    rate_dependent: ClassVar[bool] = False
+
+
+class MemoryOfArraysOnly(GoodMemory):
+    @staticmethod
+    def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
+        return tuple(
+            one * np.ones(F.shape[2]) for one in Viscoelastic.advance(F, history, step, params)
+        )
+
+
+def test_the_memory_that_the_wrong_ones_differ_from_passes() -> None:
+    assert failed("materials", GoodMemory()) == set()
+
+
+MEMORIES = [
+    (BornOld, {"virgin state"}),
+    (StressOfTheVirgin, {"stress with history"}),
+    (GivesBack, {"dissipation"}),
+    (Silent, {"energy balance"}),
+    (RemembersDirections, {"objectivity of history"}),
+    (TurnedMemory, {"angular momentum of history"}),
+    (FlatMemory, {"missing dimensions of history"}),
+    (Hasty, {"rate dependence"}),
+    (MemoryOfArraysOnly, {"pointwise history"}),
+]
+
+
 MATERIALS = [
+    *MEMORIES,
     (TurnedStress, {"stress measures"}),
     (Softening, {"ellipticity"}),
     (WrongStress, {"stress"}),

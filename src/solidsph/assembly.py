@@ -18,6 +18,7 @@ from solidsph import compatibility, registry
 from solidsph.body import Body
 from solidsph.dynamics import Dynamics
 from solidsph.engines.engine import Engine
+from solidsph.engines.history import HistoryFields, remembering
 from solidsph.engines.select import engine_named
 from solidsph.errors import SceneError
 from solidsph.interfaces.condition import (
@@ -30,6 +31,7 @@ from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.gradient import Gradient
+from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.material import Material
@@ -74,6 +76,7 @@ class Assembly:
         handlers = self._labelled("boundaries", scene.boundaries)
         effects: dict[str, Effect] = self._labelled("effects", scene.effects)
         shapes, sets, materials = self._body_parts()
+        problems.add(compatibility.effects(effects))
         problems.stop_if_any()
 
         problems.add(compatibility.dimensions(shapes, scene.cover))
@@ -109,7 +112,13 @@ class Assembly:
         initial = problems.attempt(self._initial_state, particles)
         chosen_engine = problems.settled(engine)
         internal = problems.attempt(chosen_engine.prepare, setting.bodies, stresses, steps)
+        for effect in effects.values() if internal is not None else ():
+            internal = problems.attempt(effect.within, internal, setting, stresses) or internal
+        problems.add(compatibility.history(made, scene, self._labels))
         problems.stop_if_any()
+        remembered = [body for body in made if isinstance(body.material, HistoryMaterial)]
+        if remembered:
+            conditions.append(HistoryFields(remembered, particles.count))
 
         return Simulation(
             scene=scene,
@@ -117,7 +126,7 @@ class Assembly:
             dynamics=Dynamics(
                 particles=particles,
                 masses=setting.masses,
-                internal=problems.settled(internal),
+                internal=remembering(problems.settled(internal), made, stresses),
                 motions=motions,
                 loads=forces,
             ),

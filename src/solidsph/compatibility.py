@@ -11,13 +11,16 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.arrays import Mask
+from solidsph.body import Body
 from solidsph.interfaces.condition import (
     ForceCondition,
     MotionCondition,
     StressCondition,
     SurfaceLoad,
 )
+from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Formulation
+from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.shape import Shape
 from solidsph.particles import Particles
 from solidsph.scene import Scene
@@ -77,6 +80,32 @@ def statics(scene: Scene) -> Iterator[str]:
                 f"statics: {name} is named, but an equilibrium is found without moving in time; "
                 "leave it out, or leave out [statics]"
             )
+
+
+def history(bodies: Sequence[Body], scene: Scene, labels: Collection[str]) -> Iterator[str]:
+    """What remembers is moved in time, and its account has its name."""
+    for body in bodies:
+        if not isinstance(body.material, HistoryMaterial):
+            continue
+        if scene.statics is not None:
+            yield (
+                f"body {body.name!r}: {type(body.material).__name__} remembers what has been, and "
+                "[statics] finds equilibria without a past; leave out [statics], load slowly and "
+                "add 'mass-damping'"
+            )
+        if "history" in labels:
+            yield "the label 'history' is that of what materials remember; choose another"
+
+
+def effects(named: Mapping[str, Effect]) -> Iterator[str]:
+    """Nothing acts across what another effect parts."""
+    parting = [label for label, one in named.items() if one.parts_neighbours]
+    joining = [label for label, one in named.items() if one.joins_neighbours]
+    if parting and joining:
+        yield (
+            f"{parting[0]!r} parts neighbours, and {joining[0]!r} acts between them whether or not "
+            "they are parted; leave one of the two out"
+        )
 
 
 def names(bodies: Mapping[str, Particles]) -> Iterator[str]:

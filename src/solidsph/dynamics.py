@@ -7,6 +7,7 @@ conditions, each called only for what its type can do.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import attrs
 import numpy as np
@@ -21,6 +22,8 @@ from solidsph.interfaces.condition import (
 )
 from solidsph.particles import Particles, State
 
+_NOTHING: Mapping[str, Array] = MappingProxyType({})
+
 
 @attrs.frozen(eq=False)
 class Response:
@@ -28,6 +31,7 @@ class Response:
 
     accelerations: Array  # (n, d) [m/s^2]
     applied: Mapping[str, Array]  # by account: force that it exerts on every particle, (n, d) [N]
+    memory: Mapping[str, Array]  # what parts remember of the step, by names of theirs
 
 
 @attrs.frozen(eq=False)
@@ -63,17 +67,30 @@ class Dynamics:
             motion.impose(time, 1, carried)
         return carried
 
-    def respond(self, time: float, positions: Array, velocities: Array) -> Response:
+    def respond(
+        self,
+        time: float,
+        positions: Array,
+        velocities: Array,
+        step: float = 0.0,
+        memory: Mapping[str, Array] = _NOTHING,
+    ) -> Response:
         """Accelerations, and the force that each imposed part exerts on every particle.
+
+        An integrator asks once a step, at its end, with its length `step` [s] and the `memory` of
+        the state before it; what the response remembers belongs into that of the next state.
 
         Free degrees of freedom follow f = m a. Held ones follow the imposed motion, and what is
         missing of m a is the reaction; ghosts have no mass, so theirs balances the force on them.
         """
-        internal = self.internal.forces(time, positions - self.particles.positions)
+        displacements = positions - self.particles.positions
+        internal, kept = self.internal.advance(time, step, displacements, memory)
+        remembered = dict(kept)
         applied = {c.label: np.zeros_like(positions) for c in (*self.loads, *self.motions)}
         total = internal.copy()
         for load in self.loads:
-            force = load.forces(time, positions, velocities)
+            force, kept = load.advance(time, step, positions, velocities, memory)
+            remembered |= kept
             applied[load.label][load.particles] += force
             total[load.particles] += force
         for motion in self.motions:
@@ -90,11 +107,12 @@ class Dynamics:
             missing = self.masses[:, None] * accelerations - total
         for motion, held in zip(self.motions, self.held, strict=True):
             applied[motion.label] += np.where(held, missing, 0.0)
-        return Response(accelerations, applied)
+        return Response(accelerations, applied, remembered)
 
     def observe(self, state: State) -> Observation:
         """The state with its deformation, stress and energy."""
-        fields = self.internal.fields(state.positions - self.particles.positions)
+        displacements = state.positions - self.particles.positions
+        fields = self.internal.observed(displacements, state.memory)
         return Observation(
             state=state,
             particles=self.particles,
@@ -102,4 +120,5 @@ class Dynamics:
             deformation_gradients=fields.deformation_gradients,
             stresses=fields.stresses,
             energy_densities=fields.energy_densities,
+            dissipated_densities=fields.dissipated_densities,
         )

@@ -60,6 +60,7 @@ class HourglassControl(Effect):
     """
 
     conserves_momentum: ClassVar[bool] = True
+    joins_neighbours: ClassVar[bool] = True
 
     strength: float = number(default=0.5)  # [-] times the shear modulus
 

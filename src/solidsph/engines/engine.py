@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, ClassVar
 
 import attrs
 
@@ -15,6 +15,7 @@ from solidsph.interfaces.condition import StressCondition
 
 if TYPE_CHECKING:
     from solidsph.dynamics import Dynamics
+    from solidsph.engines.history import Law
     from solidsph.interfaces.integrator import Integrator
     from solidsph.time_loop import TimeLoop
 
@@ -26,10 +27,14 @@ class StressFields:
     deformation_gradients: Array  # (n, d, d) F [-]
     stresses: Array  # (n, d, d) first Piola-Kirchhoff stress P [Pa]
     energy_densities: Array  # (n,) psi [J/m^3]
+    dissipated_densities: Array | None = None  # (n,) [J/m^3], where a material dissipates
 
 
 class InternalForces(ABC):
     """The forces that bodies exert on themselves, as a function of where their particles are."""
+
+    advances_histories: ClassVar[bool] = False
+    """Whether it asks materials that remember itself."""
 
     @property
     @abstractmethod
@@ -43,6 +48,43 @@ class InternalForces(ABC):
     @abstractmethod
     def fields(self, displacements: Array) -> StressFields:
         """Deformation, stress and energy at the same displacements, for reports and records."""
+
+    @abstractmethod
+    def gradients(self, displacements: Array) -> Array:
+        """H = Grad u of displacements, or of any vector field (n, d), (n, d, d).
+
+        This and `spread` are the two passes of `forces`, for a law that comes between them.
+        """
+
+    @abstractmethod
+    def spread(self, displacements: Array, stress: Array) -> Array:
+        """Forces (n, d) [N] of a stress (d, d, n) [Pa] at these displacements.
+
+        `stress` is the formulation's flux; it may be written on.
+        """
+
+    def law(self, body: Body) -> Law:
+        """How the material of a body is asked for its stress between the two passes."""
+        from solidsph.engines.history import ArrayLaw  # which knows what forces are
+
+        return ArrayLaw(body)
+
+    def advance(
+        self, time: float, step: float, displacements: Array, memory: Mapping[str, Array]
+    ) -> tuple[Array, Mapping[str, Array]]:
+        """The forces at the end of a step, and what the bodies remember of it.
+
+        Args:
+            time: at its end [s].
+            step: its length [s]; 0 if none is made.
+            displacements: at its end, (n, d) [m].
+            memory: `State.memory` at its beginning.
+        """
+        return self.forces(time, displacements), {}
+
+    def observed(self, displacements: Array, memory: Mapping[str, Array]) -> StressFields:
+        """The fields of a state that has this memory."""
+        return self.fields(displacements)
 
     @property
     def tally(self) -> Sequence[Tally]:

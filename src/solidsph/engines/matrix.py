@@ -47,6 +47,11 @@ def operators(body: Body, pairs: Pairs, crowding: Array | float = 1.0) -> Operat
     cells, volumes = body.particles.cells * crowding, body.particles.volumes * crowding
     gradient = body.formulation.gradient.weights(pairs, kernel_gradients, cells)
     force = body.formulation.divergence.weights(pairs, gradient, volumes)
+    return assembled(pairs, gradient, force)
+
+
+def assembled(pairs: Pairs, gradient: Array, force: Array) -> Operators:
+    """The matrices of the weights (m, d) of a gradient and of the divergence."""
     axes = range(gradient.shape[1])
     return Operators(
         gradient=csr_array(vstack([pairs.matrix(gradient[:, k]) for k in axes], format="csr")),
@@ -139,6 +144,22 @@ class MatrixForces(InternalForces):
                 all_operators.append(matrices)
         for condition in self.conditions:
             condition.impose_stress(time, stress)
+        return self._spread(all_operators, stress)
+
+    def gradients(self, displacements: Array) -> Array:
+        n, d = displacements.shape
+        H = np.empty((n, d, d))
+        for part in self.parts:
+            own = displacements[part.body.extent]
+            H[part.body.extent] = np.moveaxis(_gradient(part.operators(own), own), -1, 0)
+        return H
+
+    def spread(self, displacements: Array, stress: Array) -> Array:
+        own = [part.operators(displacements[part.body.extent]) for part in self.parts]
+        return self._spread(own, stress)
+
+    def _spread(self, all_operators: Sequence[Operators], stress: Array) -> Array:
+        d, _, n = stress.shape
         for part in self.parts:
             if not part.body.formulation.divergence.uses_ghost_stress:
                 stress[:, :, part.body.extent][:, :, part.body.particles.ghosts] = 0.0
@@ -175,16 +196,28 @@ class MatrixForces(InternalForces):
 
 
 def _deformation_gradient(body: Body, matrices: Operators, displacements: Array) -> Tensor:
+    return body.formulation.deformation_gradient(_gradient(matrices, displacements))
+
+
+def _gradient(matrices: Operators, displacements: Array) -> Array:
+    """H (d, d, n)."""
     n, d = displacements.shape
     along = (matrices.gradient @ displacements).reshape(d, n, d)
-    H = along.transpose(2, 0, 1)  # H[i][k] = du_i / dx_k
-    return body.formulation.deformation_gradient(H)
+    return along.transpose(2, 0, 1)  # H[i][k] = du_i / dx_k
 
 
 def _without_ghosts(F: Tensor, ghosts: Mask) -> Tensor:
     one = identity(F)
     axes = range(len(F))
     return tuple(tuple(np.where(ghosts, one[i][k], F[i][k]) for k in axes) for i in axes)
+
+
+def fixed_forces(
+    bodies: Sequence[Body], constant: Sequence[Operators], conditions: Sequence[StressCondition]
+) -> MatrixForces:
+    """Internal forces of bodies by matrices that are given."""
+    parts = [_FixedBody(body, own) for body, own in zip(bodies, constant, strict=True)]
+    return MatrixForces(parts, conditions, sum(part.tally.pairs for part in parts))
 
 
 @final

@@ -28,6 +28,7 @@ class Observation:
     deformation_gradients: Array  # (n, d, d) F [-]
     stresses: Array  # (n, d, d) first Piola-Kirchhoff stress P [Pa]
     energy_densities: Array  # (n,) psi [J/m^3]
+    dissipated_densities: Array | None = None  # (n,) by materials so far [J/m^3]
     # What several listeners need, made once by keys of theirs.
     made: dict[object, Any] = attrs.field(factory=dict, init=False, repr=False)
 
@@ -128,6 +129,23 @@ class ForceCondition(Condition):
     @abstractmethod
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         """Forces on these particles, (k, d) [N], from positions and velocities (n, d) of all."""
+
+    def advance(
+        self,
+        time: float,
+        step: float,
+        positions: Array,
+        velocities: Array,
+        memory: Mapping[str, Array],
+    ) -> tuple[Array, Mapping[str, Array]]:
+        """The forces at the end of a step, and what is to be remembered of it.
+
+        What remembers overrides this: it reads `memory`, that of the state before the step, under
+        names that begin with its label, and returns under them what the next step will read. Where
+        nothing is there yet, the run begins. `step` is the length of the step [s]; 0 if none is
+        made, and then nothing may change.
+        """
+        return self.forces(time, positions, velocities), {}
 
 
 class SurfaceLoad(ForceCondition):

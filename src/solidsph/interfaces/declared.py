@@ -219,6 +219,6 @@ class MismatchForce(ForceCondition):
         blocks = [MismatchProducts.of(one.mismatch).matrix() for one in self.operators]
         return csr_array(block_diag(blocks, format="csr"))
 
-    def stiffness(self, displacements: Array) -> csr_array:
+    def stiffness(self, displacements: Array, time: float) -> csr_array:
         """Minus the derivative of the force, (d n, d n), particle by particle."""
         return csr_array(kron(self.matrix, np.eye(displacements.shape[1]), format="csr"))

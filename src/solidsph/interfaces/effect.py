@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from solidsph.body import Body
-from solidsph.interfaces.condition import ForceCondition
+from solidsph.interfaces.condition import ForceCondition, StressCondition
 from solidsph.setting import Setting
+
+if TYPE_CHECKING:
+    from solidsph.engines.engine import InternalForces
 
 
 class Effect(ABC):
@@ -19,6 +22,12 @@ class Effect(ABC):
 
     conserves_momentum: ClassVar[bool] = False
     """Whether its forces on a free body, and their moments, add up to zero whatever the motion."""
+
+    parts_neighbours: ClassVar[bool] = False
+    """Whether neighbours may come to act on each other no more."""
+
+    joins_neighbours: ClassVar[bool] = False
+    """Whether it acts between the neighbours of the start, come what may."""
 
     @abstractmethod
     def bind(self, setting: Setting, label: str) -> ForceCondition:
@@ -39,6 +48,19 @@ class Effect(ABC):
     @abstractmethod
     def stiffness_rate(self, bodies: Sequence[Body]) -> float:
         """Angular frequency that its stiffness adds at most [rad/s]; 0 if none."""
+
+    def within(
+        self, internal: InternalForces, setting: Setting, conditions: Sequence[StressCondition]
+    ) -> InternalForces:
+        """The internal forces as the effect lets them act: itself, unless it changes how bodies act
+        on themselves.
+
+        Args:
+            internal: by the scene's engine, or by an effect before this one.
+            setting: the bodies.
+            conditions: what changes the stress before forces are formed.
+        """
+        return internal
 
     def pair_work(self, particles: float, pairs: float) -> float:
         """Pairs that an evaluation of its forces visits, by what the cost of a run is estimated.

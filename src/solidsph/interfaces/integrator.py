@@ -61,7 +61,7 @@ class PointwiseIntegrator(Integrator):
         return state.begun(
             accelerations=a,
             applied=response.applied,
-            memory={MEAN_VELOCITY: state.velocities - 0.5 * step_size * a},
+            memory={**response.memory, MEAN_VELOCITY: state.velocities - 0.5 * step_size * a},
         )
 
     def advance(self, state: State, dynamics: Dynamics, step_size: float) -> State:
@@ -74,12 +74,12 @@ class PointwiseIntegrator(Integrator):
         # Only what was imposed: the difference of positions would bring their rounding back.
         h = h + (positions - free) / step_size
         predicted = dynamics.carry(time, self.arrive(h, a, step_size))
-        response = dynamics.respond(time, positions, predicted)
+        response = dynamics.respond(time, positions, predicted, step_size, state.memory)
         return state.advanced(
             time=time,
             positions=positions,
             velocities=dynamics.carry(time, self.arrive(h, response.accelerations, step_size)),
             accelerations=response.accelerations,
             applied=response.applied,
-            memory={**state.memory, MEAN_VELOCITY: h},
+            memory={**state.memory, **response.memory, MEAN_VELOCITY: h},
         )

@@ -9,7 +9,8 @@ import numpy as np
 from solidsph.interfaces.condition import Condition, Observation, StoringCondition
 
 KINETIC, STRAIN, RESIDUAL = "kinetic energy [J]", "strain energy [J]", "energy residual [J]"
-"""Columns of every record."""
+DISSIPATED = "dissipated energy [J]"
+"""Columns of every record; what is dissipated only where a material dissipates."""
 
 
 def kinetic_energy(observation: Observation) -> float:
@@ -28,6 +29,12 @@ def strain_energy(observation: Observation) -> float:
     return found
 
 
+def dissipated_energy(observation: Observation) -> float | None:
+    """Sum of V d over the particles [J]; None where no material dissipates."""
+    lost = observation.dissipated_densities
+    return None if lost is None else float(observation.particles.volumes @ lost)
+
+
 def ledger(
     observation: Observation, initial: float, conditions: Sequence[Condition] = ()
 ) -> Mapping[str, float]:
@@ -36,12 +43,14 @@ def ledger(
     Of several bodies also what each has, and what `conditions` store in each.
     """
     kinetic, strain = kinetic_energy(observation), strain_energy(observation)
+    lost = dissipated_energy(observation)
     work = observation.state.work
     return {
         KINETIC: kinetic,
         STRAIN: strain,
+        **({} if lost is None else {DISSIPATED: lost}),
         **{f"work of {name} [J]": value for name, value in work.items()},
-        RESIDUAL: kinetic + strain - initial - sum(work.values()),
+        RESIDUAL: kinetic + strain + (lost or 0.0) - initial - sum(work.values()),
         **_by_body(observation, conditions),
     }
 

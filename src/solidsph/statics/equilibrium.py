@@ -197,7 +197,7 @@ class _Newton:
         if not (missing.any() or self._imbalance(forces).any()):
             return u, tuple(residuals)
         for _ in range(self.max_iterations):
-            correction = self._correction(u, ahead, missing, forces)
+            correction = self._correction(u, ahead, missing, forces, self.path.time(factor))
             u, ahead = self._advanced(u, missing, factor, correction)
             missing = self.path.placed(u, factor) - u
             forces = self.path.forces(u, factor)
@@ -212,10 +212,10 @@ class _Newton:
         )
 
     def _correction(
-        self, u: Array, ahead: Array | None, missing: Array, forces: Forces
+        self, u: Array, ahead: Array | None, missing: Array, forces: Forces, time: float
     ) -> _Correction:
         """Newton's change of the free displacements, with `missing` (n, d) imposed too."""
-        matrix = self.tangent.matrix(u, ahead)
+        matrix = self.tangent.matrix(u, ahead, time)
         reduced = self.freedoms.reduced(matrix)
         self.iterations += 1
         moved = np.abs(u[self.freedoms.free])

@@ -121,11 +121,14 @@ class Tangent:
             simulation.dynamics.loads,
         )
 
-    def matrix(self, displacements: Array, ahead: Array | None = None) -> csr_array:
+    def matrix(
+        self, displacements: Array, ahead: Array | None = None, time: float = 0.0
+    ) -> csr_array:
         """K, (d n, d n) [N/m], at displacements u = x - X (n, d) of all particles.
 
         Forces on ghosts and their displacements are among its rows and columns. `ahead` (n, d, d)
-        is added to the second Piola-Kirchhoff stress that turns with the body.
+        is added to the second Piola-Kirchhoff stress that turns with the body. Loads are those of
+        `time` [s].
         """
         if ahead is None:
             ahead = np.zeros((*displacements.shape, displacements.shape[1]))
@@ -136,7 +139,7 @@ class Tangent:
         total = parts[0] if len(parts) == 1 else csr_array(block_diag(parts, format="csr"))
         for load in self.loads:
             if isinstance(load, Stiff):
-                own = load.stiffness(displacements)
+                own = load.stiffness(displacements, time)
                 total = total if own is None else csr_array(total + own)
         return total
 

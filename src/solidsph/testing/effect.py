@@ -5,7 +5,7 @@ An effect may refuse a dimension or a formulation; it must not refuse all of the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import product
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from solidsph.arrays import Array
 from solidsph.builder import Builder
+from solidsph.engines.engine import InternalForces
 from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.condition import ForceCondition
 from solidsph.interfaces.effect import Effect
@@ -30,6 +31,9 @@ _FORMS = ("total-lagrangian", "updated-lagrangian")
 _MATERIAL = {"youngs_modulus": 1e6, "poissons_ratio": 0.3, "density": 1000.0}
 _SPEED = 37.0  # of its confined wave [m/s]
 
+# After so many, whatever remembers has something to remember.
+_FIRST_STEPS = 4
+
 # Sums that cancel pair by pair leave 1e-16; where a force is itself a small difference of large
 # terms, as hourglass control's on a smooth motion, 1e-12 of it.
 _CANCELLATION = 1e-11
@@ -41,6 +45,8 @@ class _Sample:
 
     simulation: Simulation
     rng: np.random.Generator
+    memory: Mapping[str, Array]  # of the body's first steps
+    engines: list[InternalForces] = attrs.field(factory=list)  # the plain one, once it is asked for
 
     @property
     def condition(self) -> ForceCondition:
@@ -61,22 +67,45 @@ class _Sample:
     def forces(self, positions: Array, velocities: Array, time: float = 1e-3) -> Array:
         """On all particles, (n, d) [N]."""
         found = np.zeros_like(positions)
-        found[self.condition.particles] = self.condition.forces(time, positions, velocities)
+        force, _ = self.condition.advance(time, 0.0, positions, velocities, self.memory)
+        found[self.condition.particles] = force
+        if self.acts_within:
+            found += self.internal(time, positions) - self.plain(time, positions)
         return found
+
+    @property
+    def acts_within(self) -> bool:
+        """Whether the effect changes the internal forces."""
+        (effect,) = self.simulation.effects.values()
+        return type(effect).within is not Effect.within
+
+    def internal(self, time: float, positions: Array) -> Array:
+        """Internal forces as the effect lets them act, (n, d) [N]."""
+        u = positions - self.positions
+        return self.simulation.dynamics.internal.advance(time, 0.0, u, self.memory)[0]
+
+    def plain(self, time: float, positions: Array) -> Array:
+        """Internal forces without it, (n, d) [N]."""
+        if not self.engines:
+            prepare = self.simulation.engine.prepare
+            self.engines.append(prepare(self.simulation.setting.bodies, ()))
+        return self.engines[0].forces(time, positions - self.positions)
 
 
 @made_once
-def _simulations(effect: Effect) -> list[Simulation]:
-    """Every body that is not refused.
+def _simulations(effect: Effect) -> list[tuple[Simulation, Mapping[str, Array]]]:
+    """Every body that is not refused, and what it remembers of its first steps.
 
     Raises:
         SceneError: all of them are.
     """
-    found: list[Simulation] = []
+    found: list[tuple[Simulation, Mapping[str, Array]]] = []
     refusals: list[str] = []
     for d, form in product(DIMENSIONS, _FORMS):
         try:
-            found.append(_scene(d, form).effect(effect, label=_LABEL).build())
+            made = _scene(d, form).effect(effect, label=_LABEL).build()
+            begun = made.time_loop().advance(made.start(), _FIRST_STEPS)
+            found.append((made, begun.memory))
         except (BuildError, SceneError) as refusal:
             refusals.append(f"{d}D, {form}: {refusal}")
     if not found:
@@ -86,7 +115,10 @@ def _simulations(effect: Effect) -> list[Simulation]:
 
 def _samples(effect: Effect) -> list[_Sample]:
     """The bodies, each with the same random numbers for every check."""
-    return [_Sample(one, np.random.default_rng(k)) for k, one in enumerate(_simulations(effect))]
+    return [
+        _Sample(one, np.random.default_rng(k), memory)
+        for k, (one, memory) in enumerate(_simulations(effect))
+    ]
 
 
 def _scene(d: int, form: str) -> Builder:
@@ -299,9 +331,19 @@ def _damping(sample: _Sample) -> float:
 
 
 def _stiffness(sample: _Sample) -> float:
-    """Largest square of an angular frequency about rest [1/s^2]."""
+    """Largest square of an angular frequency about rest [1/s^2]: of the effect's own forces, or
+    how much it raises that of the internal ones."""
     x, tiny = sample.positions, 1e-4 * _SPACING
     still = np.zeros_like(x)
+    if sample.acts_within:
+        with_it, without = (
+            -np.linalg.eigvals(_derivative(sample, one, tiny)).real.min()
+            for one in (
+                lambda u: sample.internal(0.0, x + u),
+                lambda u: sample.plain(0.0, x + u),
+            )
+        )
+        return float(with_it - without)
     matrix = _derivative(sample, lambda u: sample.forces(x + u, still), tiny)
     return float(-np.linalg.eigvals(matrix).real.min())
 

@@ -23,6 +23,14 @@ TYPICAL: Mapping[str, Any] = {
     "amplitude": 0.2,  # [-]
     "rate": 20.0,  # [1/s]
     "seed": 1,
+    "prony": [{"share": 0.4, "time": 1e-2}, {"share": 0.2, "time": 1.0}],  # [-], [s]
+    "time": 1e-5,  # [s]
+    "critical_stretch": 4e-4,  # [-]
+    "conductivity": 50.0,  # [W/(m K)]
+    "heat_capacity": 500.0,  # [J/(kg K)]
+    "expansion": 1e-4,  # [1/K]
+    "initial": "100*sin(4*X)",  # [K]
+    "pressure": "1e3*sin(300*t)",  # [Pa]
     # Shapes
     "length": 1.3,  # [m]
     "lengths": [1.2, 0.8],  # [m]
@@ -49,7 +57,7 @@ TYPICAL_OF_KIND: Mapping[tuple[str, str], Any] = {
 }
 
 # Fields with a default that a part cannot do without all the same.
-_OFFERED = ("positions",)
+_OFFERED = ("positions", "expansion", "initial")
 
 
 def example_part(kind: str, name: str, **parameters: Any) -> Any:

@@ -48,6 +48,13 @@ class _Spring(InternalForces):
         n, d = displacements.shape
         return StressFields(np.tile(np.eye(d), (n, 1, 1)), np.zeros((n, d, d)), np.zeros(n))
 
+    def gradients(self, displacements: Array) -> Array:
+        n, d = displacements.shape
+        return np.zeros((n, d, d))
+
+    def spread(self, displacements: Array, stress: Array) -> Array:
+        return np.zeros_like(displacements)
+
 
 @final
 @attrs.frozen(eq=False)

@@ -14,6 +14,7 @@ from solidsph.body import Body
 from solidsph.dynamics import Dynamics
 from solidsph.engines.compiled.blocks import STRIDE, group
 from solidsph.engines.compiled.chunks import weighted_chunks
+from solidsph.engines.compiled.history import CompiledLaw
 from solidsph.engines.compiled.loop import compiled_loop
 from solidsph.engines.compiled.moving import MovingBody, moving_body
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux, no_law
@@ -28,6 +29,7 @@ from solidsph.engines.compiled.shares import (
     thread_count,
 )
 from solidsph.engines.engine import Engine, InternalForces, StressFields
+from solidsph.engines.history import ArrayLaw, Law
 from solidsph.engines.matrix import MatrixEngine
 from solidsph.engines.tally import Tally, Way, vectors
 from solidsph.interfaces.condition import StressCondition
@@ -272,6 +274,25 @@ class CompiledForces(InternalForces):
                 extent = part.body.extent
                 part.spread(stress[:, :, extent], forces[extent])
         return forces
+
+    def gradients(self, displacements: Array) -> Array:
+        n, d = displacements.shape
+        H = np.zeros((n, d, d))
+        for part in self.parts:
+            part.gradient_of(displacements[part.body.extent], H[part.body.extent])
+        return H
+
+    def spread(self, displacements: Array, stress: Array) -> Array:
+        forces = np.empty(displacements.shape)
+        for part in self.parts:
+            part.spread(stress[:, :, part.body.extent], forces[part.body.extent])
+        return forces
+
+    def law(self, body: Body) -> Law:
+        try:
+            return CompiledLaw.of(body)
+        except NotCompilableError:
+            return ArrayLaw(body)
 
     def fields(self, displacements: Array) -> StressFields:
         n, d = displacements.shape

@@ -1,0 +1,131 @@
+"""A pressure that follows the surface it acts on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import final
+
+import attrs
+import numpy as np
+from scipy.sparse import block_diag, csr_array, diags_array, kron
+
+from solidsph.arrays import Array, Indices
+from solidsph.interfaces.boundary import BoundaryHandler
+from solidsph.interfaces.condition import Condition, Observation, SurfaceLoad
+from solidsph.motion import Component, VectorField
+from solidsph.particles import Face
+from solidsph.setting import Setting
+from solidsph.tensors import cofactor, components_first, particles_first
+from solidsph.where import Where
+from solidsph_builtin.boundaries.traction import surface_at
+from solidsph_builtin.effects._gradients import body_gradient, in_the_reference
+
+
+@final
+@attrs.frozen
+class Pressure(BoundaryHandler):
+    """f = -p cof(F) N A: force per current area, along the current normal (a follower load).
+
+    Nanson's formula, n da = cof(F) N dA, with F of the particle that owns the surface. The total
+    force is that of the deformed surface as the particles see it, so it turns with the body; a
+    pressure has no dead direction, and in general no energy.
+    """
+
+    where: Where  # a face such as "inner", or any condition that matches surface particles
+    pressure: Component  # p such as "5e6*min(t/1e-3, 1)", positive when it pushes [Pa]
+
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        particles = setting.particles
+        in_the_reference(setting, "pressure")
+        field = VectorField.of({"x": self.pressure}, "pressure: pressure")
+        face = surface_at(setting, self.where, "pressure")
+        field.values(0, particles.positions[face.particles], 0.0)
+        return [
+            FollowerLoad(
+                label=label,
+                particles=face.particles,
+                reference=particles.positions,
+                face=face,
+                field=field,
+                gradients=_gradients(setting, face.particles),
+            )
+        ]
+
+
+def _gradients(setting: Setting, chosen: Indices) -> Sequence[csr_array]:
+    """From displacements of all to their derivatives at the chosen, (k, n) along each axis."""
+    blocks = [body_gradient(body).matrices.gradient for body in setting.bodies]
+    d = setting.particles.dimension
+    found = []
+    for axis in range(d):
+        rows = [one[axis * one.shape[1] : (axis + 1) * one.shape[1]] for one in blocks]
+        found.append(csr_array(csr_array(block_diag(rows, format="csr"))[chosen]))
+    return found
+
+
+@final
+@attrs.frozen(eq=False)
+class FollowerLoad(SurfaceLoad):
+    """Pressure times current area on each surface particle."""
+
+    label: str
+    particles: Indices  # (k,)
+    reference: Array  # X (n, d)
+    face: Face
+    field: VectorField
+    gradients: Sequence[csr_array]  # along each axis, (k, n) [1/m]
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        p = self.field.values(0, self.reference[self.particles], time)
+        return -p[:, None] * self._areas(positions)
+
+    def _areas(self, positions: Array) -> Array:
+        return self._areas_of(self._deformation(positions))
+
+    def _deformation(self, positions: Array) -> Array:
+        """F (d, d, k) of the surface particles."""
+        u = positions - self.reference
+        H = np.stack([gradient @ u for gradient in self.gradients], axis=-1)
+        return components_first(H + np.eye(u.shape[1]))
+
+    def _areas_of(self, F: Array) -> Array:
+        """cof(F) N A, (k, d) [m^(d-1)]."""
+        cof = particles_first(cofactor(F), len(self.particles))
+        return np.asarray(np.einsum("kij,kj->ki", cof, self.face.area_vectors))
+
+    def stiffness(self, displacements: Array, time: float) -> csr_array:
+        """The symmetric part of K (d n, d n) [N/m]: all of it where the surface is closed, or its
+        edge held."""
+        n, d = displacements.shape
+        p = self.field.values(0, self.reference[self.particles], time)
+        F = self._deformation(self.reference + displacements)
+        chosen = csr_array(
+            (np.ones(len(p)), (self.particles, np.arange(len(p)))), shape=(n, len(p))
+        )
+        total = csr_array((d * n, d * n))
+        for i, j in product(range(d), repeat=2):
+            # cof is a polynomial of the second degree: these differences are exact.
+            step = np.zeros((d, d, 1))
+            step[i, j] = 1.0
+            change = 0.5 * (self._areas_of(F + step) - self._areas_of(F - step))
+            for k in range(d):
+                block = chosen @ (diags_array(p * change[:, k]) @ self.gradients[j])
+                place = np.zeros((d, d))
+                place[k, i] = 1.0
+                total = total + kron(block, place, format="csr")
+        return csr_array(0.5 * (total + total.T))
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        state = observation.state
+        p = self.field.values(0, self.reference[self.particles], state.time)
+        areas = self._areas(state.positions)
+        size = np.linalg.norm(areas, axis=1)
+        traction = np.einsum(
+            "kij,kj->ki", observation.stresses[self.particles], self.face.area_vectors
+        )
+        against = -float(np.sum(traction * areas / size[:, None]))
+        return {
+            f"{self.label} asked [Pa]": float(p @ size / size.sum()),
+            f"{self.label} achieved [Pa]": against / float(size.sum()),
+        }

@@ -1,0 +1,219 @@
+"""Internal forces of bodies whose bonds fail: pairs of neighbours that act no more."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, final
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array, Mask
+from solidsph.body import Body
+from solidsph.engines.engine import InternalForces, StressFields
+from solidsph.engines.history import HistoryForces, Law
+from solidsph.engines.matrix import MatrixForces, Operators, assembled, fixed_forces
+from solidsph.engines.tally import Tally
+from solidsph.interfaces.condition import StressCondition
+from solidsph.neighbours import Pairs
+
+# A moment that is I in a full neighbourhood, and half of it at a flat surface: where its least
+# direction has less than this, what is left of the neighbours determines no gradient.
+_LEAST_MOMENT = 0.25
+
+
+@attrs.frozen(eq=False)
+class Bonds:
+    """Pairs of neighbours of one body, and how far each may be stretched."""
+
+    body: Body
+    pairs: Pairs
+    kernel_gradients: Array  # (m, d)
+    critical_stretch: float  # [-]
+    may_fail: Mask  # (m,)
+    # (p, q) and (q, p) fail together: their stretches are the same to the bit.
+
+    @classmethod
+    def of(cls, body: Body, critical_stretch: float, chosen: Mask) -> Bonds:
+        """Those of a body; only bonds with both ends among the chosen particles (n,) may fail."""
+        pairs = body.pairs()
+        real = ~body.particles.ghosts & chosen
+        may = real[pairs.rows] & real[pairs.columns] & (pairs.distances > 0.0)
+        kernel_gradients = body.smoothing.gradient(pairs.offsets, pairs.distances)
+        return cls(body, pairs, kernel_gradients, critical_stretch, may)
+
+    @property
+    def name(self) -> str:
+        """Where they are in `State.memory`."""
+        return f"bonds of {self.body.name}"
+
+    @property
+    def bytes(self) -> int:
+        """Memory of the list, and of the flags."""
+        p = self.pairs
+        listed = (p.starts, p.rows, p.columns, p.offsets, p.distances, self.kernel_gradients)
+        return sum(one.nbytes for one in listed) + 9 * p.count
+
+    def whole(self) -> Array:
+        """Flags (m,) of bonds that have not failed: 1, and 0 for those that have."""
+        return np.ones(self.pairs.count)
+
+    def after(self, flags: Array, displacements: Array) -> Array:
+        """The flags at displacements (n, d): the same array if no bond has failed."""
+        u = displacements
+        p, q = self.pairs.rows, self.pairs.columns
+        now = self.pairs.offsets + u[q] - u[p]
+        limit = (1.0 + self.critical_stretch) * self.pairs.distances
+        fails = self.may_fail & (flags > 0.0) & (np.einsum("mi,mi->m", now, now) > limit**2)
+        if not fails.any():
+            return flags
+        left = np.where(fails, 0.0, flags)
+        while True:
+            alone = self._alone(left)
+            torn = (left > 0.0) & self.may_fail & (alone[p] | alone[q])
+            if not torn.any():
+                return left
+            left = np.where(torn, 0.0, left)
+
+    def _alone(self, flags: Array) -> Mask:
+        """Particles (n,) whose bonds that are left determine no gradient."""
+        weights = self.kernel_gradients * flags[:, None]
+        weights *= self.body.particles.cells[self.pairs.columns, None]
+        moments = self.pairs.row_sums(self.pairs.offsets[:, :, None] * weights[:, None, :])
+        touched = self.pairs.row_sums(flags) < np.diff(self.pairs.starts)
+        least = np.linalg.svd(moments, compute_uv=False)[:, -1]
+        return np.asarray(touched & (least < _LEAST_MOMENT))
+
+    def damage(self, flags: Array) -> Array:
+        """Part of each particle's bonds that have failed, (n,) [-]."""
+        own = np.diff(self.pairs.starts) - 1  # a particle is among its own neighbours
+        failed = self.pairs.row_sums(1.0 - flags)
+        return np.asarray(failed / np.maximum(own, 1))
+
+    def operators(self, flags: Array) -> Operators:
+        """Gradient and force matrices of the bonds that are left."""
+        body, pairs = self.body, self.pairs
+        alone = pairs.spread(self._alone(flags))
+        # A gradient that nothing determines is not asked for: such a particle stays unstrained.
+        acting = np.where(alone, 1.0, flags)[:, None] * self.kernel_gradients
+        gradient = body.formulation.gradient.weights(pairs, acting, body.particles.cells)
+        gradient = np.where(alone[:, None], 0.0, gradient)
+        force = body.formulation.divergence.weights(pairs, gradient, body.particles.volumes)
+        return assembled(pairs, gradient, force)
+
+
+@final
+@attrs.frozen(eq=False)
+class _Damaged(Law):
+    """A law of which damage leaves a part, P = (1 - D) P(F)."""
+
+    body: Body
+    own: Law
+    left: Array  # 1 - D (n,) [-]
+
+    def flux(self, H: Array, history: Array, step: float) -> tuple[Array, Array]:
+        stress, history = self.own.flux(H, history, step)
+        return stress * self.left, history
+
+
+@final
+@attrs.define(eq=False)
+class BreakingForces(InternalForces):
+    """Internal forces by the bonds that are left, and which those are.
+
+    Which have failed is in `State.memory`, with the energy that was in the strain they let go. The
+    matrices are kept until a bond fails, which changes no result.
+    """
+
+    advances_histories: ClassVar[bool] = True
+
+    bonds: Sequence[Bonds]
+    laws: Sequence[Law]
+    conditions: Sequence[StressCondition]
+    _flags: tuple[Array, ...] = ()
+    _sums: MatrixForces | None = None
+
+    @property
+    def pair_count(self) -> int:
+        return sum(one.pairs.count for one in self.bonds)
+
+    @property
+    def tally(self) -> Sequence[Tally]:
+        return self._of(tuple(one.whole() for one in self.bonds)).sums.tally
+
+    def forces(self, time: float, displacements: Array) -> Array:
+        return self.advance(time, 0.0, displacements, {})[0]
+
+    def advance(
+        self, time: float, step: float, displacements: Array, memory: Mapping[str, Array]
+    ) -> tuple[Array, Mapping[str, Array]]:
+        flags = self._remembered(memory)
+        kept = {one.name: own for one, own in zip(self.bonds, flags, strict=True)}
+        if step > 0.0:
+            after = tuple(
+                one.after(own, displacements[one.body.extent])
+                for one, own in zip(self.bonds, flags, strict=True)
+            )
+            if any(new is not old for new, old in zip(after, flags, strict=True)):
+                energies = [
+                    self._observed(one, displacements, memory).energy_densities
+                    for one in (flags, after)
+                ]
+                kept = {one.name: own for one, own in zip(self.bonds, after, strict=True)}
+                kept[_RELEASED] = self._released(memory, displacements) + energies[0] - energies[1]
+                flags = after
+        forces, histories = self._of(flags).advance(time, step, displacements, memory)
+        return forces, {**kept, **histories}
+
+    def fields(self, displacements: Array) -> StressFields:
+        return self.observed(displacements, {})
+
+    def observed(self, displacements: Array, memory: Mapping[str, Array]) -> StressFields:
+        found = self._observed(self._remembered(memory), displacements, memory)
+        dissipated = found.dissipated_densities
+        released = self._released(memory, displacements)
+        total = released if dissipated is None else dissipated + released
+        return attrs.evolve(found, dissipated_densities=total)
+
+    def _observed(
+        self, flags: tuple[Array, ...], displacements: Array, memory: Mapping[str, Array]
+    ) -> StressFields:
+        found = self._of(flags).observed(displacements, memory)
+        for one, own in zip(self.bonds, flags, strict=True):
+            left, extent = 1.0 - one.damage(own), one.body.extent
+            found.stresses[extent] *= left[:, None, None]
+            found.energy_densities[extent] *= left
+        return found
+
+    def gradients(self, displacements: Array) -> Array:
+        whole = tuple(one.whole() for one in self.bonds)
+        return self._of(whole).gradients(displacements)
+
+    def spread(self, displacements: Array, stress: Array) -> Array:
+        whole = tuple(one.whole() for one in self.bonds)
+        return self._of(whole).spread(displacements, stress)
+
+    def _remembered(self, memory: Mapping[str, Array]) -> tuple[Array, ...]:
+        return tuple(memory[one.name] if one.name in memory else one.whole() for one in self.bonds)
+
+    def _released(self, memory: Mapping[str, Array], displacements: Array) -> Array:
+        """Strain energy let go so far, (n,) [J/m^3]."""
+        return memory.get(_RELEASED, np.zeros(len(displacements)))
+
+    def _of(self, flags: tuple[Array, ...]) -> HistoryForces:
+        """The forces by these bonds."""
+        same = len(flags) == len(self._flags) and all(
+            new is old for new, old in zip(flags, self._flags, strict=True)
+        )
+        if self._sums is None or not same:
+            made = [one.operators(own) for one, own in zip(self.bonds, flags, strict=True)]
+            self._sums = fixed_forces([one.body for one in self.bonds], made, self.conditions)
+            self._flags = flags
+        laws = [
+            _Damaged(law.body, law, 1.0 - one.damage(own))
+            for law, one, own in zip(self.laws, self.bonds, flags, strict=True)
+        ]
+        return HistoryForces(self._sums, laws, self.conditions)
+
+
+_RELEASED = "energy released by bonds"

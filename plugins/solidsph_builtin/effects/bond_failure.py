@@ -1,0 +1,147 @@
+"""Fracture: bonds between neighbours fail when they are stretched too far."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, final
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array, Indices
+from solidsph.body import Body
+from solidsph.engines.engine import InternalForces
+from solidsph.engines.history import ArrayLaw
+from solidsph.errors import SceneError
+from solidsph.interfaces.condition import (
+    FieldCondition,
+    ForceCondition,
+    Observation,
+    StressCondition,
+)
+from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.gradient import PointwiseGradient
+from solidsph.parameters import check_positive, number
+from solidsph.setting import Setting
+from solidsph.where import Where
+from solidsph_builtin.effects._breaking import Bonds, BreakingForces
+from solidsph_builtin.effects._gradients import in_the_reference
+
+# What cracks add to the highest frequency of a lattice, in squares: one-sided corrections are
+# stiffer. Of bodies in rubble, 0.9 was the most that was found (`solidsph check bond-failure`).
+_RUBBLE = 1.0
+
+
+@final
+@attrs.frozen
+class BondFailure(Effect):
+    """Two neighbours whose distance exceeds (1 + critical_stretch) times that at the start no
+    longer act on each other, for good.
+
+    The kernel gradient of a failed pair is left out of both particles' sums, whose correction is
+    formed anew from what is left: Chakraborty & Shaw (2013), who let pseudo springs fail. A crack
+    is then a free surface to the gradient. A particle that has lost the part D of its bonds has the
+    energy (1 - D) psi(F): without that, what is left of its neighbours may see more strain than all
+    did, and a crack would feed on energy that nobody has spent. Where they determine no gradient
+    any more it loses its last bonds, and flies on without strain. Nothing keeps the two sides of a
+    crack from overlapping but 'contact'.
+
+    The energy that bonds let go is what they dissipate. It depends on the spacing, as the width of
+    the strip that a crack unloads does: choose the stretch for the spacing in use.
+    """
+
+    conserves_momentum: ClassVar[bool] = True
+    parts_neighbours: ClassVar[bool] = True
+
+    critical_stretch: float = number()  # [-]
+    where: Where = "all"  # particles between which bonds may fail
+
+    def __attrs_post_init__(self) -> None:
+        check_positive(
+            "bond-failure", "critical_stretch", self.critical_stretch, "parts of the first distance"
+        )
+
+    def bind(self, setting: Setting, label: str) -> ForceCondition:
+        return _Cracks(label, self._bonds(setting), setting.particles.count)
+
+    def within(
+        self, internal: InternalForces, setting: Setting, conditions: Sequence[StressCondition]
+    ) -> InternalForces:
+        if isinstance(internal, BreakingForces):
+            raise SceneError(
+                "bond-failure: it is named twice, and a bond fails once; give it one "
+                "critical_stretch, and places by `where`"
+            )
+        laws = [ArrayLaw(body) for body in setting.bodies]
+        return BreakingForces(self._bonds(setting), laws, conditions)
+
+    def arrays(self, setting: Setting) -> Mapping[str, int]:
+        return {f"bonds of {one.body.name}": one.bytes for one in self._bonds(setting)}
+
+    def damping_rate(self, bodies: Sequence[Body]) -> float:
+        return 0.0
+
+    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
+        return _RUBBLE * max(
+            2.0 * body.material.wave_speed / float(body.particles.spacings.min()) for body in bodies
+        )
+
+    def pair_work(self, particles: float, pairs: float) -> float:
+        return pairs
+
+    def _bonds(self, setting: Setting) -> Sequence[Bonds]:
+        in_the_reference(setting, "bond-failure")
+        chosen = np.zeros(setting.particles.count, dtype=np.bool_)
+        chosen[setting.select(self.where)] = True
+        found = []
+        for body in setting.bodies:
+            gradient = body.formulation.gradient
+            if not isinstance(gradient, PointwiseGradient):
+                raise SceneError(
+                    f"bond-failure: gradient {type(gradient).__name__} of body {body.name!r} is "
+                    "not formed particle by particle, so that what failed bonds leave cannot be "
+                    "corrected anew; use 'corrected'"
+                )
+            key = (BondFailure, self.critical_stretch, str(self.where))
+            if key not in body.made:
+                body.made[key] = Bonds.of(body, self.critical_stretch, chosen[body.extent])
+            found.append(body.made[key])
+        return found
+
+
+@final
+@attrs.frozen(eq=False)
+class _Cracks(FieldCondition, ForceCondition):
+    """Adds no force of its own; it shows what has failed."""
+
+    label: str
+    bonds: Sequence[Bonds]
+    count: int
+
+    @property
+    def particles(self) -> Indices:
+        return np.arange(0)
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return np.empty((0, positions.shape[1]))
+
+    def damage(self, observation: Observation) -> Array:
+        """Part of each particle's bonds that have failed, (n,) [-]."""
+        found, memory = np.zeros(self.count), observation.state.memory
+        for one in self.bonds:
+            if one.name in memory:
+                found[one.body.extent] = one.damage(memory[one.name])
+        return found
+
+    def fields(self, observation: Observation) -> Mapping[str, Array]:
+        return {"damage [-]": self.damage(observation)}
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        memory = observation.state.memory
+        failed = sum(
+            float(np.sum(1.0 - memory[one.name])) for one in self.bonds if one.name in memory
+        )
+        return {
+            f"{self.label} failed bonds [-]": failed / 2.0,
+            f"{self.label} largest damage [-]": float(self.damage(observation).max()),
+        }

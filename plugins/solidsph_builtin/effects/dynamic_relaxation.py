@@ -1,0 +1,129 @@
+"""Damping that finds the rate by which a body comes to rest soonest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import final
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array, Indices
+from solidsph.body import Body
+from solidsph.errors import SceneError
+from solidsph.interfaces.condition import ForceCondition, Observation
+from solidsph.interfaces.effect import Effect
+from solidsph.parameters import number
+from solidsph.setting import Setting
+
+# Of the highest frequency of a lattice: no motion worth waiting for is that fast, and a rate that
+# stays below costs a tenth of the time step at most.
+_CAP = 0.1
+
+
+@final
+@attrs.frozen
+class DynamicRelaxation(Effect):
+    """f = -2 damping w m v, with w the frequency of the motion as it is: critical by default.
+
+    After Underwood (1983). The frequency is Rayleigh's quotient of the way that the body has gone,
+
+        w^2 = -(u . m a) / (u . m u),
+
+    with u and a the changes of position and of acceleration, its own part left out, since the
+    first step: -m a is the stiffness times u if the loads stay. That way soon resembles the
+    equilibrium, in which slow motions outweigh fast ones. No stiffness is needed, and what it comes
+    to rest at is the equilibrium whatever the rate was. For a body that is not held it is of no
+    use, and for an equilibrium alone [statics] is quicker.
+    """
+
+    damping: float = number(default=1.0)  # [-] times critical
+
+    def __attrs_post_init__(self) -> None:
+        if not 0.0 < self.damping <= 10.0:
+            raise SceneError(
+                f"dynamic-relaxation: damping must lie between 0 and 10, got {self.damping}; 1 is "
+                "critical"
+            )
+
+    def bind(self, setting: Setting, label: str) -> ForceCondition:
+        return _Relaxation(
+            label=label,
+            masses=setting.masses,
+            damping=self.damping,
+            highest_rate=self.damping_rate(setting.bodies),
+        )
+
+    def arrays(self, setting: Setting) -> Mapping[str, int]:
+        n, d = setting.particles.positions.shape
+        return {"masses": 8 * n, "first step": 2 * 8 * n * d, "last velocity": 8 * n * d}
+
+    def damping_rate(self, bodies: Sequence[Body]) -> float:
+        return _CAP * max(
+            2.0 * body.material.wave_speed / float(body.particles.spacings.min()) for body in bodies
+        )
+
+    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
+        return 0.0
+
+
+@final
+@attrs.frozen(eq=False)
+class _Relaxation(ForceCondition):
+    label: str
+    masses: Array  # (n,) [kg]
+    damping: float
+    highest_rate: float  # [1/s]
+
+    @property
+    def particles(self) -> Indices:
+        return np.arange(len(self.masses))
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return np.zeros_like(velocities)  # before any step nothing is known of the motion
+
+    def advance(
+        self,
+        time: float,
+        step: float,
+        positions: Array,
+        velocities: Array,
+        memory: Mapping[str, Array],
+    ) -> tuple[Array, Mapping[str, Array]]:
+        last, rate = (memory.get(self._named(name)) for name in ("last velocity", "rate"))
+        c = 0.0 if rate is None else float(rate[0])
+        if step == 0.0:
+            kept = {}
+        elif last is None:
+            kept = {self._named("last velocity"): velocities}
+        else:
+            # What acts besides: the change of velocity without what this part took of it.
+            acceleration = (velocities - last) / step + c * velocities
+            first = (
+                memory.get(self._named("first position"), positions),
+                memory.get(self._named("first acceleration"), acceleration),
+            )
+            c = self._rate(positions - first[0], acceleration - first[1], c)
+            kept = {
+                self._named("first position"): first[0],
+                self._named("first acceleration"): first[1],
+                self._named("last velocity"): velocities,
+                self._named("rate"): np.array([c]),
+            }
+        return -c * self.masses[:, None] * velocities, kept
+
+    def _named(self, name: str) -> str:
+        return f"{self.label}: {name}"
+
+    def _rate(self, way: Array, acceleration: Array, c: float) -> float:
+        weight, power = (
+            float(np.einsum("n,ni,ni->", self.masses, way, one)) for one in (way, acceleration)
+        )
+        # Before it has gone anywhere, or while a load pushes it on, the rate stays.
+        if not (weight > 0.0 and power < 0.0):
+            return c
+        return min(2.0 * self.damping * float(np.sqrt(-power / weight)), self.highest_rate)
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        rate = observation.state.memory.get(self._named("rate"), np.zeros(1))
+        return {f"{self.label} rate [1/s]": float(rate[0])}

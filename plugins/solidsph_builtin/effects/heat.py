@@ -1,0 +1,258 @@
+"""Heat that is conducted through bodies and makes them swell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import ceil
+from typing import Any, ClassVar, final
+
+import attrs
+import numpy as np
+from scipy.sparse import csr_array, diags_array
+
+from solidsph.arrays import Array, Indices, Tensor
+from solidsph.body import Body
+from solidsph.errors import SceneError
+from solidsph.interfaces.condition import FieldCondition, ForceCondition, Observation
+from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.history import HistoryMaterial
+from solidsph.interfaces.material import Material
+from solidsph.motion import Component, VectorField
+from solidsph.parameters import check_positive, number
+from solidsph.setting import Setting
+from solidsph.tensors import particles_first
+from solidsph.where import Where
+from solidsph_builtin.effects._gradients import BodyGradient, body_gradient, in_the_reference
+
+# Of the largest stable step of the explicit rule, by which heat advances within a step.
+_PART = 0.9
+
+
+def _places(given: Any) -> tuple[tuple[Where, Component], ...]:
+    """(where, temperature) of what is held, from what a scene gives."""
+    wanted = 'heat: held takes a list such as [{where = "left", temperature = 100}]'
+    if isinstance(given, (str, Mapping)) or not isinstance(given, Sequence):
+        raise SceneError(f"{wanted}, got {given!r}")
+    for one in given:
+        if isinstance(one, tuple) and len(one) == 2:
+            continue
+        if not isinstance(one, Mapping) or set(one) != {"where", "temperature"}:
+            raise SceneError(f"{wanted}, got the entry {one!r}")
+    return tuple(
+        (one["where"], one["temperature"]) if isinstance(one, Mapping) else one for one in given
+    )
+
+
+@final
+@attrs.frozen
+class Heat(Effect):
+    """rho c dT/dt = div(k Grad T) + source, and free stretches of 1 + expansion T.
+
+    T is the difference from the temperature at which the body is as it was modelled; nothing flows
+    through a surface where it is not held. Between two particles heat flows at the rate
+    2 k V_a V_b |W'| / R (T_b - T_a), Cleary & Monaghan (1999), in the reference configuration and
+    scaled so that a full neighbourhood conducts exactly as told: what one loses the other gains.
+
+    With the stretch g = 1 + expansion T, the body's own material has the energy g^3 psi(F / g),
+    across the plane too: free swelling has no stress, and the stress of a hindered one follows
+    from the law at any strain. The work of its account is what swelling does on the motion. What
+    deformation gives back to the temperature is left out.
+    """
+
+    conserves_momentum: ClassVar[bool] = True
+    joins_neighbours: ClassVar[bool] = True
+
+    conductivity: float = number()  # k [W/(m K)]
+    heat_capacity: float = number()  # c per mass [J/(kg K)]
+    expansion: float = number(default=0.0)  # linear [1/K]
+    initial: Component = 0.0  # T at the start, of X, Y, Z [K]
+    source: Component = 0.0  # of X, Y, Z and t [W/m^3]
+    held: Sequence[Any] = attrs.field(default=(), converter=_places)
+    largest: float = number(default=1000.0)  # |T| up to which the time step is stable [K]
+
+    def __attrs_post_init__(self) -> None:
+        check_positive("heat", "conductivity", self.conductivity, "W/(m K)")
+        check_positive("heat", "heat_capacity", self.heat_capacity, "J/(kg K)")
+        check_positive("heat", "largest", self.largest, "K")
+        if not abs(self.expansion) * self.largest < 0.5:
+            raise SceneError(
+                f"heat: expansion times largest must stay below 0.5, got {self.expansion:g} 1/K "
+                f"times {self.largest:g} K; metals have some 1e-5 1/K"
+            )
+
+    def bind(self, setting: Setting, label: str) -> ForceCondition:
+        in_the_reference(setting, "heat")
+        for body in setting.bodies:
+            if self.expansion and isinstance(body.material, HistoryMaterial):
+                raise SceneError(
+                    f"heat: the swelling of body {body.name!r} needs a material that is a formula "
+                    f"of F, and {type(body.material).__name__} remembers; set expansion = 0, or "
+                    "take another material"
+                )
+        X = setting.particles.positions
+        held = [
+            (setting.select(where), VectorField.of({"x": value}, "heat: held.temperature"))
+            for where, value in self.held
+        ]
+        return _Conduction(
+            label=label,
+            reference=X,
+            conduction=_conduction(setting.bodies, self.conductivity),
+            capacities=self.heat_capacity * setting.masses,
+            volumes=np.where(setting.particles.ghosts, 0.0, setting.particles.volumes),
+            expansion=self.expansion,
+            start=VectorField.of({"x": self.initial}, "heat: initial").values(0, X, 0.0),
+            source=VectorField.of({"x": self.source}, "heat: source"),
+            held=held,
+            gradients=[body_gradient(b) for b in setting.bodies] if self.expansion else [],
+        )
+
+    def arrays(self, setting: Setting) -> Mapping[str, int]:
+        in_the_reference(setting, "heat")
+        K = _conduction(setting.bodies, self.conductivity)
+        n = setting.particles.count
+        kept = {"conduction": K.data.nbytes + K.indices.nbytes + K.indptr.nbytes}
+        kept |= {"temperature": 8 * n, "capacities": 8 * n}
+        if self.expansion:
+            kept |= {
+                f"gradient of {body.name}": body_gradient(body).matrices.bytes
+                for body in setting.bodies
+            }
+        return kept
+
+    def damping_rate(self, bodies: Sequence[Body]) -> float:
+        return 0.0
+
+    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
+        # A body that has swollen is stiffer by about three times its stretch.
+        highest = max(
+            2.0 * body.material.wave_speed / float(body.particles.spacings.min()) for body in bodies
+        )
+        return float(np.sqrt(3.0 * abs(self.expansion) * self.largest) * highest)
+
+    def pair_work(self, particles: float, pairs: float) -> float:
+        return 3.0 * pairs if self.expansion else pairs
+
+
+def _conduction(bodies: Sequence[Body], conductivity: float) -> csr_array:
+    """K (n, n) [W/K], so that K T is the heat that flows to every particle."""
+    count = bodies[-1].extent.stop
+    rows, columns, values = [], [], []
+    for body in bodies:
+        pairs, particles = body.pairs(), body.particles
+        real = ~particles.ghosts
+        acts = (pairs.distances > 0.0) & real[pairs.rows] & real[pairs.columns]
+        a, b, R = pairs.rows[acts], pairs.columns[acts], pairs.distances[acts]
+        V, slope = particles.volumes, np.abs(body.smoothing.slope(R))
+        # The second moment of a full neighbourhood, which the integral makes 1.
+        moments = np.bincount(a, V[b] * slope * R, particles.count) / particles.dimension
+        rows.append(a + body.extent.start)
+        columns.append(b + body.extent.start)
+        values.append(2.0 * conductivity * V[a] * V[b] * slope / (R * moments.max()))
+    flat = tuple(np.concatenate(one) for one in (rows, columns))
+    K = csr_array((np.concatenate(values), flat), shape=(count, count))
+    return csr_array(K - diags_array(np.asarray(K.sum(axis=1)), format="csr"))
+
+
+@final
+@attrs.frozen(eq=False)
+class _Conduction(FieldCondition, ForceCondition):
+    label: str
+    reference: Array  # X (n, d)
+    conduction: csr_array  # K (n, n) [W/K]
+    capacities: Array  # (n,) [J/K]
+    volumes: Array  # (n,)
+    expansion: float
+    start: Array  # T (n,) [K]
+    source: VectorField
+    held: Sequence[tuple[Indices, VectorField]]
+    gradients: Sequence[BodyGradient]  # of every body, where they swell
+
+    @property
+    def particles(self) -> Indices:
+        return np.arange(len(self.reference))
+
+    @property
+    def _name(self) -> str:
+        return f"{self.label}: temperature"
+
+    def temperature(self, memory: Mapping[str, Array]) -> Array:
+        """T (n,) [K] of a state with this memory."""
+        return memory.get(self._name, self._holding(0.0, self.start))
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return self.advance(time, 0.0, positions, velocities, {})[0]
+
+    def advance(
+        self,
+        time: float,
+        step: float,
+        positions: Array,
+        velocities: Array,
+        memory: Mapping[str, Array],
+    ) -> tuple[Array, Mapping[str, Array]]:
+        T = self.temperature(memory)
+        if step > 0.0:
+            T = self._conducted(T, time, step)
+        return self._forces(positions, T), {self._name: T}
+
+    def _conducted(self, T: Array, time: float, step: float) -> Array:
+        """T after a step that ends at `time`, in as many parts as stability asks for."""
+        parts = ceil(step * self._fastest / (2.0 * _PART))
+        part = step / max(1, parts)
+        inverse = np.zeros_like(self.capacities)
+        np.divide(1.0, self.capacities, out=inverse, where=self.capacities > 0.0)
+        for k in range(max(1, parts)):
+            now = time - step + k * part
+            source = self.source.values(0, self.reference, now) * self.volumes
+            T = T + part * inverse * (self.conduction @ T + source)
+            T = self._holding(now + part, T)
+        return T
+
+    @property
+    def _fastest(self) -> float:
+        """A bound on the rate at which differences of temperature decay [1/s]."""
+        diagonal = -self.conduction.diagonal()
+        real = self.capacities > 0.0
+        return float(2.0 * (diagonal[real] / self.capacities[real]).max())
+
+    def _holding(self, time: float, T: Array) -> Array:
+        if not self.held:
+            return T
+        T = T.copy()
+        for chosen, value in self.held:
+            T[chosen] = value.values(0, self.reference[chosen], time)
+        return T
+
+    def _forces(self, positions: Array, T: Array) -> Array:
+        forces = np.zeros_like(positions)
+        for gradient in self.gradients:
+            body = gradient.body
+            H = gradient.of((positions - self.reference)[body.extent])
+            g = 1.0 + self.expansion * T[body.extent]
+            forces[body.extent] = gradient.forces(_swelling(body.material, H, g))
+        return forces
+
+    def fields(self, observation: Observation) -> Mapping[str, Array]:
+        return {"temperature [K]": self.temperature(observation.state.memory)}
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        T = self.temperature(observation.state.memory)
+        return {
+            f"{self.label} heat [J]": float(self.capacities @ T),
+            f"{self.label} highest [K]": float(T.max()),
+        }
+
+
+def _swelling(material: Material, H: Array, g: Array) -> Array:
+    """What swelling by g (n,) adds to the stress, g^2 P(F / g) - P(F), (d, d, n)."""
+    d, n = len(H), H.shape[2]
+    F = np.repeat(np.eye(3)[:, :, None], n, axis=2)
+    F[:d, :d] += H
+    swollen, own = (_stress(material, one) for one in (F / g, F))
+    return (g**2 * swollen - own)[:d, :d]
+
+
+def _stress(material: Material, F: Array) -> Array:
+    P: Tensor = material.first_piola(F, material.params)
+    return np.moveaxis(particles_first(P, F.shape[2]), 0, -1)

@@ -1,0 +1,213 @@
+"""Bodies of different material, joined where they touch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from typing import ClassVar, final
+
+import attrs
+import numpy as np
+from scipy.sparse import bsr_array, csr_array
+from scipy.spatial import cKDTree
+
+from solidsph.arrays import Array, Indices, Scalar, Vector
+from solidsph.body import Body
+from solidsph.errors import SceneError
+from solidsph.interfaces.condition import ForceCondition, Observation, StoringCondition
+from solidsph.interfaces.declared import PairForce, PairTable
+from solidsph.interfaces.effect import Effect
+from solidsph.parameters import number
+from solidsph.setting import Setting
+from solidsph.tensors import dot
+
+
+@final
+@attrs.frozen
+class Joint(Effect):
+    """Springs between particles of two bodies that are neighbours in the reference configuration.
+
+    psi = k_ab / 2 (|x_ab| - |X_ab|)^2: along the line between the two, so that momentum and angular
+    momentum are kept to rounding and rigid motions cost nothing. The springs of a particle add up,
+    in the direction of its partners, to the stiffness of what lies between the outermost particles
+    of both bodies: half a spacing of each material, in series,
+
+        sum over b of k_ab (e_ab . n_a)^2 = s^(d-1) / (s_A / (2 M_A) + s_B / (2 M_B)),
+
+    with M = lambda + 2 mu. A joint of equal materials is then as stiff as the material, to the
+    first order in the spacing. Particles closer than `reach` mean spacings are partners.
+    """
+
+    conserves_momentum: ClassVar[bool] = True
+
+    between: tuple[str, ...] | None = attrs.field(
+        default=None, converter=attrs.converters.optional(tuple)
+    )  # names of the bodies; all by default
+    reach: float = number(default=1.8)  # [mean spacings of the two bodies]
+
+    def __attrs_post_init__(self) -> None:
+        if not 1.0 < self.reach <= 5.0:
+            raise SceneError(
+                f"joint: reach must lie between 1 and 5 spacings, got {self.reach}; 1.8 takes the "
+                "nearest across a face, and their neighbours"
+            )
+        if self.between is not None and len(set(self.between)) < 2:
+            raise SceneError(
+                f"joint: between must name two bodies at least, got {list(self.between)}"
+            )
+
+    def bind(self, setting: Setting, label: str) -> ForceCondition:
+        springs = self._springs(setting.bodies)
+        return _Springs(label, springs.table(setting.particles.count), setting.particles.positions)
+
+    def arrays(self, setting: Setting) -> Mapping[str, int]:
+        table = self._springs(setting.bodies).table(setting.particles.count)
+        return {"springs": table.starts.nbytes + table.columns.nbytes + table.values.nbytes}
+
+    def damping_rate(self, bodies: Sequence[Body]) -> float:
+        return 0.0
+
+    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
+        springs = self._springs(bodies)
+        masses = np.concatenate([body.masses for body in bodies])
+        # No eigenvalue exceeds the largest sum of a row's entries, scaled evenly.
+        a, b, k = springs.one, springs.other, springs.stiffness
+        own = np.bincount(a, k, len(masses)) + np.bincount(b, k, len(masses))
+        across = k / np.sqrt(masses[a] * masses[b])
+        real = masses > 0.0
+        rows = np.bincount(a, across, len(masses)) + np.bincount(b, across, len(masses))
+        rows[real] += own[real] / masses[real]
+        return float(np.sqrt(rows.max()))
+
+    def pair_work(self, particles: float, pairs: float) -> float:
+        return 0.0  # of the few at the faces nothing is known before they are found
+
+    def _springs(self, bodies: Sequence[Body]) -> _Found:
+        key = (Joint, self.between, self.reach)
+        made = bodies[0].made
+        if key not in made:
+            made[key] = self._found(bodies)
+        found: _Found = made[key]
+        return found
+
+    def _found(self, bodies: Sequence[Body]) -> _Found:
+        names = [body.name for body in bodies]
+        for name in self.between or ():
+            if name not in names:
+                raise SceneError(
+                    f"joint: there is no body {name!r}; the bodies are {', '.join(names)}"
+                )
+        chosen = [body for body in bodies if self.between is None or body.name in self.between]
+        if len(chosen) < 2:
+            raise SceneError(
+                f"joint: it joins two bodies at least, and the scene has only {', '.join(names)}; "
+                "leave it out, or add a body"
+            )
+        parts = [_between(a, b, self.reach) for a, b in combinations(chosen, 2)]
+        found = _Found(*(np.concatenate([getattr(one, f) for one in parts]) for f in _FIELDS))
+        if not len(found.one):
+            raise SceneError(
+                f"joint: no particles of {', '.join(body.name for body in chosen)} are closer than "
+                f"{self.reach:g} spacings; let the bodies touch, or take a longer reach"
+            )
+        return found
+
+
+@attrs.frozen(eq=False)
+class _Found:
+    """Springs, each once."""
+
+    one: Indices  # (m,) its ends, numbered among all particles
+    other: Indices
+    stiffness: Array  # k (m,) [N/m]
+    length: Array  # |X_ab| (m,) [m]
+
+    def table(self, count: int) -> PairTable:
+        rows = np.concatenate([self.one, self.other])
+        columns = np.concatenate([self.other, self.one])
+        values = np.tile(np.column_stack([self.stiffness, self.length]), (2, 1))
+        order = np.lexsort((columns, rows))
+        starts = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=count))])
+        return PairTable(starts.astype(np.intp), columns[order].astype(np.int32), values[order])
+
+
+_FIELDS = tuple(field.name for field in attrs.fields(_Found))
+
+
+def _between(one: Body, other: Body, reach: float) -> _Found:
+    """The springs between two bodies."""
+    real = [np.flatnonzero(~body.particles.ghosts) for body in (one, other)]
+    X, Y = one.particles.positions[real[0]], other.particles.positions[real[1]]
+    s, t = one.particles.spacings[real[0]], other.particles.spacings[real[1]]
+    longest = reach * 0.5 * (s.max() + t.max())
+    near = cKDTree(X).sparse_distance_matrix(cKDTree(Y), longest, output_type="coo_matrix")
+    a, b, R = near.row.astype(np.intp), near.col.astype(np.intp), near.data
+    close = (reach * 0.5 * (s[a] + t[b]) >= R) & (R > 0.0)
+    a, b, R = a[close], b[close], R[close]
+    order = np.lexsort((b, a))
+    a, b, R = a[order], b[order], R[order]
+    e = (Y[b] - X[a]) / R[:, None]
+    d = e.shape[1]
+    # What lies between, of the confined moduli, on the area of the smaller cell.
+    M, N = (body.material.density * body.material.wave_speed**2 for body in (one, other))
+    layer = np.minimum(s[a], t[b]) ** (d - 1) / (0.5 * s[a] / M + 0.5 * t[b] / N)
+    shares = 0.5 * (1.0 / _squares(a, e, len(X))[a] + 1.0 / _squares(b, e, len(Y))[b])
+    return _Found(
+        one=real[0][a] + one.extent.start,
+        other=real[1][b] + other.extent.start,
+        stiffness=layer * shares,
+        length=R,
+    )
+
+
+def _squares(ends: Indices, directions: Array, count: int) -> Array:
+    """Sum over a particle's springs of (e . n)^2, n the direction of all of them, (count,)."""
+    mean = np.column_stack([np.bincount(ends, one, count) for one in directions.T]).astype(float)
+    size = np.linalg.norm(mean, axis=1, keepdims=True)
+    normal = np.divide(mean, size, out=np.zeros_like(mean), where=size > 0.0)
+    squares = np.einsum("mi,mi->m", directions, normal[ends]) ** 2
+    return np.asarray(np.bincount(ends, squares, count), dtype=np.float64)
+
+
+@final
+@attrs.frozen(eq=False)
+class _Springs(PairForce, StoringCondition):
+    label: str
+    pairs: PairTable
+    reference: Array  # X (n, d)
+
+    @staticmethod
+    def pull(offset: Vector, velocity: Vector, values: Vector) -> Scalar:
+        r = np.sqrt(dot(offset, offset))
+        return values[0] * (1.0 - values[1] / r)
+
+    def energies(self, observation: Observation) -> Array:
+        x, p, q = observation.state.positions, self.pairs.rows, self.pairs.columns
+        stretch = np.linalg.norm(x[q] - x[p], axis=1) - self.pairs.values[:, 1]
+        # A spring is listed both ways, and each end has half of it.
+        shares = 0.25 * self.pairs.values[:, 0] * stretch**2
+        return np.asarray(np.bincount(p, shares, len(x)), dtype=np.float64)
+
+    def stiffness(self, displacements: Array, time: float) -> csr_array:
+        """K (d n, d n) [N/m]: k (I - (R / r) (I - e e^T)) between the two ends of each spring."""
+        n, d = displacements.shape
+        p, q = self.pairs.rows, self.pairs.columns
+        k, R = self.pairs.values.T
+        x = self.reference + displacements
+        offsets = x[q] - x[p]
+        r = np.linalg.norm(offsets, axis=1)[:, None, None]
+        along = np.einsum("mi,mj->mij", offsets, offsets) / r**2
+        blocks = k[:, None, None] * (np.eye(d) - (R[:, None, None] / r) * (np.eye(d) - along))
+        between = bsr_array((-blocks, q, self.pairs.starts), shape=(d * n, d * n))
+        own = np.zeros((n, d, d))
+        np.add.at(own, p, blocks)
+        places = np.arange(n)
+        return csr_array(between + bsr_array((own, places, np.arange(n + 1)), shape=(d * n, d * n)))
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        x, p, q = observation.state.positions, self.pairs.rows, self.pairs.columns
+        r = np.linalg.norm(x[q] - x[p], axis=1)
+        return {
+            f"{self.label} energy [J]": float(self.energies(observation).sum()),
+            f"{self.label} largest stretch [-]": float(np.max(r / self.pairs.values[:, 1])),
+        }

@@ -1,0 +1,129 @@
+"""Damping inside the material, in proportion to stiffness and strain rate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, final
+
+import attrs
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from solidsph.arrays import Array, Indices, Tensor
+from solidsph.body import Body
+from solidsph.interfaces.condition import ForceCondition, Observation
+from solidsph.interfaces.effect import Effect
+from solidsph.parameters import check_positive, number
+from solidsph.setting import Setting
+from solidsph.tensors import add, identity, product, scale, trace, transpose
+from solidsph_builtin.effects._gradients import BodyGradient, body_gradient, in_the_reference
+
+# Up to so many freedoms eigenvalues are found by a dense matrix; beyond, to this part.
+_DENSE, _FOUND = 60, 1e-3
+
+
+@final
+@attrs.frozen
+class KelvinVoigt(Effect):
+    """A dashpot beside the material: S_v = time (lambda tr(dE/dt) I + 2 mu dE/dt), P_v = F S_v.
+
+    Kelvin and Voigt's solid in the reference configuration, E being the Green-Lagrange strain: it
+    is objective, rigid motions give nothing, and energy is only ever taken. A small vibration of
+    angular frequency w decays as exp(-time w^2 t / 2): Rayleigh's second term, by which short
+    waves fade first. The stress goes through the same gradient and divergence as the material's.
+    """
+
+    conserves_momentum: ClassVar[bool] = True
+    joins_neighbours: ClassVar[bool] = True
+
+    time: float = number()  # retardation time [s]
+
+    def __attrs_post_init__(self) -> None:
+        check_positive("kelvin-voigt", "time", self.time, "s, or leave the effect out")
+
+    def bind(self, setting: Setting, label: str) -> ForceCondition:
+        in_the_reference(setting, "kelvin-voigt")
+        return _Dashpot(
+            label,
+            setting.particles.positions,
+            self.time,
+            [body_gradient(body) for body in setting.bodies],
+        )
+
+    def arrays(self, setting: Setting) -> Mapping[str, int]:
+        in_the_reference(setting, "kelvin-voigt")
+        return {
+            f"gradient of {body.name}": body_gradient(body).matrices.bytes
+            for body in setting.bodies
+        }
+
+    def damping_rate(self, bodies: Sequence[Body]) -> float:
+        return self.time * max(_highest_square(body) for body in bodies)
+
+    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
+        return 0.0
+
+    def pair_work(self, particles: float, pairs: float) -> float:
+        return 3.0 * pairs  # both gradients, and the divergence
+
+
+def _highest_square(body: Body) -> float:
+    """Largest square of an angular frequency of the body's linear stiffness [1/s^2]."""
+    key = (KelvinVoigt, "highest")
+    if key not in body.made:
+        body.made[key] = _largest_eigenvalue(body)
+    found: float = body.made[key]
+    return found
+
+
+def _largest_eigenvalue(body: Body) -> float:
+    gradient, real = body_gradient(body), ~body.particles.ghosts
+    n, d = body.particles.positions.shape
+    roots = np.zeros((n, 1))
+    roots[real, 0] = 1.0 / np.sqrt(body.masses[real])
+
+    def stiffness(flat: Array) -> Array:
+        rate = gradient.of(roots * flat.reshape(n, d))
+        stress = _viscous_stress(body, 0.5 * (rate + rate.transpose(1, 0, 2)))
+        return -(roots * gradient.forces(np.array(stress))).ravel()
+
+    whole = LinearOperator((n * d, n * d), matvec=stiffness, dtype=np.float64)
+    if n * d <= _DENSE:
+        dense = np.column_stack([stiffness(column) for column in np.eye(n * d)])
+        return float(np.linalg.eigvalsh(0.5 * (dense + dense.T))[-1])
+    start = np.random.default_rng(0).normal(size=n * d)
+    highest = eigsh(whole, k=1, which="LA", tol=_FOUND, v0=start, return_eigenvectors=False)
+    return float(highest[0] * (1.0 + _FOUND))
+
+
+def _viscous_stress(body: Body, rate: Tensor) -> Tensor:
+    """lambda tr(dE/dt) I + 2 mu dE/dt [Pa/s]."""
+    lam, mu = body.material.lame_parameters
+    return add(scale(lam * trace(rate), identity(rate)), scale(2.0 * mu, rate))
+
+
+@final
+@attrs.frozen(eq=False)
+class _Dashpot(ForceCondition):
+    label: str
+    reference: Array  # X (n, d)
+    time: float
+    gradients: Sequence[BodyGradient]
+
+    @property
+    def particles(self) -> Indices:
+        return np.arange(len(self.reference))
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        u, forces = positions - self.reference, np.zeros_like(positions)
+        for gradient in self.gradients:
+            extent = gradient.body.extent
+            H, rate = gradient.of(u[extent]), gradient.of(velocities[extent])
+            F = add(H, identity(H))
+            half = product(transpose(F), rate)
+            S = _viscous_stress(gradient.body, scale(0.5, add(half, transpose(half))))
+            forces[extent] = gradient.forces(self.time * np.array(product(F, S)))
+        return forces
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {}

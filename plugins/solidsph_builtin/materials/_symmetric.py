@@ -1,0 +1,37 @@
+"""Symmetric tensors as the tuples of numbers that a history keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from solidsph.arrays import Tensor
+from solidsph.interfaces.history import History
+
+
+def component_count(dimension: int) -> int:
+    """Of a symmetric tensor."""
+    return dimension * (dimension + 1) // 2
+
+
+def names(dimension: int) -> Sequence[str]:
+    """Of its components, in their order."""
+    return {1: ("xx",), 2: ("xx", "yy", "xy"), 3: ("xx", "yy", "zz", "yz", "xz", "xy")}[dimension]
+
+
+def components(A: Tensor) -> History:
+    """The tuple of a symmetric tensor."""
+    if len(A) == 1:
+        return (A[0][0],)
+    if len(A) == 2:
+        return (A[0][0], A[1][1], A[0][1])
+    return (A[0][0], A[1][1], A[2][2], A[1][2], A[0][2], A[0][1])
+
+
+def symmetric(values: History, dimension: int) -> Tensor:
+    """The tensor of such a tuple."""
+    if dimension == 1:
+        return ((values[0],),)
+    if dimension == 2:
+        return ((values[0], values[2]), (values[2], values[1]))
+    xx, yy, zz, yz, xz, xy = values
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))

@@ -1,0 +1,177 @@
+"""Internal forces of bodies whose materials remember."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, final
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array
+from solidsph.body import Body
+from solidsph.engines.engine import InternalForces, StressFields
+from solidsph.engines.tally import Tally
+from solidsph.interfaces.condition import FieldCondition, Observation, StressCondition
+from solidsph.interfaces.history import History, HistoryMaterial
+from solidsph.tensors import components_first, particles_first
+
+
+class Law(ABC):
+    """What one body answers to the gradients of its displacements."""
+
+    body: Body
+
+    @abstractmethod
+    def flux(self, H: Array, history: Array, step: float) -> tuple[Array, Array]:
+        """What the divergence is taken of, (d, d, n) [Pa], and the history (n, k) after the step.
+
+        Args:
+            H: gradient of the displacements, (n, d, d).
+            history: internal variables at its beginning, (n, k); they are not written on.
+            step: its length [s]; 0 leaves the history as it is.
+        """
+
+    def history_of(self, memory: Mapping[str, Array]) -> Array:
+        """The internal variables, (n, k): those remembered, or the virgin state's."""
+        name = memory_name(self.body)
+        if name in memory:
+            return memory[name]
+        n, d = self.body.particles.positions.shape
+        material = self.body.material
+        start = material.initial_history(d) if isinstance(material, HistoryMaterial) else {}
+        return np.tile(np.array([*start.values()], dtype=np.float64), (n, 1))
+
+
+@final
+@attrs.frozen(eq=False)
+class ArrayLaw(Law):
+    """By arrays of all particles: the reference for every other way."""
+
+    body: Body
+
+    def flux(self, H: Array, history: Array, step: float) -> tuple[Array, Array]:
+        formulation, material = self.body.formulation, self.body.material
+        n = self.body.particles.count
+        with np.errstate(all="ignore"):  # a run that leaves the material's domain is caught later
+            F = formulation.deformation_gradient(components_first(H))
+            if isinstance(material, HistoryMaterial):
+                h: History = tuple(history.T)
+                if step > 0.0:
+                    h = material.advance(F, h, step, material.params)
+                P = material.stress(F, h, material.params)
+                history = np.column_stack([np.broadcast_to(one, n) for one in h])
+            else:
+                P = material.first_piola(F, material.params)
+            T = formulation.flux(F, P)
+        return np.moveaxis(particles_first(T, n), 0, -1), history
+
+
+def memory_name(body: Body) -> str:
+    """Where the history of a body is in `State.memory`."""
+    return f"history of {body.name}"
+
+
+def remembering(
+    internal: InternalForces, bodies: Sequence[Body], conditions: Sequence[StressCondition]
+) -> InternalForces:
+    """Forces that also advance what the bodies' materials remember, where there are such."""
+    asked = internal.advances_histories
+    if asked or not any(isinstance(body.material, HistoryMaterial) for body in bodies):
+        return internal
+    return HistoryForces(internal, tuple(internal.law(body) for body in bodies), tuple(conditions))
+
+
+@final
+@attrs.frozen(eq=False)
+class HistoryForces(InternalForces):
+    """The sums are the engine's; the law comes between its two passes."""
+
+    advances_histories: ClassVar[bool] = True
+
+    sums: InternalForces
+    laws: Sequence[Law]
+    conditions: Sequence[StressCondition]
+
+    @property
+    def pair_count(self) -> int:
+        return self.sums.pair_count
+
+    @property
+    def tally(self) -> Sequence[Tally]:
+        return self.sums.tally
+
+    def forces(self, time: float, displacements: Array) -> Array:
+        return self.advance(time, 0.0, displacements, {})[0]
+
+    def advance(
+        self, time: float, step: float, displacements: Array, memory: Mapping[str, Array]
+    ) -> tuple[Array, Mapping[str, Array]]:
+        n, d = displacements.shape
+        H = self.sums.gradients(displacements)
+        stress = np.zeros((d, d, n))
+        kept = {}
+        for law in self.laws:
+            extent = law.body.extent
+            T, history = law.flux(H[extent], law.history_of(memory), step)
+            stress[:, :, extent] = np.where(law.body.particles.ghosts, 0.0, T)
+            if isinstance(law.body.material, HistoryMaterial):
+                kept[memory_name(law.body)] = history
+        for condition in self.conditions:
+            condition.impose_stress(time, stress)
+        return self.sums.spread(displacements, stress), kept
+
+    def fields(self, displacements: Array) -> StressFields:
+        return self.observed(displacements, {})
+
+    def gradients(self, displacements: Array) -> Array:
+        return self.sums.gradients(displacements)
+
+    def spread(self, displacements: Array, stress: Array) -> Array:
+        return self.sums.spread(displacements, stress)
+
+    def observed(self, displacements: Array, memory: Mapping[str, Array]) -> StressFields:
+        virgin = self.sums.fields(displacements)
+        dissipated = np.zeros(len(displacements))
+        for law in self.laws:
+            body, material = law.body, law.body.material
+            if not isinstance(material, HistoryMaterial):
+                continue
+            extent, n = body.extent, body.particles.count
+            h: History = tuple(law.history_of(memory).T)
+            F = components_first(virgin.deformation_gradients[extent])
+            with np.errstate(all="ignore"):
+                virgin.stresses[extent] = particles_first(material.stress(F, h, material.params), n)
+                virgin.energy_densities[extent] = material.stored(F, h, material.params)
+            dissipated[extent] = np.where(body.particles.ghosts, 0.0, material.dissipated(h))
+        return attrs.evolve(virgin, dissipated_densities=dissipated)
+
+
+@final
+@attrs.frozen(eq=False)
+class HistoryFields(FieldCondition):
+    """Shows what the materials of some bodies remember."""
+
+    bodies: Sequence[Body]
+    count: int  # of all particles
+
+    @property
+    def label(self) -> str:
+        return "history"
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {}
+
+    def fields(self, observation: Observation) -> Mapping[str, Array]:
+        found: dict[str, Array] = {}
+        for body in self.bodies:
+            material = body.material
+            if not isinstance(material, HistoryMaterial):
+                continue
+            history = ArrayLaw(body).history_of(observation.state.memory)
+            names = list(material.initial_history(body.smoothing.dimension))
+            for name in material.shown:
+                values = found.setdefault(name, np.zeros(self.count))
+                values[body.extent] = history[:, names.index(name)]
+        return found
