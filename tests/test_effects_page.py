@@ -15,6 +15,9 @@ TEXT = (Path(__file__).parents[1] / "docs/effects.md").read_text(encoding="utf-8
 SECTIONS = dict(re.findall(r"^## ([\w-]+)\n(.*?)(?=^## |\Z)", TEXT, re.DOTALL | re.MULTILINE))
 
 
+SECTIONS.pop("Sleep")  # no part: it has tests of its own
+
+
 def example(name: str) -> Scene:
     (text,) = re.findall(r"```toml\n(.*?)```", SECTIONS[name], re.DOTALL)
     return Scene.from_toml(text)

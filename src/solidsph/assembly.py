@@ -69,6 +69,7 @@ class Assembly:
         scene, problems = self._scene, self._problems
         problems.add(compatibility.numbers(scene))
         problems.add(compatibility.statics(scene))
+        problems.add(compatibility.sleep(scene))
         kernel: Kernel | None = self._make("kernels", scene.kernel)
         formulation: Formulation | None = self._make("formulations", scene.formulation)
         integrator = self._integrator()
@@ -120,7 +121,7 @@ class Assembly:
         if remembered:
             conditions.append(HistoryFields(remembered, particles.count))
 
-        return Simulation(
+        made_ready = Simulation(
             scene=scene,
             setting=setting,
             dynamics=Dynamics(
@@ -140,6 +141,12 @@ class Assembly:
             parts=tuple(self._used),
             manager=self._manager,
         )
+        if scene.sleep is not None:
+            from solidsph.asleep.loop import check_sleep  # only where something sleeps
+
+            problems.attempt(check_sleep, made_ready)
+            problems.stop_if_any()
+        return made_ready
 
     def _make(self, kind: str, wanted: PartLike) -> Any:
         part = self._problems.attempt(construct, kind, wanted)

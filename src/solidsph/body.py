@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
+from solidsph.arrays import Array, Indices
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.material import Material
 from solidsph.neighbours import Pairs, neighbour_pairs
@@ -39,3 +39,19 @@ class Body:
     def masses(self) -> Array:
         """(n,) [kg, per unit of the missing dimensions]; ghosts have none."""
         return np.where(self.particles.ghosts, 0.0, self.material.density * self.particles.volumes)
+
+
+def part_of(body: Body, chosen: Indices) -> Body:
+    """The same body of these particles (k,) alone, numbered in their order, without faces or
+    tags."""
+    own = body.particles
+    particles = Particles(
+        positions=own.positions[chosen],
+        volumes=own.volumes[chosen],
+        spacings=own.spacings[chosen],
+        area_vectors=own.area_vectors[chosen],
+        ghosts=own.ghosts[chosen],
+        images=own.images[chosen],
+        cells=own.cells[chosen],
+    )
+    return attrs.evolve(body, particles=particles, extent=slice(0, len(chosen)))

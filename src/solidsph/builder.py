@@ -14,7 +14,15 @@ from solidsph.assembly import Assembly
 from solidsph.errors import BuildError, SceneError
 from solidsph.hooks import listeners
 from solidsph.motion import Component
-from solidsph.scene import BodyScene, ImposedScene, InitialScene, PartLike, Scene, StaticsScene
+from solidsph.scene import (
+    BodyScene,
+    ImposedScene,
+    InitialScene,
+    PartLike,
+    Scene,
+    SleepScene,
+    StaticsScene,
+)
 from solidsph.simulation import Simulation
 from solidsph.where import EVERYWHERE, Where
 
@@ -117,6 +125,11 @@ class Builder:
     ) -> Builder:
         """Find the equilibrium under the loads at the end of the duration, instead of a motion."""
         self._values["statics"] = StaticsScene(load_steps, tolerance, max_iterations)
+        return self
+
+    def sleep(self, *, tolerance: float = 1e-9, slabs: int = 160) -> Builder:
+        """Let regions sleep that nothing has reached, or that have come to rest."""
+        self._values["sleep"] = SleepScene(tolerance, slabs)
         return self
 
     def duration(self, duration: float) -> Builder:

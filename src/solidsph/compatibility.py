@@ -54,6 +54,19 @@ def numbers(scene: Scene) -> Iterator[str]:
         yield f"outputs must be at least 1, got {scene.outputs}; the last state is always recorded"
 
 
+def sleep(scene: Scene) -> Iterator[str]:
+    """Numbers of what may sleep."""
+    wanted = scene.sleep
+    if wanted is None:
+        return
+    if scene.statics is not None:
+        yield "sleep: an equilibrium has no motion to wait for; leave out [sleep], or [statics]"
+    if not isinstance(wanted.tolerance, (int, float)) or not 0.0 < wanted.tolerance < 1.0:
+        yield f"sleep: tolerance must lie between 0 and 1, got {wanted.tolerance!r}; 1e-9 is usual"
+    if isinstance(wanted.slabs, bool) or not isinstance(wanted.slabs, int) or wanted.slabs < 2:
+        yield f"sleep: slabs must be a whole number from 2 on, got {wanted.slabs!r}; 160 is usual"
+
+
 def statics(scene: Scene) -> Iterator[str]:
     """Numbers of the static run, and no word beside it that means a motion."""
     wanted = scene.statics

@@ -61,6 +61,14 @@ class StaticsScene:
     max_iterations: int = 25  # of Newton's method in a load step
 
 
+@attrs.frozen
+class SleepScene:
+    """That regions which nothing has reached cost nothing; see `solidsph.asleep`."""
+
+    tolerance: float = 1e-9  # of the largest speed, below which a region sleeps [-]
+    slabs: int = 160  # regions across the longest side of the body
+
+
 DEFAULT_INTEGRATOR = "velocity-verlet"
 
 
@@ -79,6 +87,7 @@ class Scene:
     effects: Sequence[ImposedScene] = ()
     initial: Sequence[InitialScene] = ()
     integrator: PartLike | None = None  # None names none: then it is the default
+    sleep: SleepScene | None = None  # regions that nothing has reached cost nothing
     statics: StaticsScene | None = None  # equilibrium at the end of the duration, not motion
     time_step_factor: float = 0.5  # of the CFL step
     time_step: float | None = None  # [s]; overrides the factor
@@ -128,6 +137,7 @@ _SECTIONS = {
     "effect": "[[effect]]",
     "initial": "[[initial]]",
     "integrator": "[integrator]",
+    "sleep": "[sleep]",
     "statics": "[statics]",
 }
 _SCALARS = ("title", "duration", "outputs", "engine")
@@ -155,6 +165,8 @@ def _scene(table: Mapping[str, Any]) -> Scene:
     for key in ("material", "formulation"):
         if key in table:
             values[key] = table[key]
+    if "sleep" in table:
+        values["sleep"] = _sleep(table["sleep"])
     if "statics" in table:
         values["statics"] = _statics(table["statics"])
     for key, extra in (("kernel", ("cover",)), ("integrator", ("time_step_factor", "time_step"))):
@@ -199,6 +211,16 @@ def _initial(entry: Any) -> InitialScene:
     entry = _mapping(entry, "initial")
     _check_keys(entry, [field.name for field in attrs.fields(InitialScene)], "initial")
     return InitialScene(**entry)
+
+
+def _sleep(entry: Any) -> SleepScene:
+    entry = dict(_mapping(entry, "sleep"))
+    _check_keys(entry, [field.name for field in attrs.fields(SleepScene)], "sleep")
+    if "slabs" in entry:
+        _count(entry["slabs"], "sleep.slabs")
+    if "tolerance" in entry:
+        entry["tolerance"] = number(entry["tolerance"], "sleep.tolerance")
+    return SleepScene(**entry)
 
 
 def _statics(entry: Any) -> StaticsScene:
@@ -279,6 +301,8 @@ def _table(scene: Scene) -> dict[str, Any]:
         table["integrator"] = {**integrator, **step}
     else:
         table["statics"] = attrs.asdict(scene.statics)
+    if scene.sleep is not None:
+        table["sleep"] = attrs.asdict(scene.sleep)
     for key, kind, entries in (
         ("boundary", "boundaries", scene.boundaries),
         ("effect", "effects", scene.effects),

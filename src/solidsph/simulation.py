@@ -80,6 +80,10 @@ class Simulation:
 
     def time_loop(self) -> TimeLoop:
         """What carries out the steps."""
+        if self.scene.sleep is not None:
+            from solidsph.asleep import sleeping_loop  # only where something sleeps
+
+            return sleeping_loop(self)
         return self.dynamics.internal.time_loop(self.dynamics, self.integrator, self.step_size)
 
     def extended(self, steps: int) -> Simulation:
@@ -144,7 +148,7 @@ class Simulation:
             state=state,
             record=path,
             seconds=clock.perf_counter() - begun,
-            effort={"steps": self.steps, "step size [s]": self.step_size},
+            effort={"steps": self.steps, "step size [s]": self.step_size, **loop.effort},
         )
 
     def output_steps(self) -> tuple[int, ...]:

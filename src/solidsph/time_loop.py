@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import final
+from collections.abc import Mapping
+from typing import Any, final
 
 import attrs
 import numpy as np
@@ -25,6 +26,11 @@ class StepError(Exception):
 
 class TimeLoop(ABC):
     """Steps of one scene."""
+
+    @property
+    def effort(self) -> Mapping[str, Any]:
+        """What the loop has to tell of its steps: "quantity [unit]" -> a number."""
+        return {}
 
     @abstractmethod
     def advance(self, state: State, stop: int) -> State:

@@ -237,8 +237,18 @@ def _of_motion(simulation: Simulation) -> list[tuple[str, Any, str]]:
             else "BELOW 1: the run will blow up; take a smaller time_step_factor",
         ),
         ("steps", simulation.steps, f"for {scene.duration:g} s"),
+        *_sleep(scene),
         _loop(simulation),
     ]
+
+
+def _sleep(scene: Scene) -> list[tuple[str, Any, str]]:
+    if scene.sleep is None:
+        return []
+    why = (
+        f"slabs slower than {scene.sleep.tolerance:g} of the largest speed sleep, and cost nothing"
+    )
+    return [("sleep", f"up to {scene.sleep.slabs} slabs", why)]
 
 
 def _of_statics(simulation: Simulation) -> list[tuple[str, Any, str]]:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import attrs
 
-from solidsph.arrays import Array
+from solidsph.arrays import Array, Indices
 from solidsph.body import Body
 from solidsph.engines.tally import Tally, Way
+from solidsph.errors import SceneError
 from solidsph.interfaces.condition import StressCondition
 
 if TYPE_CHECKING:
@@ -68,6 +69,24 @@ class InternalForces(ABC):
         from solidsph.engines.history import ArrayLaw  # which knows what forces are
 
         return ArrayLaw(body)
+
+    def check_parts(self) -> None:
+        """Raise SceneError unless the forces of some particles can be formed alone, by `part`."""
+        raise SceneError(
+            f"sleep: {type(self).__name__} cannot form the forces of some particles alone; use one "
+            "body of the total Lagrangian form whose material remembers nothing, without ghosts, "
+            "or leave [sleep] out"
+        )
+
+    def part(self, chosen: Indices) -> InternalForces:
+        """The same forces of the chosen particles alone, which are numbered in their order.
+
+        Right for those of them whose neighbours, and the neighbours of those, are all chosen.
+
+        Args:
+            chosen: particles in rising order, (k,).
+        """
+        raise AssertionError("`check_parts` has refused it")
 
     def advance(
         self, time: float, step: float, displacements: Array, memory: Mapping[str, Array]

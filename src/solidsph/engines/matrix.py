@@ -10,10 +10,10 @@ from typing import final
 
 import attrs
 import numpy as np
-from scipy.sparse import csr_array, hstack, vstack
+from scipy.sparse import csr_array, diags_array, hstack, vstack
 
-from solidsph.arrays import Array, Mask, Tensor
-from solidsph.body import Body
+from solidsph.arrays import Array, Indices, Mask, Tensor
+from solidsph.body import Body, part_of
 from solidsph.engines.engine import Engine, InternalForces, StressFields
 from solidsph.engines.tally import Tally, Way, array_bytes, vectors
 from solidsph.interfaces.condition import StressCondition
@@ -28,6 +28,21 @@ class Operators:
 
     gradient: csr_array  # (d n, n): row k n + p gives the derivative along axis k at p [1/m]
     force: csr_array  # (n, d n): from stress components along axis k to force [m^(d-1)]
+
+    def part(self, chosen: Indices) -> Operators:
+        """Those of the chosen particles; rows that reach beyond them are left out."""
+        n = self.force.shape[0]
+        gradients, forces = [], []
+        for k in range(self.gradient.shape[0] // n):
+            rows = csr_array(self.gradient[k * n + chosen])
+            inside = csr_array(rows[:, chosen])
+            complete = np.diff(inside.indptr) == np.diff(rows.indptr)
+            keep = diags_array(complete.astype(np.float64), format="csr")
+            gradients.append(keep @ inside)
+            forces.append(csr_array(csr_array(self.force[chosen])[:, k * n + chosen]) @ keep)
+        return Operators(
+            csr_array(vstack(gradients, format="csr")), csr_array(hstack(forces, format="csr"))
+        )
 
     @property
     def bytes(self) -> int:
@@ -174,6 +189,24 @@ class MatrixForces(InternalForces):
                 force[part.body.particles.ghosts] = 0.0
             forces[part.body.extent] = force
         return forces
+
+    def check_parts(self) -> None:
+        if self._whole is None:
+            super().check_parts()
+
+    def part(self, chosen: Indices) -> InternalForces:
+        whole = self._whole
+        if whole is None:
+            return super().part(chosen)
+        body = part_of(whole.body, chosen)
+        return fixed_forces([body], [whole.constant.part(chosen)], ())
+
+    @property
+    def _whole(self) -> _FixedBody | None:
+        """The only body, if its forces may be formed in parts."""
+        if self.conditions or len(self.parts) > 1 or not isinstance(self.parts[0], _FixedBody):
+            return None
+        return None if self.parts[0].body.particles.ghosts.any() else self.parts[0]
 
     def fields(self, displacements: Array) -> StressFields:
         n, d = displacements.shape

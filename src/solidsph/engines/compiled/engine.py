@@ -9,16 +9,21 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from solidsph.arrays import Array
-from solidsph.body import Body
+from solidsph.arrays import Array, Indices
+from solidsph.body import Body, part_of
 from solidsph.dynamics import Dynamics
 from solidsph.engines.compiled.blocks import STRIDE, group
 from solidsph.engines.compiled.chunks import weighted_chunks
 from solidsph.engines.compiled.history import CompiledLaw
 from solidsph.engines.compiled.loop import compiled_loop
 from solidsph.engines.compiled.moving import MovingBody, moving_body
+from solidsph.engines.compiled.part import part_of_rows
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux, no_law
-from solidsph.engines.compiled.rows import Rows, compressed, in_chunks
+from solidsph.engines.compiled.rows import (
+    Rows,
+    compressed,
+    in_chunks,
+)
 from solidsph.engines.compiled.shares import (
     Passes,
     Shares,
@@ -287,6 +292,43 @@ class CompiledForces(InternalForces):
         for part in self.parts:
             part.spread(stress[:, :, part.body.extent], forces[part.body.extent])
         return forces
+
+    def check_parts(self) -> None:
+        if self._whole is None:
+            super().check_parts()
+
+    def part(self, chosen: Indices) -> InternalForces:
+        whole = self._whole
+        if whole is None:
+            return super().part(chosen)
+        d, dtype = whole.body.particles.dimension, whole.u.dtype.name
+        rows = part_of_rows(whole.gradient, chosen, whole.body.particles.count)
+        count = rows.run_pairs + rows.row_pairs
+        threads = thread_count(count)
+        shares = shared(rows, d, dtype, threads)
+        own = attrs.evolve(
+            whole,
+            body=part_of(whole.body, chosen),
+            gradient=rows,
+            force=rows,
+            factors=whole.factors[chosen],
+            gradient_shares=shares,
+            force_shares=shares,
+            u=aligned((len(chosen) + group(d, dtype)) * STRIDE[d], dtype),
+            passes=passes(d, dtype, whole.law, threads > 1),
+            gradients=passes(d, dtype, no_law, threads > 1),
+            spread_pass=spread_pass(d, dtype, threads > 1),
+            pair_count=count,
+        )
+        return CompiledForces((own,), ())
+
+    @property
+    def _whole(self) -> CompiledBody | None:
+        """The only body, if its forces may be formed in parts."""
+        if self.conditions or len(self.parts) > 1 or not isinstance(self.parts[0], CompiledBody):
+            return None
+        only = self.parts[0]
+        return only if only.fused and not only.body.particles.ghosts.any() else None
 
     def law(self, body: Body) -> Law:
         try:

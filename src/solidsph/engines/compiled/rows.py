@@ -85,7 +85,7 @@ class Rows(NamedTuple):
         run = where >= 0
         sizes = np.diff(self.members)
         costs[run] = 0.4 * count[run] * sizes[where[run]]
-        starts = _starts(self.spans[:, 1] - self.spans[:, 0])
+        starts = starts_of(self.spans[:, 1] - self.spans[:, 0])
         row = -1 - where[~run]
         costs[~run] = starts[row + count[~run]] - starts[row]
         return costs
@@ -136,17 +136,17 @@ class _Compressor:
         """All that was added."""
         blocks = self._blocks.array()
         offsets = [one[0] for one in self._stencils]
-        members = _starts(np.array([len(one) for one in offsets], dtype=np.intp))
-        bands = [_bands(one, start) for one, start in zip(offsets, members[:-1], strict=True)]
+        members = starts_of(np.array([len(one) for one in offsets], dtype=np.intp))
+        banded = [bands(one, start) for one, start in zip(offsets, members[:-1], strict=True)]
         weights = self._weights.array()
         stencil_weights = [one[1].astype(self._dtype) for one in self._stencils]
         return Rows(
             blocks=np.ascontiguousarray(blocks[np.argsort(blocks[:, 0])]),
             members=members,
-            stencils=_starts(np.array([len(one) for one in bands], dtype=np.intp)),
+            stencils=starts_of(np.array([len(one) for one in banded], dtype=np.intp)),
             offsets=np.concatenate([np.empty(0, dtype=np.intp), *offsets]),
             stencil_weights=np.concatenate([weights[:0], *stencil_weights]),
-            bands=np.concatenate([np.empty((0, 3), dtype=np.intp), *bands]),
+            bands=np.concatenate([np.empty((0, 3), dtype=np.intp), *banded]),
             spans=self._spans.array(),
             row_offsets=self._offsets.array(),
             row_weights=weights,
@@ -214,11 +214,11 @@ def in_chunks(pairs: Pairs, weights: Array, rows: int = 2048) -> Iterator[tuple[
         yield part, weights[own]
 
 
-def _starts(lengths: Indices) -> Indices:
+def starts_of(lengths: Indices) -> Indices:
     return np.concatenate([[0], np.cumsum(lengths)]).astype(np.intp)
 
 
-def _bands(offsets: Indices, start: int) -> Indices:
+def bands(offsets: Indices, start: int) -> Indices:
     """Stretches of offsets that follow each other, (c, 3): first member, offset, width.
 
     `start` is the first member of all.
