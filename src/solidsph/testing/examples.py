@@ -23,6 +23,16 @@ TYPICAL: Mapping[str, Any] = {
     "amplitude": 0.2,  # [-]
     "rate": 20.0,  # [1/s]
     "seed": 1,
+    "yield_stress": 1e4,  # [Pa]; the kits strain by ten times as much and more
+    "hardening": 2e4,  # [Pa]
+    "saturation_stress": 1.5e4,  # [Pa]
+    "saturation_exponent": 20.0,  # [-]
+    "hardening_modulus": 2e4,  # [Pa]
+    "hardening_exponent": 0.3,  # [-]
+    "rate_coefficient": 0.02,  # [-]
+    "softening_exponent": 1.1,  # [-]
+    "melting_temperature": 500.0,  # [K]
+    "specific_heat": 0.1,  # [J/(kg K)], so that such a soft solid warms at all
     "prony": [{"share": 0.4, "time": 1e-2}, {"share": 0.2, "time": 1.0}],  # [-], [s]
     # Shapes
     "length": 1.3,  # [m]
@@ -50,7 +60,7 @@ TYPICAL_OF_KIND: Mapping[tuple[str, str], Any] = {
 }
 
 # Fields with a default that a part cannot do without all the same.
-_OFFERED = ("positions",)
+_OFFERED = ("positions", "hardening", "saturation_stress", "saturation_exponent")
 
 
 def example_part(kind: str, name: str, **parameters: Any) -> Any:
