@@ -32,23 +32,23 @@ from solidsph.tensors import (
 # Length of a deviator over its equivalent stress.
 ROOT = sqrt(2.0 / 3.0)
 
-# Newton's method from above, where the cubic is convex: each step squares the error. Three do for
-# metals, whose x is some thousandths.
-_CUBIC_STEPS = 8
+# Newton's method from above, where the cubic is convex: each step squares the error, x^2 / 3 at
+# first. Two do for metals, whose x is some thousandths, five for a flow stress near mu.
+_CUBIC_STEPS = 5
 
 _NONE = 1e-30  # keeps the direction of no deviator at all finite
 
 
-def metric(values: History, dimension: int) -> Tensor:
-    """G (3, 3), from its components in the dimensions that there are: det G = 1 gives the rest."""
-    if dimension == 1:
-        xx = values[0]
-        across = 1.0 / np.sqrt(xx)
-        return ((xx, 0.0, 0.0), (0.0, across, 0.0), (0.0, 0.0, across))
-    if dimension == 2:
-        xx, yy, xy = values
+def metric(history: History, F: Tensor) -> Tensor:
+    """G (3, 3), which the history begins with, in the dimensions of F: det G = 1 gives the rest."""
+    if len(F) == 1:
+        across = 1.0 / np.sqrt(history[0])
+        return ((history[0], 0.0, 0.0), (0.0, across, 0.0), (0.0, 0.0, across))
+    if len(F) == 2:
+        xx, yy, xy = history[0], history[1], history[2]
         return ((xx, xy, 0.0), (xy, yy, 0.0), (0.0, 0.0, 1.0 / (xx * yy - xy * xy)))
-    xx, yy, zz, yz, xz, xy = values
+    xx, yy, zz = history[0], history[1], history[2]
+    yz, xz, xy = history[3], history[4], history[5]
     return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
@@ -90,21 +90,22 @@ def flowed(F: Tensor, G: Tensor, b: Tensor, x: Scalar, before: Scalar, det_n: Sc
     return add(scale(share, G), sphere)
 
 
-def chosen(flows: Scalar, after: History, before: History) -> History:
-    """`after` where it flows, and `before` to the last bit where it does not."""
+def chosen(flows: Scalar, after: History, history: History) -> History:
+    """`after` where `flows` is 1; where it is 0, to the last bit, what the history begins with."""
+    stays = 1.0 - flows
     if len(after) == 1:
-        return (np.where(flows, after[0], before[0]),)
+        return (flows * after[0] + stays * history[0],)
     if len(after) == 3:
         return (
-            np.where(flows, after[0], before[0]),
-            np.where(flows, after[1], before[1]),
-            np.where(flows, after[2], before[2]),
+            flows * after[0] + stays * history[0],
+            flows * after[1] + stays * history[1],
+            flows * after[2] + stays * history[2],
         )
     return (
-        np.where(flows, after[0], before[0]),
-        np.where(flows, after[1], before[1]),
-        np.where(flows, after[2], before[2]),
-        np.where(flows, after[3], before[3]),
-        np.where(flows, after[4], before[4]),
-        np.where(flows, after[5], before[5]),
+        flows * after[0] + stays * history[0],
+        flows * after[1] + stays * history[1],
+        flows * after[2] + stays * history[2],
+        flows * after[3] + stays * history[3],
+        flows * after[4] + stays * history[4],
+        flows * after[5] + stays * history[5],
     )

@@ -28,8 +28,9 @@ from solidsph_builtin.materials._lame import checked_lame
 from solidsph_builtin.materials._symmetric import component_count, components, names
 from solidsph_builtin.materials._wide import narrowed, widened, widened_change
 
-# Newton's method from the trial state comes down monotonically, since hardening never quickens.
-_STEPS = 10
+# Newton's method from the trial state comes down monotonically, since hardening never quickens. Two
+# do for a straight line, six for the bend of saturation within steps of some per cent of strain.
+_STEPS = 6
 
 PLASTIC_STRAIN = "plastic strain [-]"
 
@@ -112,7 +113,7 @@ class J2Plasticity(HistoryMaterial):
     @staticmethod
     def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
         mu, size = params[1], component_count(len(F))
-        wide, G = widened(F), metric(history[:size], len(F))
+        wide, G = widened(F), metric(history, F)
         e_before, lost = history[size], history[size + 1]
         b = elastic_metric(wide, G)
         trial = deviator_length(b)
@@ -125,20 +126,21 @@ class J2Plasticity(HistoryMaterial):
             miss = mu * x - ROOT * _flow_stress(e, params)
             x = x - miss / (mu + ROOT * share * _slope(e, params))
             x = np.minimum(np.maximum(x, least), trial)
-        flows = trial > least
-        e = e_before + np.where(flows, strain_of_flow(x, det_n) * (trial - x), 0.0)
+        flows = 1.0 * (trial > least)
+        e = e_before + flows * strain_of_flow(x, det_n) * (trial - x)
         after = components(narrowed(flowed(wide, G, b, x, trial, det_n), F))
         work = _plastic_work(e, params) - _plastic_work(e_before, params)
-        return (*chosen(flows, after, history[:size]), e, lost + work)
+        # A sum of tuples: unpacking does not compile.
+        return chosen(flows, after, history) + (e, lost + work)  # noqa: RUF005
 
     @staticmethod
     def stored(F: Tensor, history: History, params: tuple[float, ...]) -> Scalar:
-        G = metric(history[: component_count(len(F))], len(F))
+        G = metric(history, F)
         return energy_of(widened(F), G, params[0], params[1])
 
     @staticmethod
     def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:
-        G = metric(history[: component_count(len(F))], len(F))
+        G = metric(history, F)
         return narrowed(stress_of(widened(F), G, params[0], params[1]), F)
 
     @staticmethod

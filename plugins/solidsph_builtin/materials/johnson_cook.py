@@ -145,7 +145,7 @@ class JohnsonCook(HistoryMaterial):
     @staticmethod
     def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
         mu, size = params[1], component_count(len(F))
-        wide, G = widened(F), metric(history[:size], len(F))
+        wide, G = widened(F), metric(history, F)
         e, T, lost = history[size], history[size + 1], history[size + 2]
         b = elastic_metric(wide, G)
         trial = deviator_length(b)
@@ -160,21 +160,22 @@ class JohnsonCook(HistoryMaterial):
             slope = mu + ROOT * share * _slope(e, added, after, step, params)
             longer = fall * np.exp(miss / (slope * fall))
             fall = np.maximum(np.minimum(longer, trial), _SMALLEST)
-        flows, x = trial > begin, trial - fall
-        added = np.where(flows, strain_of_flow(x, det_n) * fall, 0.0)
+        flows, x = 1.0 * (trial > begin), trial - fall
+        added = flows * strain_of_flow(x, det_n) * fall
         work = _plastic_work(e, added, T, step, params)
         G_after = components(narrowed(flowed(wide, G, b, x, trial, det_n), F))
-        G_kept = chosen(flows, G_after, history[:size])
-        return (*G_kept, e + added, T + params[10] * work, lost + work)
+        G_kept = chosen(flows, G_after, history)
+        # A sum of tuples: unpacking does not compile.
+        return G_kept + (e + added, T + params[10] * work, lost + work)  # noqa: RUF005
 
     @staticmethod
     def stored(F: Tensor, history: History, params: tuple[float, ...]) -> Scalar:
-        G = metric(history[: component_count(len(F))], len(F))
+        G = metric(history, F)
         return energy_of(widened(F), G, params[0], params[1])
 
     @staticmethod
     def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:
-        G = metric(history[: component_count(len(F))], len(F))
+        G = metric(history, F)
         return narrowed(stress_of(widened(F), G, params[0], params[1]), F)
 
     @staticmethod
@@ -211,8 +212,8 @@ def _slope(e: Scalar, added: Scalar, T: Scalar, step: float, params: tuple[float
     total = np.maximum(e + added, _SMALLEST)
     hardened = params[2] + params[3] * total ** params[4]
     of_rate, of_temperature = _of_rate(added, step, params), _of_temperature(T, params)
-    fast = added > step * params[7]
-    by_rate = np.where(fast, params[5] / np.maximum(added, _SMALLEST), 0.0)
+    fast = 1.0 * (added > step * params[7])
+    by_rate = fast * params[5] / np.maximum(added, _SMALLEST)
     warm = np.maximum(_homologous(T, params), _SMALLEST)
     softening = params[6] * warm ** (params[6] - 1.0) / (params[9] - params[8])
     heating = params[10] * hardened * of_rate * of_temperature
