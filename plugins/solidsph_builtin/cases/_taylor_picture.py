@@ -58,11 +58,11 @@ def draw_bar(
             axes.axhspan(*(1e3 * end for end in ranges[row]), color="tab:blue", alpha=0.3)
             axes.annotate(
                 "published at the end",
-                (0.02, 1e3 * ranges[row][1]),
+                (0.02, 1e3 * ranges[row][1 - row]),
                 xycoords=("axes fraction", "data"),
                 fontsize=8,
                 color="tab:blue",
-                va="bottom",
+                va="top" if row else "bottom",
             )
         axes.set_ylabel(f"{name} [mm]")
         axes.set_xlabel("time [us]")

@@ -59,7 +59,7 @@ class TaylorBar(Case):
     }
     trials: ClassVar[Mapping[str, Trial]] = {"227 m/s": Trial({}, {"across": 2, "tolerance": 0.1})}
 
-    across: int = 4  # particles along a radius, the one on the axis left out
+    across: int = 5  # particles along a radius, the one on the axis left out
     velocity: float = number(default=227.0)  # of impact [m/s]
     duration: float = number(default=_DURATION)  # [s]
     kernel: str = "cubic-spline"
@@ -68,7 +68,7 @@ class TaylorBar(Case):
     hourglass: float = number(default=0.05)  # strength [-]; 0 names none
     engine: str = "compiled"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.15)  # of the CFL step at the start
+    time_step_factor: float = number(default=0.12)  # of the CFL step at the start
     tolerance: float = number(default=0.005)  # how far off the published range passes [-]
     energy_tolerance: float = number(default=1e-3)  # of the energy at the start [-]
 
