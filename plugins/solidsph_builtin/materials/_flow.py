@@ -76,10 +76,14 @@ def spherical_part(x: Scalar, det_n: Scalar) -> Scalar:
     return c
 
 
-def strain_of_flow(x: Scalar, det_n: Scalar) -> Scalar:
-    """Equivalent plastic strain over -dx, at x: sqrt(3/2) (dc/dx) / x."""
-    c = spherical_part(x, det_n)
-    return (c - 3.0 * x * det_n) / (3.0 * c**2 - 0.5 * x**2) / ROOT
+def strain_of_flow(x: Scalar, before: Scalar, det_n: Scalar) -> Scalar:
+    """Equivalent plastic strain over the fall of x from `before`: sqrt(3/2) (dc/dx) / x half way.
+
+    The middle makes a step of the second order where the direction stays.
+    """
+    half = 0.5 * (x + before)
+    c = spherical_part(half, det_n)
+    return (c - 3.0 * half * det_n) / (3.0 * c**2 - 0.5 * half**2) / ROOT
 
 
 def flowed(F: Tensor, G: Tensor, b: Tensor, x: Scalar, before: Scalar, det_n: Scalar) -> Tensor:

@@ -121,13 +121,13 @@ class J2Plasticity(HistoryMaterial):
         least = ROOT * _flow_stress(e_before, params) / mu
         x = trial
         for _ in range(_STEPS):
-            share = strain_of_flow(x, det_n)
+            share = strain_of_flow(x, trial, det_n)
             e = e_before + share * (trial - x)
             miss = mu * x - ROOT * _flow_stress(e, params)
             x = x - miss / (mu + ROOT * share * _slope(e, params))
             x = np.minimum(np.maximum(x, least), trial)
         flows = 1.0 * (trial > least)
-        e = e_before + flows * strain_of_flow(x, det_n) * (trial - x)
+        e = e_before + flows * strain_of_flow(x, trial, det_n) * (trial - x)
         after = components(narrowed(flowed(wide, G, b, x, trial, det_n), F))
         work = _plastic_work(e, params) - _plastic_work(e_before, params)
         # A sum of tuples: unpacking does not compile.

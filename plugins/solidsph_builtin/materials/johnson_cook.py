@@ -153,7 +153,7 @@ class JohnsonCook(HistoryMaterial):
         begin = ROOT * _flow_stress(e, 0.0, T, step, params) / mu
         fall = np.maximum(trial - begin, _SMALLEST)
         for _ in range(_STEPS):
-            share = strain_of_flow(trial - fall, det_n)
+            share = strain_of_flow(trial - fall, trial, det_n)
             added = share * fall
             after = T + params[10] * _plastic_work(e, added, T, step, params)
             miss = mu * (trial - fall) - ROOT * _flow_stress(e, added, after, step, params)
@@ -161,7 +161,7 @@ class JohnsonCook(HistoryMaterial):
             longer = fall * np.exp(miss / (slope * fall))
             fall = np.maximum(np.minimum(longer, trial), _SMALLEST)
         flows, x = 1.0 * (trial > begin), trial - fall
-        added = flows * strain_of_flow(x, det_n) * fall
+        added = flows * strain_of_flow(x, trial, det_n) * fall
         work = _plastic_work(e, added, T, step, params)
         G_after = components(narrowed(flowed(wide, G, b, x, trial, det_n), F))
         G_kept = chosen(flows, G_after, history)
