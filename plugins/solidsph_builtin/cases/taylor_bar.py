@@ -48,11 +48,11 @@ class TaylorBar(Case):
     which its particles come so close that the stable step is some tenth of the one at the start.
 
     Hourglass control is a spring, and does not know that the metal has yielded: at its usual
-    strength it holds the foot together, which costs half a millimetre of its radius.
+    strength it holds the foot together, which costs 0.4 mm of its radius at four particles along it.
     """
 
     title: ClassVar[str] = "A Taylor bar"
-    source: ClassVar[str] = "Taylor (1948); the copper bar of Wilkins & Guinan (1973) at 227 m/s"
+    source: ClassVar[str] = "Taylor (1948); the copper bar by which codes are compared, at 227 m/s"
     sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
         "across": (2, 3, 4, 5),
         "gradient": ("corrected", "quadratic"),
