@@ -48,7 +48,8 @@ class TaylorBar(Case):
     which its particles come so close that the stable step is some tenth of the one at the start.
 
     Hourglass control is a spring, and does not know that the metal has yielded: at its usual
-    strength it holds the foot together, which costs 0.4 mm of its radius at four particles along it.
+    strength it holds the foot together, which costs 0.4 mm of its radius with four particles along
+    it.
     """
 
     title: ClassVar[str] = "A Taylor bar"
