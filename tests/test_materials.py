@@ -32,7 +32,14 @@ def test_conformance(name: str, check: Check) -> None:
 )
 @pytest.mark.parametrize("poissons_ratio", [-0.5, 0.0, 0.49])
 def test_conformance_for_other_ratios(name: str, poissons_ratio: float) -> None:
-    part = example_part("materials", name, youngs_modulus=200e9, poissons_ratio=poissons_ratio)
+    # As hard as steel, but where the yield stress, of rubber, would then be next to nothing.
+    flows = "yield_stress" in attrs.fields_dict(registry.load("materials", name))
+    part = example_part(
+        "materials",
+        name,
+        youngs_modulus=1e6 if flows else 200e9,
+        poissons_ratio=poissons_ratio,
+    )
     assert [result for result in conformance("materials", part) if not result.passed] == []
 
 
@@ -70,7 +77,9 @@ def test_work_along_a_path_is_the_energy_stored(
         return  # a straight line to a large rotation passes through states without volume
     power = [np.vdot(np.array(material.first_piola(at, material.params)), H) for at in path]
     lam, mu = material.lame_parameters
-    # 40 Gauss points resolve 1 / J on a path that stays away from J = 0.
-    assert abs(0.5 * np.dot(weights, power) - material.energy(F, material.params)) < 1e-9 * (
+    # 40 Gauss points resolve 1 / J on a path that stays away from J = 0; a bend of the stress, of
+    # the order of the moduli, is off by the square of their distance.
+    tolerance = 1e-9 if material.smooth else 1e-3
+    assert abs(0.5 * np.dot(weights, power) - material.energy(F, material.params)) < tolerance * (
         lam + 2.0 * mu
     )

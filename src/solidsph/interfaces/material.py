@@ -20,6 +20,13 @@ class Material(ABC):
     objective: ClassVar[bool] = True
     """Whether a rigid rotation leaves the energy alone. A law of small strains says False."""
 
+    isotropic: ClassVar[bool] = True
+    """Whether all directions are alike at small strain. A law with fibres says False; its Lame
+    parameters are then those of an isotropic one that is nowhere less stiff."""
+
+    smooth: ClassVar[bool] = True
+    """Whether the tangent is continuous. A law of fibres that go slack says False."""
+
     @property
     @abstractmethod
     def density(self) -> float:
@@ -33,7 +40,7 @@ class Material(ABC):
     @property
     @abstractmethod
     def lame_parameters(self) -> tuple[float, float]:
-        """Moduli (lambda, mu) of the linear law that holds at small strain [Pa]."""
+        """Moduli (lambda, mu) of the linear law that holds at small strain [Pa], or bounds it."""
 
     @staticmethod
     @abstractmethod

@@ -23,6 +23,30 @@ TYPICAL: Mapping[str, Any] = {
     "amplitude": 0.2,  # [-]
     "rate": 20.0,  # [1/s]
     "seed": 1,
+    "c10": 1.5e5,  # [Pa]
+    "c01": 0.4e5,  # [Pa]
+    # Fibres of that rubber's stiffness; real ones stiffen so fast that at the 40 % of strain of the
+    # kit their stress would be a million times its scale.
+    "matrix_stiffness": 3e5,  # [Pa]
+    "matrix_exponent": 0.5,  # [-]
+    "fibre_stiffness": 2e5,  # [Pa]
+    "fibre_exponent": 0.6,  # [-]
+    "sheet_stiffness": 1e5,  # [Pa]
+    "sheet_exponent": 0.4,  # [-]
+    "coupling_stiffness": 0.5e5,  # [Pa]
+    "coupling_exponent": 0.3,  # [-]
+    "fibre": [0.8, 0.6, 0.0],
+    "sheet": [-0.36, 0.48, 0.8],
+    "yield_stress": 1e4,  # [Pa]; the kits strain by ten times as much and more
+    "hardening": 2e4,  # [Pa]
+    "saturation_stress": 1.5e4,  # [Pa]
+    "saturation_exponent": 20.0,  # [-]
+    "hardening_modulus": 2e4,  # [Pa]
+    "hardening_exponent": 0.3,  # [-]
+    "rate_coefficient": 0.02,  # [-]
+    "softening_exponent": 1.1,  # [-]
+    "melting_temperature": 500.0,  # [K]
+    "specific_heat": 0.1,  # [J/(kg K)], so that such a soft solid warms at all
     "prony": [{"share": 0.4, "time": 1e-2}, {"share": 0.2, "time": 1.0}],  # [-], [s]
     "time": 1e-5,  # [s]
     "critical_stretch": 4e-4,  # [-]
@@ -57,7 +81,16 @@ TYPICAL_OF_KIND: Mapping[tuple[str, str], Any] = {
 }
 
 # Fields with a default that a part cannot do without all the same.
-_OFFERED = ("positions", "expansion", "initial")
+_OFFERED = (
+    "positions",
+    "expansion",
+    "initial",
+    "hardening",
+    "saturation_stress",
+    "saturation_exponent",
+    "fibre",
+    "sheet",
+)
 
 
 def example_part(kind: str, name: str, **parameters: Any) -> Any:

@@ -1,0 +1,115 @@
+"""Plastic flow that keeps volume: the way back to the yield surface at a fixed deformation.
+
+The history holds G = C_p^-1, symmetric and of determinant 1. With the isochoric elastic metric
+b = J^(-2/3) F G F^T = c I + x n, where n is a deviator of length 1, the deviator of the Kirchhoff
+stress is mu x n. At fixed F flow shortens x and keeps n, and c follows from det b = 1; the radial
+return of Simo (1988), but for that last condition, without which elastic volumes drift.
+
+The equivalent plastic strain is the conjugate of the equivalent stress sqrt(3/2) mu x: what flow
+takes from the stored energy, mu/2 d(tr b), is equivalent stress times its increment, exactly.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from solidsph.arrays import Scalar, Tensor
+from solidsph.interfaces.history import History
+from solidsph.tensors import (
+    add,
+    contraction,
+    determinant,
+    identity,
+    inverse_transpose,
+    product,
+    scale,
+    trace,
+    transpose,
+)
+
+# Length of a deviator over its equivalent stress.
+ROOT = sqrt(2.0 / 3.0)
+
+# Newton's method from above, where the cubic is convex: each step squares the error, x^2 / 3 at
+# first. Two do for metals, whose x is some thousandths, five for a flow stress near mu.
+_CUBIC_STEPS = 5
+
+_NONE = 1e-30  # keeps the direction of no deviator at all finite
+
+
+def metric(history: History, F: Tensor) -> Tensor:
+    """G (3, 3), which the history begins with, in the dimensions of F: det G = 1 gives the rest."""
+    if len(F) == 1:
+        across = 1.0 / np.sqrt(history[0])
+        return ((history[0], 0.0, 0.0), (0.0, across, 0.0), (0.0, 0.0, across))
+    if len(F) == 2:
+        xx, yy, xy = history[0], history[1], history[2]
+        return ((xx, xy, 0.0), (xy, yy, 0.0), (0.0, 0.0, 1.0 / (xx * yy - xy * xy)))
+    xx, yy, zz = history[0], history[1], history[2]
+    yz, xz, xy = history[3], history[4], history[5]
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+
+
+def elastic_metric(F: Tensor, G: Tensor) -> Tensor:
+    """b = J^(-2/3) F G F^T."""
+    return scale(determinant(F) ** (-2.0 / 3.0), product(F, product(G, transpose(F))))
+
+
+def deviator_length(b: Tensor) -> Scalar:
+    """x = |dev b|."""
+    s = add(b, scale(-trace(b) / 3.0, identity(b)))
+    return np.maximum(np.sqrt(contraction(s, s)), _NONE)
+
+
+def direction_determinant(b: Tensor, x: Scalar) -> Scalar:
+    """det n, between -1/sqrt(54) and 1/sqrt(54)."""
+    return determinant(scale(1.0 / x, add(b, scale(-trace(b) / 3.0, identity(b)))))
+
+
+def spherical_part(x: Scalar, det_n: Scalar) -> Scalar:
+    """c of det(c I + x n) = c^3 - c x^2 / 2 + x^3 det n = 1."""
+    c = 1.0 + 0.5 * x**2  # never below the root
+    for _ in range(_CUBIC_STEPS):
+        c = c - (c**3 - 0.5 * c * x**2 + x**3 * det_n - 1.0) / (3.0 * c**2 - 0.5 * x**2)
+    return c
+
+
+def strain_of_flow(x: Scalar, before: Scalar, det_n: Scalar) -> Scalar:
+    """Equivalent plastic strain over the fall of x from `before`: sqrt(3/2) (dc/dx) / x half way.
+
+    The middle makes a step of the second order where the direction stays.
+    """
+    half = 0.5 * (x + before)
+    c = spherical_part(half, det_n)
+    return (c - 3.0 * half * det_n) / (3.0 * c**2 - 0.5 * half**2) / ROOT
+
+
+def flowed(F: Tensor, G: Tensor, b: Tensor, x: Scalar, before: Scalar, det_n: Scalar) -> Tensor:
+    """G after x has fallen from `before`, that of b: J^(2/3) F^-1 (c I + x n) F^-T."""
+    share, B = x / before, inverse_transpose(F)
+    rest = spherical_part(x, det_n) - share * trace(b) / 3.0
+    sphere = scale(rest * determinant(F) ** (2.0 / 3.0), product(transpose(B), B))
+    return add(scale(share, G), sphere)
+
+
+def chosen(flows: Scalar, after: History, history: History) -> History:
+    """`after` where `flows` is 1; where it is 0, to the last bit, what the history begins with."""
+    stays = 1.0 - flows
+    if len(after) == 1:
+        return (flows * after[0] + stays * history[0],)
+    if len(after) == 3:
+        return (
+            flows * after[0] + stays * history[0],
+            flows * after[1] + stays * history[1],
+            flows * after[2] + stays * history[2],
+        )
+    return (
+        flows * after[0] + stays * history[0],
+        flows * after[1] + stays * history[1],
+        flows * after[2] + stays * history[2],
+        flows * after[3] + stays * history[3],
+        flows * after[4] + stays * history[4],
+        flows * after[5] + stays * history[5],
+    )

@@ -1,0 +1,166 @@
+"""Metal plasticity: von Mises' yield stress with linear and saturating hardening."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, final
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Scalar, Tensor
+from solidsph.errors import SceneError
+from solidsph.interfaces.history import History, HistoryMaterial
+from solidsph.parameters import check_positive, number
+from solidsph.tensors import identity
+from solidsph_builtin.materials._flow import (
+    ROOT,
+    chosen,
+    deviator_length,
+    direction_determinant,
+    elastic_metric,
+    flowed,
+    metric,
+    strain_of_flow,
+)
+from solidsph_builtin.materials._isochoric import energy_of, stress_of, tangent_of
+from solidsph_builtin.materials._lame import checked_lame
+from solidsph_builtin.materials._symmetric import component_count, components, names
+from solidsph_builtin.materials._wide import narrowed, widened, widened_change
+
+# Newton's method from the trial state comes down monotonically, since hardening never quickens. Two
+# do for a straight line, six for the bend of saturation within steps of some per cent of strain.
+_STEPS = 6
+
+PLASTIC_STRAIN = "plastic strain [-]"
+
+
+@final
+@attrs.frozen
+class J2Plasticity(HistoryMaterial):
+    """psi = kappa/2 ((J^2 - 1)/2 - ln J) + mu/2 (J^(-2/3) C : C_p^-1 - 3), with det C_p = 1.
+
+    Multiplicative J2 flow with isotropic hardening, Simo (1988), Simo & Hughes (1998), chapter 9:
+    the equivalent Kirchhoff stress stays within
+
+        yield + (saturation - yield) (1 - exp(-exponent e)) + hardening e,
+
+    e the equivalent plastic strain. A step is a radial return that keeps det C_p = 1
+    (`materials/_flow.py`), solved to rounding.
+
+    All plastic work counts as dissipated: what hardening stores in the crystal is no more given
+    back by unloading than heat is.
+    """
+
+    youngs_modulus: float = number()  # E [Pa]
+    poissons_ratio: float = number()  # nu [-]
+    density: float = number()  # rho_0 [kg/m^3]
+    yield_stress: float = number()  # [Pa]
+    hardening: float = number(default=0.0)  # slope over the plastic strain [Pa]
+    saturation_stress: float = number(default=0.0)  # [Pa]; 0: there is none, the yield stress stays
+    saturation_exponent: float = number(default=1.0)  # [-]
+
+    shown: ClassVar[Sequence[str]] = (PLASTIC_STRAIN,)
+
+    def __attrs_post_init__(self) -> None:
+        law = "j2-plasticity"
+        checked_lame(law, self.youngs_modulus, self.poissons_ratio, self.density)
+        check_positive(f"material {law!r}", "yield_stress", self.yield_stress, "Pa")
+        check_positive(f"material {law!r}", "saturation_exponent", self.saturation_exponent, "1")
+        if not 0.0 <= self.hardening < 1e100:
+            raise SceneError(
+                f"material {law!r}: hardening must not be negative, got {self.hardening}; a law "
+                "that softens has no width of its own for what localises"
+            )
+        if self.saturation_stress and not self.yield_stress <= self.saturation_stress < 1e100:
+            raise SceneError(
+                f"material {law!r}: saturation_stress must be at least the yield stress of "
+                f"{self.yield_stress:g} Pa, got {self.saturation_stress}; leave it out for none"
+            )
+
+    @property
+    def lame_parameters(self) -> tuple[float, float]:
+        law = "j2-plasticity"
+        return checked_lame(law, self.youngs_modulus, self.poissons_ratio, self.density)
+
+    @property
+    def params(self) -> tuple[float, ...]:
+        """kappa, mu, then yield stress, rise to saturation, its exponent, slope."""
+        lam, mu = self.lame_parameters
+        rise = self.saturation_stress - self.yield_stress if self.saturation_stress else 0.0
+        hardening = (rise, self.saturation_exponent, self.hardening)
+        return (lam + 2.0 / 3.0 * mu, mu, self.yield_stress, *hardening)
+
+    def initial_history(self, dimension: int) -> Mapping[str, float]:
+        one = {"xx": 1.0, "yy": 1.0, "zz": 1.0}
+        inverse = {f"inverse plastic metric {a} [-]": one.get(a, 0.0) for a in names(dimension)}
+        return {**inverse, PLASTIC_STRAIN: 0.0, "dissipated energy [J/m^3]": 0.0}
+
+    @staticmethod
+    def energy(F: Tensor, params: tuple[float, ...]) -> Scalar:
+        wide = widened(F)
+        return energy_of(wide, identity(wide), params[0], params[1])
+
+    @staticmethod
+    def first_piola(F: Tensor, params: tuple[float, ...]) -> Tensor:
+        wide = widened(F)
+        return narrowed(stress_of(wide, identity(wide), params[0], params[1]), F)
+
+    @staticmethod
+    def tangent(F: Tensor, dF: Tensor, params: tuple[float, ...]) -> Tensor:
+        return narrowed(tangent_of(widened(F), widened_change(dF), params[0], params[1]), F)
+
+    @staticmethod
+    def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
+        mu, size = params[1], component_count(len(F))
+        wide, G = widened(F), metric(history, F)
+        e_before, lost = history[size], history[size + 1]
+        b = elastic_metric(wide, G)
+        trial = deviator_length(b)
+        det_n = direction_determinant(b, trial)
+        least = ROOT * _flow_stress(e_before, params) / mu
+        x = trial
+        for _ in range(_STEPS):
+            share = strain_of_flow(x, trial, det_n)
+            e = e_before + share * (trial - x)
+            miss = mu * x - ROOT * _flow_stress(e, params)
+            x = x - miss / (mu + ROOT * share * _slope(e, params))
+            x = np.minimum(np.maximum(x, least), trial)
+        flows = 1.0 * (trial > least)
+        e = e_before + flows * strain_of_flow(x, trial, det_n) * (trial - x)
+        after = components(narrowed(flowed(wide, G, b, x, trial, det_n), F))
+        work = _plastic_work(e, params) - _plastic_work(e_before, params)
+        # A sum of tuples: unpacking does not compile.
+        return chosen(flows, after, history) + (e, lost + work)  # noqa: RUF005
+
+    @staticmethod
+    def stored(F: Tensor, history: History, params: tuple[float, ...]) -> Scalar:
+        G = metric(history, F)
+        return energy_of(widened(F), G, params[0], params[1])
+
+    @staticmethod
+    def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:
+        G = metric(history, F)
+        return narrowed(stress_of(widened(F), G, params[0], params[1]), F)
+
+    @staticmethod
+    def dissipated(history: History) -> Scalar:
+        return history[-1]
+
+
+def _flow_stress(e: Scalar, params: tuple[float, ...]) -> Scalar:
+    """Equivalent stress of flow at the plastic strain e [Pa]."""
+    first, rise, exponent, slope = params[2:]
+    return first - rise * np.expm1(-exponent * e) + slope * e
+
+
+def _slope(e: Scalar, params: tuple[float, ...]) -> Scalar:
+    """Its derivative."""
+    return params[3] * params[4] * np.exp(-params[4] * e) + params[5]
+
+
+def _plastic_work(e: Scalar, params: tuple[float, ...]) -> Scalar:
+    """Its integral from 0 to e [J/m^3]."""
+    first, rise, exponent, slope = params[2:]
+    saturating = rise * (e + np.expm1(-exponent * e) / exponent)
+    return first * e + saturating + 0.5 * slope * e**2

@@ -1,0 +1,235 @@
+"""Metal plasticity at high rates: yield stress by strain, rate and temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, final
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Scalar, Tensor
+from solidsph.errors import SceneError
+from solidsph.interfaces.history import History, HistoryMaterial
+from solidsph.parameters import check_positive, number
+from solidsph.tensors import identity
+from solidsph_builtin.materials._flow import (
+    ROOT,
+    chosen,
+    deviator_length,
+    direction_determinant,
+    elastic_metric,
+    flowed,
+    metric,
+    strain_of_flow,
+)
+from solidsph_builtin.materials._isochoric import energy_of, stress_of, tangent_of
+from solidsph_builtin.materials._lame import checked_lame
+from solidsph_builtin.materials._symmetric import component_count, components, names
+from solidsph_builtin.materials._wide import narrowed, widened, widened_change
+from solidsph_builtin.materials.j2_plasticity import PLASTIC_STRAIN
+
+TEMPERATURE = "temperature [K]"
+
+# Newton's method for the logarithm of the fall of x, in which the flow stress is next to linear at
+# high rates. The miss is concave, so that it comes down monotonically from a fall that is too far.
+# Twelve reach rounding for strains of up to a per cent in a step.
+_STEPS = 12
+
+# Slopes of powers below 1, and logarithms, have no value at zero.
+_SMALLEST = 1e-30
+
+
+@final
+@attrs.frozen
+class JohnsonCook(HistoryMaterial):
+    """The elastic energy of `j2-plasticity`, and the flow stress of Johnson & Cook (1983):
+
+        (yield + B e^n) (1 + C ln(e' / reference rate)) (1 - T*^m),
+        T* = (T - reference) / (melting - reference), within 0 and 1,
+
+    e the equivalent plastic strain, e' its rate; below the reference rate the logarithm is 0. Heat
+    has no time to flow: rho_0 c dT = heat_share times the plastic work (Taylor & Quinney, 1934),
+    all of which counts as dissipated. A step is the radial return of `materials/_flow.py` to the
+    flow stress at its end, with the rate and the temperature there.
+    """
+
+    youngs_modulus: float = number()  # E [Pa]
+    poissons_ratio: float = number()  # nu [-]
+    density: float = number()  # rho_0 [kg/m^3]
+    yield_stress: float = number()  # A [Pa]
+    hardening_modulus: float = number()  # B [Pa]
+    hardening_exponent: float = number()  # n [-]
+    rate_coefficient: float = number()  # C [-]
+    softening_exponent: float = number()  # m [-]
+    melting_temperature: float = number()  # [K]
+    specific_heat: float = number()  # c [J/(kg K)]
+    reference_rate: float = number(default=1.0)  # [1/s]
+    reference_temperature: float = number(default=293.0)  # [K]
+    temperature: float = number(default=293.0)  # at the start [K]
+    heat_share: float = number(default=0.9)  # of the plastic work [-]
+
+    shown: ClassVar[Sequence[str]] = (PLASTIC_STRAIN, TEMPERATURE)
+    rate_dependent: ClassVar[bool] = True
+
+    def __attrs_post_init__(self) -> None:
+        law = "material 'johnson-cook'"
+        checked_lame("johnson-cook", self.youngs_modulus, self.poissons_ratio, self.density)
+        for name, unit in (
+            ("yield_stress", "Pa"),
+            ("hardening_exponent", "1"),
+            ("softening_exponent", "1"),
+            ("specific_heat", "J/(kg K)"),
+            ("reference_rate", "1/s"),
+            ("reference_temperature", "K"),
+            ("temperature", "K"),
+        ):
+            check_positive(law, name, getattr(self, name), unit)
+        for name in ("hardening_modulus", "rate_coefficient"):
+            value = getattr(self, name)
+            if not 0.0 <= value < 1e100:
+                raise SceneError(f"{law}: {name} must not be negative, got {value}; 0 is none")
+        if not self.reference_temperature < self.melting_temperature < 1e100:
+            raise SceneError(
+                f"{law}: melting_temperature must be above the reference temperature of "
+                f"{self.reference_temperature:g} K, got {self.melting_temperature}; give both in K"
+            )
+        if not 0.0 <= self.heat_share <= 1.0:
+            raise SceneError(
+                f"{law}: heat_share must lie between 0 and 1, got {self.heat_share}; 0.9 is usual"
+            )
+
+    @property
+    def lame_parameters(self) -> tuple[float, float]:
+        return checked_lame("johnson-cook", self.youngs_modulus, self.poissons_ratio, self.density)
+
+    @property
+    def params(self) -> tuple[float, ...]:
+        """kappa, mu, A, B, n, C, m, reference rate, reference and melting temperature, dT over
+        plastic work."""
+        lam, mu = self.lame_parameters
+        return (
+            lam + 2.0 / 3.0 * mu,
+            mu,
+            self.yield_stress,
+            self.hardening_modulus,
+            self.hardening_exponent,
+            self.rate_coefficient,
+            self.softening_exponent,
+            self.reference_rate,
+            self.reference_temperature,
+            self.melting_temperature,
+            self.heat_share / (self.density * self.specific_heat),
+        )
+
+    def initial_history(self, dimension: int) -> Mapping[str, float]:
+        one = {"xx": 1.0, "yy": 1.0, "zz": 1.0}
+        inverse = {f"inverse plastic metric {a} [-]": one.get(a, 0.0) for a in names(dimension)}
+        rest = {TEMPERATURE: self.temperature, "dissipated energy [J/m^3]": 0.0}
+        return {**inverse, PLASTIC_STRAIN: 0.0, **rest}
+
+    @staticmethod
+    def energy(F: Tensor, params: tuple[float, ...]) -> Scalar:
+        wide = widened(F)
+        return energy_of(wide, identity(wide), params[0], params[1])
+
+    @staticmethod
+    def first_piola(F: Tensor, params: tuple[float, ...]) -> Tensor:
+        wide = widened(F)
+        return narrowed(stress_of(wide, identity(wide), params[0], params[1]), F)
+
+    @staticmethod
+    def tangent(F: Tensor, dF: Tensor, params: tuple[float, ...]) -> Tensor:
+        return narrowed(tangent_of(widened(F), widened_change(dF), params[0], params[1]), F)
+
+    @staticmethod
+    def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
+        mu, size = params[1], component_count(len(F))
+        wide, G = widened(F), metric(history, F)
+        e, T, lost = history[size], history[size + 1], history[size + 2]
+        b = elastic_metric(wide, G)
+        trial = deviator_length(b)
+        det_n = direction_determinant(b, trial)
+        begin = ROOT * _flow_stress(e, 0.0, T, step, params) / mu
+        fall = np.maximum(trial - begin, _SMALLEST)
+        for _ in range(_STEPS):
+            share = strain_of_flow(trial - fall, trial, det_n)
+            added = share * fall
+            after = T + params[10] * _plastic_work(e, added, T, step, params)
+            miss = mu * (trial - fall) - ROOT * _flow_stress(e, added, after, step, params)
+            slope = mu + ROOT * share * _slope(e, added, after, step, params)
+            longer = fall * np.exp(miss / (slope * fall))
+            fall = np.maximum(np.minimum(longer, trial), _SMALLEST)
+        flows, x = 1.0 * (trial > begin), trial - fall
+        added = flows * strain_of_flow(x, trial, det_n) * fall
+        work = _plastic_work(e, added, T, step, params)
+        G_after = components(narrowed(flowed(wide, G, b, x, trial, det_n), F))
+        G_kept = chosen(flows, G_after, history)
+        # A sum of tuples: unpacking does not compile.
+        return G_kept + (e + added, T + params[10] * work, lost + work)  # noqa: RUF005
+
+    @staticmethod
+    def stored(F: Tensor, history: History, params: tuple[float, ...]) -> Scalar:
+        G = metric(history, F)
+        return energy_of(widened(F), G, params[0], params[1])
+
+    @staticmethod
+    def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:
+        G = metric(history, F)
+        return narrowed(stress_of(widened(F), G, params[0], params[1]), F)
+
+    @staticmethod
+    def dissipated(history: History) -> Scalar:
+        return history[-1]
+
+
+def _of_rate(added: Scalar, step: float, params: tuple[float, ...]) -> Scalar:
+    """1 + C ln of the rate over the reference rate."""
+    return 1.0 + params[5] * np.log(np.maximum(added / (step * params[7]), 1.0))
+
+
+def _of_temperature(T: Scalar, params: tuple[float, ...]) -> Scalar:
+    """1 - T*^m."""
+    return 1.0 - _homologous(T, params) ** params[6]
+
+
+def _homologous(T: Scalar, params: tuple[float, ...]) -> Scalar:
+    """T*."""
+    share = (T - params[8]) / (params[9] - params[8])
+    return np.minimum(np.maximum(share, 0.0), 1.0)
+
+
+def _flow_stress(
+    e: Scalar, added: Scalar, T: Scalar, step: float, params: tuple[float, ...]
+) -> Scalar:
+    """Equivalent stress of flow after `added` more plastic strain in a step, at T [Pa]."""
+    hardened = params[2] + params[3] * (e + added) ** params[4]
+    return hardened * _of_rate(added, step, params) * _of_temperature(T, params)
+
+
+def _slope(e: Scalar, added: Scalar, T: Scalar, step: float, params: tuple[float, ...]) -> Scalar:
+    """Its derivative by the strain added, the heating included."""
+    total = np.maximum(e + added, _SMALLEST)
+    hardened = params[2] + params[3] * total ** params[4]
+    of_rate, of_temperature = _of_rate(added, step, params), _of_temperature(T, params)
+    fast = 1.0 * (added > step * params[7])
+    by_rate = fast * params[5] / np.maximum(added, _SMALLEST)
+    warm = np.maximum(_homologous(T, params), _SMALLEST)
+    softening = params[6] * warm ** (params[6] - 1.0) / (params[9] - params[8])
+    heating = params[10] * hardened * of_rate * of_temperature
+    return (
+        params[3] * params[4] * total ** (params[4] - 1.0) * of_rate * of_temperature
+        + hardened * by_rate * of_temperature
+        - hardened * of_rate * softening * heating
+    )
+
+
+def _plastic_work(
+    e: Scalar, added: Scalar, T: Scalar, step: float, params: tuple[float, ...]
+) -> Scalar:
+    """Of a step that begins at e and T [J/m^3]: hardening integrated, heat at its half."""
+    power = params[4] + 1.0
+    hardened = params[2] * added + params[3] / power * ((e + added) ** power - e**power)
+    work = hardened * _of_rate(added, step, params)
+    half = T + 0.5 * params[10] * work * _of_temperature(T, params)
+    return work * _of_temperature(half, params)
