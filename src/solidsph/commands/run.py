@@ -96,12 +96,17 @@ def _run_scene(
     shown: bool,
     as_json: bool,
 ) -> None:
+    from solidsph.advice import advised
     from solidsph.carry_out import carry_out
     from solidsph.commands import prediction as told
+    from solidsph.commands.warned import warn
     from solidsph.costs.process import peak_memory
     from solidsph.results.record import Record
 
     simulation, build = told.built(scene)
+    advice = advised(simulation)
+    if not as_json:
+        warn({"": advice})
     prediction = told.of_run(simulation, build)
     if shown and prediction is not None and prediction.seconds > told.LONG:
         say(told.announcement(prediction))
@@ -132,7 +137,10 @@ def _run_scene(
     }
     if as_json:
         noted = {"notes": list(notes)} if notes else {}
-        show_json({"scene": target, "record": str(path), **facts, **noted, "final": history})
+        warned = {"warnings": [one.line for one in advice]} if advice else {}
+        show_json(
+            {"scene": target, "record": str(path), **facts, **warned, **noted, "final": history}
+        )
         return
     show_table(target, ["", "value"], [[key, value] for key, value in facts.items()])
     show_table("at the end", ["quantity", "value"], [[k, v] for k, v in history.items()])
@@ -160,9 +168,12 @@ class _Once:
 
 
 def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bool) -> None:
+    from solidsph.advice import Advice, advised
     from solidsph.commands import prediction as told
+    from solidsph.commands.warned import warn
     from solidsph.studies.case_run import run_case
 
+    advice: dict[str, Sequence[Advice]] = {}
     case_predictions: dict[str, Prediction | None] = {}
     compiled: set[Compilation] = set()
     with progress(shown) as display:
@@ -170,6 +181,10 @@ def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bo
         def begin(name: str, simulation: Any) -> Sequence[object]:
             case_predictions[name] = told.of_run(simulation, None, frozenset(compiled))
             compiled.update(told.compilations(case_predictions[name]))
+            before = {one.name for several in advice.values() for one in several}
+            advice[name] = advised(simulation)
+            if not as_json:  # each warning once a case, at the first scene that it is about
+                warn({name: [one for one in advice[name] if one.name not in before]})
             return [ProgressObserver(display, name, simulation)] if display else []
 
         result = run_case(case, folder, begin=begin)
@@ -180,6 +195,7 @@ def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bo
                 "case": target,
                 "passed": result.passed,
                 "peak memory [bytes]": result.peak_memory,
+                "warnings": {name: [one.line for one in a] for name, a in advice.items() if a},
                 "predicted": told.sums(result.runs, predictions),
                 "measurements": [_row(m) for m in result.measurements],
                 "runs": [

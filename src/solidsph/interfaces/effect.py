@@ -4,11 +4,21 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from enum import Enum
 from typing import ClassVar
 
 from solidsph.body import Body
 from solidsph.interfaces.condition import ForceCondition
 from solidsph.setting import Setting
+
+
+class Need(Enum):
+    """What a scene may call for, and an effect answer."""
+
+    SHOCKS = "fronts steeper than the particles resolve"
+    UNSEEN_MOTIONS = "motions that the gradient does not see"
+    REST = "a motion that is to come to rest"
+    MEETING = "bodies that meet, or hang together"
 
 
 class Effect(ABC):
@@ -19,6 +29,10 @@ class Effect(ABC):
 
     conserves_momentum: ClassVar[bool] = False
     """Whether its forces on a free body, and their moments, add up to zero whatever the motion."""
+
+    answers: ClassVar[frozenset[Need] | None] = None
+    """What it is for, by which a scene is told what it lacks or has in vain (`solidsph.advice`);
+    empty for something else. None does not say: beside it nothing is said to be lacking."""
 
     @abstractmethod
     def bind(self, setting: Setting, label: str) -> ForceCondition:
