@@ -77,3 +77,10 @@ def test_every_module_of_the_core_is_in_the_architecture() -> None:
     folders = [f"{path.name}/" for path in core.iterdir() if (path / "__init__.py").exists()]
     small = {"arrays.py", "errors.py", "problems.py"}
     assert [name for name in [*named, *folders] if name not in text and name not in small] == []
+
+
+def test_every_warning_is_listed() -> None:
+    from solidsph.advice import ADVICE
+
+    text = (ROOT / "docs/scenes.md").read_text()
+    assert [name for name in ADVICE if f"`{name}`" not in text] == []
