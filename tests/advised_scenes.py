@@ -20,7 +20,7 @@ class Flawed(NamedTuple):
 FLAWED = [
     Flawed(
         "few-across",
-        "spacing = 0.002",
+        "gradient = 'quadratic', which needs 3",
         f"""
 title = "a steel ruler that swings, two particles thick"
 duration = 0.1
@@ -293,6 +293,9 @@ material = {RUBBER}
 [body.beam]
 shape = {{type = "box", lengths = [1.0, 0.1]}}
 spacing = 0.0125
+[formulation]
+type = "total-lagrangian"
+gradient = "quadratic"
 [[boundary]]
 type = "clamp"
 where = "X < 0.5"
@@ -394,6 +397,9 @@ material = {RUBBER}
 [body.beam]
 shape = {{type = "box", lengths = [0.5, 0.06]}}
 spacing = 0.01
+[formulation]
+type = "total-lagrangian"
+gradient = "quadratic"
 [[boundary]]
 type = "clamp"
 where = "left"
@@ -453,6 +459,9 @@ material = {STEEL}
 [body.tine]
 shape = {{type = "box", lengths = [0.1, 0.01]}}
 spacing = 0.002
+[formulation]
+type = "total-lagrangian"
+gradient = "quadratic"
 [[boundary]]
 type = "clamp"
 where = "left"
@@ -470,6 +479,9 @@ material = {RUBBER}
 [body.beam]
 shape = {{type = "box", lengths = [0.5, 0.06]}}
 spacing = 0.01
+[formulation]
+type = "total-lagrangian"
+gradient = "quadratic"
 [[boundary]]
 type = "clamp"
 where = "left"
@@ -491,6 +503,9 @@ material = {RUBBER}
 [body.beam]
 shape = {{type = "box", lengths = [5.0, 0.6]}}
 spacing = 0.1
+[formulation]
+type = "total-lagrangian"
+gradient = "quadratic"
 [[boundary]]
 type = "clamp"
 where = "left"

@@ -32,6 +32,14 @@ def test_the_scenes_shown_can_be_built_and_the_static_one_run() -> None:
     assert carry_out(Simulation.builder(static).build()).effort["residual [-]"] < 1e-9
 
 
+def test_the_scenes_shown_are_sound() -> None:
+    from solidsph.advice import advised
+
+    for text in blocks("docs/scenes.md", "toml"):
+        built = Simulation.builder(Scene.from_toml(text)).build()
+        assert [one.line for one in advised(built)] == []
+
+
 def test_every_builtin_part_is_listed() -> None:
     text = (ROOT / "docs/scenes.md").read_text()
     missing = [

@@ -56,7 +56,6 @@ class Load(Signal):
 
     stresses: Array  # (t,) largest force over the area that its particle owns [Pa]; 0 inside
     accelerations: Array  # (t,) largest force over mass [m/s^2]
-    total: Array  # (d,) sum over particles at the last time [N]
     on_surface: bool
 
 
@@ -78,56 +77,54 @@ def loads(simulation: Simulation) -> Iterator[Load]:
 
     What answers to the motion is asked at the start, where nothing has moved.
     """
-    particles, masses = simulation.particles, simulation.setting.masses
-    areas = np.linalg.norm(particles.area_vectors, axis=1)
-    start = simulation.initial
+    areas = np.linalg.norm(simulation.particles.area_vectors, axis=1)
     for load in simulation.dynamics.loads:
-        chosen = load.particles
-        ask = _asked(load, start.positions, start.velocities)
-        times = _times(simulation, len(chosen) * particles.dimension)
-        times = times if isinstance(load, ScheduledForce) else times[:: max(1, len(times) // 4)]
-        own_areas, own_masses = areas[chosen], masses[chosen]
-        # Corners own little, so the mean area says more than each particle's own.
-        area = float(own_areas[own_areas > 0.0].mean()) if (own_areas > 0.0).any() else np.inf
-        real = own_masses > 0.0
+        yield _of_load(simulation, load, areas[load.particles])
 
-        def found(some: Array, ask=ask, real=real, own_masses=own_masses):  # type: ignore[no-untyped-def]
-            forces = ask(some)
-            sizes = np.linalg.norm(forces, axis=2)
-            pulls = (sizes[:, real] / own_masses[real]).max(axis=1, initial=0.0)
-            return sizes.max(axis=1, initial=0.0), pulls, forces[-1].sum(axis=0)
 
-        sizes, pulls, total = found(times)
-        times, (sizes, pulls, total) = _refined(times, (sizes, pulls, total), found)
-        on_surface = isinstance(load, SurfaceLoad)
-        yield Load(
-            label=load.label,
-            times=times,
-            sizes=sizes,
-            stresses=sizes / area if on_surface else np.zeros_like(sizes),
-            accelerations=pulls,
-            total=total,
-            on_surface=on_surface,
-        )
+def _of_load(simulation: Simulation, load: ForceCondition, areas: Array) -> Load:
+    start, masses = simulation.initial, simulation.setting.masses[load.particles]
+    ask = _asked(load, start.positions, start.velocities)
+    times = _times(simulation, len(masses) * simulation.particles.dimension)
+    if not isinstance(load, ScheduledForce):
+        times = times[:: max(1, len(times) // 4)]
+    owns, real = areas > 0.0, masses > 0.0
+
+    def found(some: Array) -> tuple[Array, ...]:
+        forces = np.linalg.norm(ask(some), axis=2)
+        pulls = (forces[:, real] / masses[real]).max(axis=1, initial=0.0)
+        # A particle at an edge owns of both faces, and so is loaded less than the others.
+        pressed = (forces[:, owns] / areas[owns]).max(axis=1, initial=0.0)
+        return forces.max(axis=1, initial=0.0), pulls, pressed
+
+    times, (sizes, pulls, pressed) = _refined(times, found(times), found)
+    on_surface = isinstance(load, SurfaceLoad)
+    return Load(
+        label=load.label,
+        times=times,
+        sizes=sizes,
+        stresses=pressed if on_surface else np.zeros_like(sizes),
+        accelerations=pulls,
+        on_surface=on_surface,
+    )
 
 
 def motions(simulation: Simulation) -> Iterator[Motion]:
     """Of every motion that is a schedule."""
     for motion in simulation.dynamics.motions:
-        if not isinstance(motion, ScheduledMotion):
-            continue
-        times = _times(simulation, len(motion.entries[0]))
+        if isinstance(motion, ScheduledMotion):
+            yield _of_motion(simulation, motion)
 
-        def found(some: Array, motion=motion):  # type: ignore[no-untyped-def]
-            return tuple(
-                np.broadcast_to(
-                    np.abs(motion.schedule(some, k)).max(axis=1, initial=0.0), (len(some),)
-                )
-                for k in (0, 1)
-            )
 
-        times, (sizes, speeds) = _refined(times, found(times), found)
-        yield Motion(motion.label, times, sizes, speeds, motion)
+def _of_motion(simulation: Simulation, motion: ScheduledMotion) -> Motion:
+    times = _times(simulation, len(motion.entries[0]))
+
+    def found(some: Array) -> tuple[Array, ...]:
+        values = (np.abs(motion.schedule(some, k)).max(axis=1, initial=0.0) for k in (0, 1))
+        return tuple(np.broadcast_to(one, (len(some),)) for one in values)
+
+    times, (sizes, speeds) = _refined(times, found(times), found)
+    return Motion(motion.label, times, sizes, speeds, motion)
 
 
 def _asked(load: ForceCondition, x: Array, v: Array) -> Callable[[Array], Array]:
@@ -151,7 +148,9 @@ def _times(simulation: Simulation, width: int) -> Array:
     return np.unique(np.concatenate([[0.0], early, np.linspace(0.0, end, count - count // 2)]))
 
 
-def _refined(times: Array, values: tuple, found: Callable) -> tuple[Array, tuple]:  # type: ignore[type-arg]
+def _refined(
+    times: Array, values: tuple[Array, ...], found: Callable[[Array], tuple[Array, ...]]
+) -> tuple[Array, tuple[Array, ...]]:
     """The same with times between the two at which the first rise was passed over."""
     sizes = values[0]
     if len(times) < 3 or not sizes.max() > 0.0:
@@ -162,7 +161,6 @@ def _refined(times: Array, values: tuple, found: Callable) -> tuple[Array, tuple
     between = np.linspace(times[above - 1], times[above], min(len(times), 34))[1:-1]
     own = found(between)
     joined = tuple(
-        np.concatenate([a[:above], b, a[above:]]) if len(a) == len(times) else a
-        for a, b in zip(values, own, strict=True)
+        np.concatenate([a[:above], b, a[above:]]) for a, b in zip(values, own, strict=True)
     )
     return np.concatenate([times[:above], between, times[above:]]), joined
