@@ -71,7 +71,7 @@ def answer(hidden: str | None, leak: str | None, engine: str) -> dict[str, Any]:
     if leak is not None:
         LEAKS[leak]()
     found = {"bare": measured(SCENE, engine)}
-    if hidden not in BUSY and engine == "matrix":
+    if leak is None and hidden not in BUSY and engine == "matrix":
         found["busy"] = measured(SCENE + BESIDE, engine)
     return found
 

@@ -127,7 +127,6 @@ def receipts(
     """
     for one in of:
         quantity(one)
-    shares = measured_shares(simulation, end)
     with tempfile.TemporaryDirectory() as folder:
         for factor in (coarser, 1.0):
             small = reduced(simulation.scene, factor)
@@ -135,6 +134,7 @@ def receipts(
             base = _carried_out(whole, Path(folder) / "with.h5", of)
             if base.outcome == FINISHED:
                 break  # else the scene does not stand being coarser
+        shares = measured_shares(simulation, end)
         each = []
         for label in simulation.effects:
             less = _carried_out(without(whole, label), Path(folder) / "without.h5", of)
