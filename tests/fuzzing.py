@@ -33,7 +33,7 @@ WORDS = [
     "discretisation", "gradient", "divergence", "ghosts", "cover", "time_step", "time_step_factor",
     "label", "tags", "lengths", "x", "y", "z", "rate", "strength", "density", "poissons_ratio",
     "youngs_modulus", "displacement", "velocity", "traction", "acceleration", "axis", "at",
-    "load_steps", "radius", "points", "file", "seed", "amount", "parts", "on_boundary",
+    "load_steps", "radius", "points", "file", "seed", "amount", "parts", "on_boundary", "silence",
 ]  # fmt: skip
 
 PARTS = [

@@ -23,11 +23,13 @@ from solidsph.costs.counted import ITERATIONS, counted
 from solidsph.costs.dissection import dissected
 from solidsph.costs.estimated import ball, cut_off, estimated, lattice_neighbours
 from solidsph.costs.model import Built, coefficient, predicted
+from solidsph.costs.shares import shares, without
 from solidsph.costs.work import Loop, Piece
 from solidsph.engines.tally import Way
 from solidsph.errors import SceneError
 from solidsph.interfaces.condition import ForceCondition
 from solidsph.interfaces.effect import Effect
+from solidsph.step_size import largest_step
 from tests.scenes import SCENE_TOML, SOFT
 from tests.test_cli import solidsph
 
@@ -433,3 +435,30 @@ def test_what_is_not_known_is_priced_by_defaults() -> None:
 def test_a_cluster_refuses_what_is_no_number() -> None:
     with pytest.raises(SceneError, match="memory must be a positive number, got 'much'"):
         Cluster(memory="much")  # type: ignore[arg-type]
+
+
+def test_a_load_in_the_compiled_loop_costs_by_the_particles_that_it_acts_on() -> None:
+    def load_on(where: str):
+        builder = block(20, 2).engine("compiled")
+        return builder.effect("mass-damping", rate=1.0, where=where, label="drag").build()
+
+    everywhere, few = (
+        shares(load_on(where), REFERENCE)["drag"].time for where in ("all", "X < 0.1")
+    )
+    # A tenth of the particles: two columns of twenty. Shares are of what differs by themselves.
+    assert few / (1.0 - few) == pytest.approx(0.1 * everywhere / (1.0 - everywhere), rel=1e-9)
+
+
+def test_shares_are_of_what_the_effects_add() -> None:
+    builder = bar().effect("artificial-viscosity", label="v").effect("mass-damping", rate=9.0)
+    simulation = builder.build()
+    found = shares(simulation, REFERENCE)
+    assert 0.0 < found["mass-damping"].time < found["v"].time < 1.0
+    # The stable step is 2 over the sum of frequency and rates, of which damping has 9 1/s.
+    viscous = bar().effect("artificial-viscosity").build()
+    assert found["mass-damping"].step == pytest.approx(
+        largest_step(simulation.integrator, simulation.effects.values(), simulation.setting.bodies)
+        / largest_step(viscous.integrator, viscous.effects.values(), viscous.setting.bodies)
+    )
+    assert found["v"].step < 0.9 < found["mass-damping"].step < 1.0
+    assert without(simulation, "v").step_size == simulation.step_size

@@ -32,6 +32,14 @@ def test_the_scenes_shown_can_be_built_and_the_static_one_run() -> None:
     assert carry_out(Simulation.builder(static).build()).effort["residual [-]"] < 1e-9
 
 
+def test_the_scenes_shown_are_sound() -> None:
+    from solidsph.advice import advised
+
+    for text in blocks("docs/scenes.md", "toml"):
+        built = Simulation.builder(Scene.from_toml(text)).build()
+        assert [one.line for one in advised(built)] == []
+
+
 def test_every_builtin_part_is_listed() -> None:
     text = (ROOT / "docs/scenes.md").read_text()
     missing = [
@@ -77,3 +85,10 @@ def test_every_module_of_the_core_is_in_the_architecture() -> None:
     folders = [f"{path.name}/" for path in core.iterdir() if (path / "__init__.py").exists()]
     small = {"arrays.py", "errors.py", "problems.py"}
     assert [name for name in [*named, *folders] if name not in text and name not in small] == []
+
+
+def test_every_warning_is_listed() -> None:
+    from solidsph.advice import ADVICE
+
+    text = (ROOT / "docs/scenes.md").read_text()
+    assert [name for name in ADVICE if f"`{name}`" not in text] == []

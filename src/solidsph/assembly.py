@@ -7,7 +7,7 @@ problems are reported together, and what comes out holds objects only.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import ceil, sqrt
+from math import ceil
 from typing import Any
 
 import attrs
@@ -44,6 +44,7 @@ from solidsph.scene import DEFAULT_INTEGRATOR, BodyScene, ImposedScene, PartLike
 from solidsph.setting import Setting
 from solidsph.simulation import Simulation
 from solidsph.smoothing import smoothing_kernel
+from solidsph.step_size import largest_step
 from solidsph.where import EVERYWHERE, select
 
 # No run of more steps ends; a scene that asks for them has its units wrong.
@@ -70,6 +71,10 @@ class Assembly:
         problems.add(compatibility.numbers(scene))
         problems.add(compatibility.statics(scene))
         problems.add(compatibility.sleep(scene))
+        if scene.silence:
+            from solidsph import advice  # only where its names are asked for
+
+            problems.add(advice.unknown(scene.silence))
         kernel: Kernel | None = self._make("kernels", scene.kernel)
         formulation: Formulation | None = self._make("formulations", scene.formulation)
         integrator = self._integrator()
@@ -309,15 +314,7 @@ class Assembly:
     ) -> float:
         """Time step [s] from the confined wave speed and whatever the effects add."""
         scene = self._scene
-        wave_time = min(
-            float(body.particles.spacings.min()) / body.material.wave_speed for body in bodies
-        )
-        # A lattice of point masses and springs has its highest frequency at 2 c / spacing.
-        frequency = sqrt(
-            (2.0 / wave_time) ** 2 + sum(e.stiffness_rate(bodies) ** 2 for e in effects.values())
-        )
-        rate = sum(e.damping_rate(bodies) for e in effects.values())
-        largest = integrator.stability_limit / (frequency + rate)
+        largest = largest_step(integrator, effects.values(), bodies)
         if scene.time_step is not None and scene.time_step > largest:
             raise SceneError(
                 f"time_step = {scene.time_step:.6g} s exceeds the CFL step, {largest:.6g} s by "

@@ -147,6 +147,11 @@ class Builder:
         self._values["engine"] = engine
         return self
 
+    def silence(self, *names: str) -> Builder:
+        """Warnings that are not to be shown, by the names that `solidsph explain` gives them."""
+        self._values["silence"] = (*self._values.get("silence", ()), *names)
+        return self
+
     def scene(self) -> Scene:
         """What has been said so far, as data.
 

@@ -93,6 +93,7 @@ class Scene:
     time_step: float | None = None  # [s]; overrides the factor
     outputs: int = 200  # recorded states after the first
     engine: str = "auto"
+    silence: Sequence[str] = ()  # names of warnings that are not to be shown
 
     @classmethod
     def read(cls, path: Path) -> Scene:
@@ -140,7 +141,7 @@ _SECTIONS = {
     "sleep": "[sleep]",
     "statics": "[statics]",
 }
-_SCALARS = ("title", "duration", "outputs", "engine")
+_SCALARS = ("title", "duration", "outputs", "engine", "silence")
 
 
 def _scene(table: Mapping[str, Any]) -> Scene:
@@ -162,6 +163,8 @@ def _scene(table: Mapping[str, Any]) -> Scene:
             values[key] = _text(table[key], key)
     if "outputs" in table:
         values["outputs"] = _count(table["outputs"], "outputs")
+    if "silence" in table:
+        values["silence"] = _names(table["silence"], "silence")
     for key in ("material", "formulation"):
         if key in table:
             values[key] = table[key]
@@ -253,6 +256,12 @@ def _count(value: Any, what: str) -> int:
     return value
 
 
+def _names(value: Any, what: str) -> tuple[str, ...]:
+    if not isinstance(value, list):
+        raise SceneError(f'{what} must be a list of names such as ["few-across"], got {value!r}')
+    return tuple(_text(one, what) for one in value)
+
+
 def _text(value: Any, what: str) -> str:
     if not isinstance(value, str):
         raise SceneError(f"{what} must be text, got {value!r}")
@@ -286,6 +295,8 @@ def _table(scene: Scene) -> dict[str, Any]:
     if scene.title:
         table["title"] = scene.title
     table |= {"duration": scene.duration, "outputs": scene.outputs, "engine": scene.engine}
+    if scene.silence:
+        table["silence"] = list(scene.silence)
     table["body"] = {name: _body_table(body) for name, body in scene.bodies.items()}
     table["kernel"] = {**_part(scene.kernel, "kernels"), "cover": scene.cover}
     if scene.material is not None:

@@ -13,7 +13,7 @@ from solidsph.body import Body
 from solidsph.errors import SceneError
 from solidsph.interfaces.condition import ForceCondition, Observation
 from solidsph.interfaces.declared import PairForce, PairTable
-from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.formulation import Configuration
 from solidsph.parameters import number
 from solidsph.setting import Setting
@@ -45,6 +45,7 @@ class ArtificialViscosity(Effect):
     """
 
     conserves_momentum: ClassVar[bool] = True
+    answers: ClassVar[frozenset[Need] | None] = frozenset({Need.SHOCKS})
 
     linear: float = number(default=1.0)  # [-]
     quadratic: float = number(default=2.0)  # [-]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import ClassVar, final
 
 import attrs
 
@@ -11,7 +11,7 @@ from solidsph.arrays import Array, Indices
 from solidsph.body import Body
 from solidsph.interfaces.condition import ForceCondition, Observation
 from solidsph.interfaces.declared import ScheduledForce
-from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.effect import Effect, Need
 from solidsph.motion import Component, VectorField, scheduled_forces
 from solidsph.setting import Setting
 from solidsph.where import Where
@@ -21,6 +21,8 @@ from solidsph.where import Where
 @attrs.frozen
 class BodyForce(Effect):
     """f = m b(X, t). Ismail & Reddy, eq. 14, whose b they neglect."""
+
+    answers: ClassVar[frozenset[Need] | None] = frozenset()
 
     acceleration: Mapping[str, Component]  # b such as {y = -9.81} [m/s^2]
     where: Where = "all"

@@ -19,7 +19,7 @@ from solidsph.interfaces.condition import (
     Observation,
     StressCondition,
 )
-from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.gradient import PointwiseGradient
 from solidsph.parameters import check_positive, number
 from solidsph.setting import Setting
@@ -51,6 +51,7 @@ class BondFailure(Effect):
     """
 
     conserves_momentum: ClassVar[bool] = True
+    answers: ClassVar[frozenset[Need] | None] = frozenset()
     parts_neighbours: ClassVar[bool] = True
 
     critical_stretch: float = number()  # [-]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import ClassVar, final
 
 import attrs
 import numpy as np
@@ -12,7 +12,7 @@ from solidsph.arrays import Array, Indices
 from solidsph.body import Body
 from solidsph.errors import SceneError
 from solidsph.interfaces.condition import ForceCondition, Observation
-from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.effect import Effect, Need
 from solidsph.parameters import number
 from solidsph.setting import Setting
 
@@ -36,6 +36,8 @@ class DynamicRelaxation(Effect):
     to rest at is the equilibrium whatever the rate was. For a body that is not held it is of no
     use, and for an equilibrium alone [statics] is quicker.
     """
+
+    answers: ClassVar[frozenset[Need] | None] = frozenset({Need.REST})
 
     damping: float = number(default=1.0)  # [-] times critical
 

@@ -14,7 +14,7 @@ from solidsph.arrays import Array, Indices, Tensor
 from solidsph.body import Body
 from solidsph.errors import SceneError
 from solidsph.interfaces.condition import FieldCondition, ForceCondition, Observation
-from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.material import Material
 from solidsph.motion import Component, VectorField
@@ -60,6 +60,7 @@ class Heat(Effect):
     """
 
     conserves_momentum: ClassVar[bool] = True
+    answers: ClassVar[frozenset[Need] | None] = frozenset()
     joins_neighbours: ClassVar[bool] = True
 
     conductivity: float = number()  # k [W/(m K)]

@@ -19,7 +19,7 @@ from solidsph.interfaces.condition import (
     StoringCondition,
 )
 from solidsph.interfaces.declared import MismatchForce
-from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.formulation import Configuration
 from solidsph.mismatch import Mismatch, MismatchOperator
 from solidsph.neighbours import neighbour_pairs
@@ -61,6 +61,7 @@ class HourglassControl(Effect):
 
     conserves_momentum: ClassVar[bool] = True
     joins_neighbours: ClassVar[bool] = True
+    answers: ClassVar[frozenset[Need] | None] = frozenset({Need.UNSEEN_MOTIONS})
 
     strength: float = number(default=0.5)  # [-] times the shear modulus
 

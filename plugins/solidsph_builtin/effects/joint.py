@@ -16,7 +16,7 @@ from solidsph.body import Body
 from solidsph.errors import SceneError
 from solidsph.interfaces.condition import ForceCondition, Observation, StoringCondition
 from solidsph.interfaces.declared import PairForce, PairTable
-from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.effect import Effect, Need
 from solidsph.parameters import number
 from solidsph.setting import Setting
 from solidsph.tensors import dot
@@ -39,6 +39,7 @@ class Joint(Effect):
     """
 
     conserves_momentum: ClassVar[bool] = True
+    answers: ClassVar[frozenset[Need] | None] = frozenset({Need.MEETING})
 
     between: tuple[str, ...] | None = attrs.field(
         default=None, converter=attrs.converters.optional(tuple)

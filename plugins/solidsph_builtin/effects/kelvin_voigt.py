@@ -12,7 +12,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from solidsph.arrays import Array, Indices, Tensor
 from solidsph.body import Body
 from solidsph.interfaces.condition import ForceCondition, Observation
-from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.effect import Effect, Need
 from solidsph.parameters import check_positive, number
 from solidsph.setting import Setting
 from solidsph.tensors import add, identity, product, scale, trace, transpose
@@ -34,6 +34,7 @@ class KelvinVoigt(Effect):
     """
 
     conserves_momentum: ClassVar[bool] = True
+    answers: ClassVar[frozenset[Need] | None] = frozenset({Need.REST})
     joins_neighbours: ClassVar[bool] = True
 
     time: float = number()  # retardation time [s]

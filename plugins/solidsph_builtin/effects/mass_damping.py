@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import ClassVar, final
 
 import attrs
 
@@ -11,7 +11,7 @@ from solidsph.arrays import Array, Indices, Vector
 from solidsph.body import Body
 from solidsph.interfaces.condition import ForceCondition, Observation
 from solidsph.interfaces.declared import PointwiseForce
-from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.effect import Effect, Need
 from solidsph.parameters import check_positive, number
 from solidsph.setting import Setting
 from solidsph.tensors import scaled
@@ -22,6 +22,8 @@ from solidsph.where import Where
 @attrs.frozen
 class MassDamping(Effect):
     """f = -c m v: every free vibration decays as exp(-c t / 2). Rayleigh's first term."""
+
+    answers: ClassVar[frozenset[Need] | None] = frozenset({Need.REST})
 
     rate: float = number()  # c [1/s]
     where: Where = "all"

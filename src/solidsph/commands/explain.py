@@ -9,6 +9,7 @@ import attrs
 import click
 
 from solidsph import registry
+from solidsph.advice import advised
 from solidsph.commands import prediction as told
 from solidsph.commands.console import say, show_json, show_table
 from solidsph.commands.target import parameters, resolve
@@ -18,6 +19,7 @@ from solidsph.costs.counted import compiles_steps, counted
 from solidsph.costs.estimated import estimated
 from solidsph.costs.model import Prediction, predicted
 from solidsph.costs.process import machine_memory
+from solidsph.costs.shares import Share, shares
 from solidsph.costs.work import Compilation
 from solidsph.errors import SceneError
 from solidsph.interfaces.case import Case
@@ -74,12 +76,34 @@ def explain(
                 show_table(title, ["", "value", "why"], rows)
         show_table(
             "effects",
-            ["effect", "simulated", "why", "arrays [bytes]"],
-            [list(row.values()) for row in facts["effects"]],
+            ["effect", "simulated", "why", "arrays", "bytes", "of the steps", "stable step"],
+            [[*list(row.values())[:5], *_shares_shown(row)] for row in facts["effects"]],
         )
+        _show_advice(facts)
     if len(predictions) > 1:
         rows = [[key, value] for key, value in _together(predictions).items()]
         show_table("all scenes, one after the other", ["", "value"], rows)
+
+
+def _shares_shown(row: Mapping[str, Any]) -> tuple[str, str]:
+    share, step = row["share of the steps"], row["stable step"]
+    return (
+        "" if share is None else f"{100.0 * share:.1f} %",
+        "" if step is None else f"times {step:.3g}",
+    )
+
+
+def _show_advice(facts: Mapping[str, Any]) -> None:
+    silenced = facts["silenced"]
+    if facts["warnings"]:
+        show_table(
+            "warnings",
+            ["warning", "found", "expected", "remedy"],
+            [list(row.values()) for row in facts["warnings"]],
+        )
+        say('To silence one: silence = ["its-name"] at the top of the scene.')
+    if silenced:
+        say(f"silenced by the scene: {', '.join(silenced)}")
 
 
 def _cluster(assumed: tuple[str, ...]) -> Cluster:
@@ -112,7 +136,12 @@ def _explained(
         "numbers": _numbers(simulation),
         "work": told.work_rows(found.work),
         "cost": told.prediction_rows(found),
-        "effects": _effects(simulation.effects, simulation),
+        "effects": _effects(simulation.effects, simulation, shares(simulation, machine)),
+        "warnings": [
+            {"name": a.name, "found": a.found, "expected": a.expected, "remedy": a.remedy}
+            for a in advised(simulation)
+        ],
+        "silenced": list(scene.silence),
     }
 
 
@@ -145,7 +174,9 @@ def _too_large(
         "work": told.work_rows(work),
         "cost": told.prediction_rows(found),
         "on a cluster": priced,
-        "effects": _effects(effects, None),
+        "effects": _effects(effects, None, {}),
+        "warnings": [],
+        "silenced": list(scene.silence),
     }
 
 
@@ -268,24 +299,40 @@ def _loop(simulation: Simulation) -> tuple[str, str, str]:
     return ("time loop", "step by step", "each step by the parts themselves, which fits all")
 
 
-def _effects(effects: Mapping[str, Any], simulation: Simulation | None) -> list[dict[str, Any]]:
+def _effects(
+    effects: Mapping[str, Any], simulation: Simulation | None, found: Mapping[str, Share]
+) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
-    named = set()
+    named = {label: registry.entry_of("effects", one).name for label, one in effects.items()}
     for label, effect in effects.items():
-        name = registry.entry_of("effects", effect).name
-        named.add(name)
-        arrays = 0 if simulation is None else sum(effect.arrays(simulation.setting).values())
+        arrays = {} if simulation is None else effect.arrays(simulation.setting)
+        share = found.get(label)
         rows.append(
             {
-                "effect": label if simulation is not None else name,
+                "effect": label if simulation is not None else named[label],
                 "simulated": True,
                 "why": "named by the scene",
-                "arrays": arrays,
+                "arrays": ", ".join(arrays),
+                "bytes": sum(arrays.values()),
+                "share of the steps": None if share is None else share.time,
+                "stable step": None if share is None else share.step,
             }
         )
-    rows += [
-        {"effect": name, "simulated": False, "why": "not named by the scene", "arrays": 0}
-        for name in registry.names("effects")
-        if name not in named
-    ]
+    # Parts may hold effects of their own.
+    inside = {e.name for e in simulation.parts if e.kind == "effects"} if simulation else set()
+    for name in registry.names("effects"):
+        if name in named.values():
+            continue
+        needed = name in inside
+        rows.append(
+            {
+                "effect": name,
+                "simulated": needed,
+                "why": "needed by another part" if needed else "not named by the scene",
+                "arrays": "",
+                "bytes": 0,
+                "share of the steps": None,
+                "stable step": None,
+            }
+        )
     return rows

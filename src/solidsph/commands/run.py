@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import attrs
 import click
 from rich.markup import escape
 
@@ -43,6 +44,19 @@ if TYPE_CHECKING:
     metavar="N",
     help="With --watch: go back to the last sound output and halve the step, up to N times.",
 )
+@click.option(
+    "--receipts",
+    is_flag=True,
+    help="Then say of each effect what it took and what it changed, by runs without it at reduced "
+    "size.",
+)
+@click.option(
+    "--receipts-of",
+    "receipts_of",
+    multiple=True,
+    metavar="NAME=x@[X,Y]",
+    help="With --receipts: a displacement to look at, or a column of the history.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def run(
@@ -52,6 +66,8 @@ def run(
     write: Path | None,
     watch: bool,
     roll_backs: int,
+    receipts: bool,
+    receipts_of: tuple[str, ...],
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -62,20 +78,30 @@ def run(
         return
     folder = output or Path("results") / Path(target).stem
     shown = not (as_json or quiet)
+    if receipts_of and not receipts:
+        raise SceneError("--receipts-of says what --receipts is to look at; add --receipts")
+    if receipts_of:
+        from solidsph.studies.receipts import quantity
+
+        for one in receipts_of:
+            quantity(one)  # what is not understood is said before the run
+    wanted_receipts = receipts_of if receipts else None
     if isinstance(wanted, Case):
         if watch or roll_backs:
             raise SceneError(
                 "--watch is for one scene, and a case is several, some of which diverge on "
                 "purpose; write them to files (--write) and run one"
             )
-        _run_case(target, wanted, folder, shown=shown, as_json=as_json)
+        _run_case(target, wanted, folder, wanted_receipts, shown=shown, as_json=as_json)
         return
     if roll_backs and not watch:
         raise SceneError("--roll-back needs --watch, which finds the last sound output")
     if watch and wanted.statics is not None:
         raise SceneError("--watch is for motions; an equilibrium is tested by itself")
     watched = roll_backs if watch else None
-    _run_scene(target, wanted, folder, watched=watched, shown=shown, as_json=as_json)
+    _run_scene(
+        target, wanted, folder, wanted_receipts, watched=watched, shown=shown, as_json=as_json
+    )
 
 
 def _write(wanted: Scene | Case, path: Path) -> None:
@@ -91,17 +117,24 @@ def _run_scene(
     target: str,
     scene: Scene,
     folder: Path,
+    receipts_of: Sequence[str] | None,
     *,
     watched: int | None,
     shown: bool,
     as_json: bool,
 ) -> None:
+    from solidsph.advice import advised
     from solidsph.carry_out import carry_out
     from solidsph.commands import prediction as told
+    from solidsph.commands.receipted import of_scene, show_receipts
+    from solidsph.commands.warned import warn
     from solidsph.costs.process import peak_memory
     from solidsph.results.record import Record
 
     simulation, build = told.built(scene)
+    advice = advised(simulation)
+    if not as_json:
+        warn({"": advice})
     prediction = told.of_run(simulation, build)
     if shown and prediction is not None and prediction.seconds > told.LONG:
         say(told.announcement(prediction))
@@ -130,14 +163,20 @@ def _run_scene(
         "peak memory [MiB]": memory / 2**20,
         **told.scored(prediction, result.seconds, memory),
     }
+    found = None if receipts_of is None else of_scene(simulation, result.state, receipts_of)
     if as_json:
         noted = {"notes": list(notes)} if notes else {}
-        show_json({"scene": target, "record": str(path), **facts, **noted, "final": history})
+        warned = {"warnings": [one.line for one in advice]} if advice else {}
+        receipted = {} if found is None else {"receipts": attrs.asdict(found)}
+        named = {"scene": target, "record": str(path)}
+        show_json({**named, **facts, **warned, **noted, "final": history, **receipted})
         return
     show_table(target, ["", "value"], [[key, value] for key, value in facts.items()])
     show_table("at the end", ["quantity", "value"], [[k, v] for k, v in history.items()])
     for note in notes:
         say(f"note: {note}")
+    if found is not None:
+        show_receipts(found, receipts_of or ())
     say(f"record: {path} (ParaView opens it; so does: solidsph plot {path})")
 
 
@@ -159,10 +198,22 @@ class _Once:
             )
 
 
-def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bool) -> None:
+def _run_case(
+    target: str,
+    case: Case,
+    folder: Path,
+    receipts_of: Sequence[str] | None,
+    *,
+    shown: bool,
+    as_json: bool,
+) -> None:
+    from solidsph.advice import Advice, advised
     from solidsph.commands import prediction as told
+    from solidsph.commands.receipted import of_case, show_case_receipts
+    from solidsph.commands.warned import warn
     from solidsph.studies.case_run import run_case
 
+    advice: dict[str, Sequence[Advice]] = {}
     case_predictions: dict[str, Prediction | None] = {}
     compiled: set[Compilation] = set()
     with progress(shown) as display:
@@ -170,16 +221,22 @@ def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bo
         def begin(name: str, simulation: Any) -> Sequence[object]:
             case_predictions[name] = told.of_run(simulation, None, frozenset(compiled))
             compiled.update(told.compilations(case_predictions[name]))
+            before = {one.name for several in advice.values() for one in several}
+            advice[name] = advised(simulation)
+            if not as_json:  # each warning once a case, at the first scene that it is about
+                warn({name: [one for one in advice[name] if one.name not in before]})
             return [ProgressObserver(display, name, simulation)] if display else []
 
         result = run_case(case, folder, begin=begin)
     predictions = told.scores(case_predictions, result.runs)
+    found = None if receipts_of is None else of_case(case, receipts_of)
     if as_json:
         show_json(
             {
                 "case": target,
                 "passed": result.passed,
                 "peak memory [bytes]": result.peak_memory,
+                "warnings": {name: [one.line for one in a] for name, a in advice.items() if a},
                 "predicted": told.sums(result.runs, predictions),
                 "measurements": [_row(m) for m in result.measurements],
                 "runs": [
@@ -197,6 +254,7 @@ def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bo
                 ],
                 "pictures": [str(path) for path in result.pictures],
                 "tables": [str(path) for path in result.tables],
+                **({} if found is None else {"receipts": found}),
             }
         )
     else:
@@ -237,6 +295,8 @@ def _run_case(target: str, case: Case, folder: Path, *, shown: bool, as_json: bo
             say(f"data: {path}")
         if result.runs:
             say(f"records: {folder}/*.h5 (ParaView opens them; so does: solidsph plot FILE)")
+        if found is not None:
+            show_case_receipts(found)
         say("verdict: " + ("as the source predicts" if result.passed else "NOT as predicted"))
     if not result.passed:
         raise SystemExit(1)

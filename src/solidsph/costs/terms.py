@@ -72,7 +72,13 @@ def step_terms(work: Work) -> Iterator[Term]:
     loop = "compiled step" if work.loop is Loop.COMPILED else "step"
     yield Term(f"{loop} {d}D", 1.0, Yard.CALLS)
     yield Term(f"{loop} particle {d}D", n, Yard.SPARSE)
-    for kind, count in (("motion", work.motions), ("load", work.conditions - work.motions)):
+    loads = work.conditions - work.motions
+    if work.loop is Loop.COMPILED:  # where what acts on some particles costs nothing on others
+        own = [part for part in work.tally if part.way is Way.UNKNOWN and not part.pairs]
+        loads -= len(own)
+        count = sum(part.particles for part in own)
+        yield Term(f"{loop} loaded particle {d}D", count, Yard.SPARSE)
+    for kind, count in (("motion", work.motions), ("load", loads)):
         yield Term(f"{loop} {kind} {d}D", count, Yard.CALLS)
         yield Term(f"{loop} {kind} particle {d}D", count * n, Yard.SPARSE)
     for part in work.tally:

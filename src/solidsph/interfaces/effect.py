@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
 
 from solidsph.body import Body
@@ -12,6 +13,15 @@ from solidsph.setting import Setting
 
 if TYPE_CHECKING:
     from solidsph.engines.engine import InternalForces
+
+
+class Need(Enum):
+    """What a scene may call for, and an effect answer."""
+
+    SHOCKS = "fronts steeper than the particles resolve"
+    UNSEEN_MOTIONS = "motions that the gradient does not see"
+    REST = "a motion that is to come to rest"
+    MEETING = "bodies that meet, or hang together"
 
 
 class Effect(ABC):
@@ -28,6 +38,10 @@ class Effect(ABC):
 
     joins_neighbours: ClassVar[bool] = False
     """Whether it acts between the neighbours of the start, come what may."""
+
+    answers: ClassVar[frozenset[Need] | None] = None
+    """What it is for, by which a scene is told what it lacks or has in vain (`solidsph.advice`);
+    empty for something else. None does not say: beside it nothing is said to be lacking."""
 
     @abstractmethod
     def bind(self, setting: Setting, label: str) -> ForceCondition:

@@ -1,0 +1,54 @@
+"""A support too small for the kernel: sums over neighbours miss what they should find."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+
+from solidsph.advice.advice import Advice
+from solidsph.advice.seen import Seen
+from solidsph.arrays import Array
+from solidsph.smoothing import SmoothingKernel, smoothing_kernel
+
+# Kernels in use stay below this in 1, 2 and 3D from the covers on that they are known to work with.
+_WRONG = 0.03
+
+# Where in a cell of the lattice the sum is taken, in spacings.
+_PLACES = (0.0, 0.25, 0.5)
+
+
+def small_cover(seen: Seen) -> Iterator[Advice]:
+    """How far the kernel's sum over a lattice is from 1, at worst."""
+    own = seen.simulation.setting.bodies[0].smoothing
+    wrong = _unevenness(own, seen.scene.cover)
+    if wrong <= _WRONG:
+        return
+    enough = next(
+        (
+            cover
+            for cover in np.arange(np.ceil(10.0 * seen.scene.cover), 60.0) / 10.0
+            if _unevenness(smoothing_kernel(own.kernel, own.dimension, cover), cover) <= _WRONG
+        ),
+        None,
+    )
+    yield Advice(
+        found=f"with cover = {seen.scene.cover:g} the kernel's sum over a lattice is "
+        f"{100 * wrong:.2g} % off",
+        expected=f"at most {100 * _WRONG:g} %: a smooth kernel needs more neighbours",
+        remedy="choose another kernel" if enough is None else f"cover = {enough:.2g} or more",
+    )
+
+
+def _unevenness(kernel: SmoothingKernel, cover: float) -> float:
+    """Largest distance of the sum over neighbours from 1 [-]."""
+    d, spacing = kernel.dimension, kernel.support_radius / cover
+    along = np.arange(-np.ceil(cover) - 1.0, np.ceil(cover) + 2.0)
+    lattice: Array = np.array(list(product(along, repeat=d)))
+    sums = [
+        float(kernel.value(spacing * np.linalg.norm(lattice + shift, axis=1)).sum()) * spacing**d
+        for shift in _PLACES
+    ]
+    lost = kernel.kernel.lost_mass(d)
+    return max(abs(one - 1.0 + lost) for one in sums)

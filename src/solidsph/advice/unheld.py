@@ -1,0 +1,49 @@
+"""Forces on a body that nothing holds: it flies away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from solidsph.advice.advice import Advice
+from solidsph.advice.seen import Seen, SeenBody
+from solidsph.arrays import Array
+from solidsph.interfaces.effect import Need
+
+_FAR = 5.0  # lengths of the body
+
+
+def unheld(seen: Seen) -> Iterator[Advice]:
+    """How far the forces carry it in the duration; an equilibrium does not even exist."""
+    if not seen.lacks(Need.MEETING):
+        return
+    for one in seen.bodies:
+        free = ~seen.freedoms[one.body.extent][~one.body.particles.ghosts].any(axis=0)
+        pull = np.where(free, _pull(seen, one), 0.0)
+        size = float(np.linalg.norm(pull))
+        way = 0.5 * size * seen.scene.duration**2
+        if size == 0.0 or (seen.moves and way <= _FAR * one.length):
+            continue
+        where = f"it will be {way:.3g} m away at the end" if seen.moves else "no equilibrium exists"
+        yield Advice(
+            found=f"nothing holds body {one.name!r} against what pulls it with "
+            f"{size:.3g} m/s^2: {where}",
+            expected="a boundary that holds it",
+            remedy="add [[boundary]] 'clamp' or 'symmetry', or balance the forces",
+        )
+
+
+def _pull(seen: Seen, one: SeenBody) -> Array:
+    """Mean acceleration at the end of the duration, (d,) [m/s^2]."""
+    simulation, extent = seen.simulation, one.body.extent
+    masses = simulation.setting.masses[extent]
+    pull = np.zeros(seen.dimension)
+    rest = np.zeros_like(seen.velocities)
+    for load in simulation.dynamics.loads:
+        forces = load.forces(simulation.scene.duration, simulation.initial.positions, rest)
+        own = (load.particles >= extent.start) & (load.particles < extent.stop)
+        pull += forces[own].sum(axis=0) / masses.sum()
+    # What rounding leaves of forces that balance pulls nothing.
+    scale = sum(float(load.accelerations.max()) for load in seen.loads)
+    return np.where(np.abs(pull) > 1e-6 * scale, pull, 0.0)

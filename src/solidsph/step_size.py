@@ -1,0 +1,31 @@
+"""The largest step of a scene: from the wave speed, and whatever its effects add to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import sqrt
+
+from solidsph.body import Body
+from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.integrator import Integrator
+
+
+def largest_step(
+    integrator: Integrator, effects: Iterable[Effect], bodies: Sequence[Body]
+) -> float:
+    """The CFL step by confined wave speed and spacing, with what the effects add [s]."""
+    rates = [(e.stiffness_rate(bodies), e.damping_rate(bodies)) for e in effects]
+    return step_by_rates(integrator, rates, bodies)
+
+
+def step_by_rates(
+    integrator: Integrator, rates: Iterable[tuple[float, float]], bodies: Sequence[Body]
+) -> float:
+    """As `largest_step`, from each effect's stiffness rate [rad/s] and damping rate [1/s]."""
+    rates = list(rates)
+    wave_time = min(
+        float(body.particles.spacings.min()) / body.material.wave_speed for body in bodies
+    )
+    # A lattice of point masses and springs has its highest frequency at 2 c / spacing.
+    frequency = sqrt((2.0 / wave_time) ** 2 + sum(stiffness**2 for stiffness, _ in rates))
+    return integrator.stability_limit / (frequency + sum(damping for _, damping in rates))

@@ -1,0 +1,742 @@
+"""Scenes with one flaw each, and scenes without; as users write them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+STEEL = "{type = 'linear-elastic', youngs_modulus = 210e9, poissons_ratio = 0.3, density = 7850.0}"
+RUBBER = "{type = 'neo-hookean', youngs_modulus = 2e6, poissons_ratio = 0.45, density = 1100.0}"
+SLENDER = "{type = 'neo-hookean', youngs_modulus = 200e9, poissons_ratio = 0.0, density = 8000.0}"
+
+
+class Flawed(NamedTuple):
+    """A scene, the warning that it deserves, and a word of the remedy."""
+
+    name: str
+    remedy: str
+    toml: str
+
+
+FLAWED = [
+    Flawed(
+        "few-across",
+        "gradient = 'quadratic', which needs 3",
+        f"""
+title = "a steel ruler that swings, two particles thick"
+duration = 0.1
+material = {STEEL}
+[body.ruler]
+shape = {{type = "box", lengths = [0.2, 0.01]}}
+spacing = 0.005
+[[boundary]]
+type = "clamp"
+where = "left"
+[[initial]]
+velocity = {{y = "0.5*(X/0.2)**2"}}
+""",
+    ),
+    Flawed(
+        "few-across",
+        "gradient = 'quadratic'",
+        f"""
+title = "a thin ligament beside a hole"
+duration = 0.01
+material = {RUBBER}
+[body.sheet]
+spacing = 0.01
+[body.sheet.shape]
+type = "difference"
+of = {{type = "box", lengths = [0.3, 0.2]}}
+minus = {{type = "disc", radius = 0.08, centre = [0.15, 0.1]}}
+[[boundary]]
+type = "clamp"
+where = "left"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {{x = "1e4*min(t/0.005, 1)"}}
+""",
+    ),
+    Flawed(
+        "small-cover",
+        "cover = 2.",
+        f"""
+title = "a kernel cut too close"
+duration = 0.02
+material = {RUBBER}
+[body.block]
+shape = {{type = "box", lengths = [0.3, 0.2]}}
+spacing = 0.02
+[kernel]
+type = "gaussian"
+cover = 1.7
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[boundary]]
+type = "traction"
+where = "top"
+traction = {{x = "2e4*min(t/0.01, 1)"}}
+""",
+    ),
+    Flawed(
+        "large-cover",
+        "cover = 3",
+        f"""
+title = "six spacings in space"
+duration = 0.01
+material = {RUBBER}
+[body.cube]
+shape = {{type = "box", lengths = [0.1, 0.1, 0.1]}}
+spacing = 0.0125
+[kernel]
+type = "cubic-spline"
+cover = 6.0
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[boundary]]
+type = "traction"
+where = "top"
+traction = {{y = "-2e4*min(t/0.005, 1)"}}
+""",
+    ),
+    Flawed(
+        "near-incompressible",
+        "hourglass-control",
+        """
+title = "a rubber bearing that is sheared"
+duration = 0.05
+[material]
+type = "neo-hookean"
+youngs_modulus = 2e6
+poissons_ratio = 0.499
+density = 1100.0
+[body.bearing]
+shape = {type = "box", lengths = [0.2, 0.1]}
+spacing = 0.01
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[boundary]]
+type = "prescribed-motion"
+where = "top"
+displacement = {x = "0.02*(1-cos(pi*t/0.05))", y = 0}
+""",
+    ),
+    Flawed(
+        "unseen-motions",
+        "hourglass-control",
+        """
+title = "a column thrown to the side"
+duration = 0.5
+[material]
+type = "neo-hookean"
+youngs_modulus = 17e6
+poissons_ratio = 0.3
+density = 1100.0
+[body.column]
+shape = {type = "box", lengths = [1.0, 3.0]}
+spacing = 0.125
+[formulation]
+type = "total-lagrangian"
+gradient = "quadratic"
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[initial]]
+velocity = {x = "10*Y"}
+""",
+    ),
+    Flawed(
+        "bar-speed",
+        "poissons_ratio = 0",
+        f"""
+title = "a pulse in a steel rod"
+duration = 1e-4
+material = {STEEL}
+[body.rod]
+shape = {{type = "interval", length = 0.5}}
+spacing = 0.005
+[[boundary]]
+type = "traction"
+where = "left"
+traction = {{x = "1e6*sin(pi*min(t/3e-5, 1))**2"}}
+""",
+    ),
+    Flawed(
+        "sudden-load",
+        "artificial-viscosity",
+        f"""
+title = "a hammer on a plate"
+duration = 2e-5
+material = {STEEL}
+[body.plate]
+shape = {{type = "box", lengths = [0.1, 0.05]}}
+spacing = 0.0025
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[boundary]]
+type = "traction"
+where = "top"
+traction = {{y = -3e8}}
+""",
+    ),
+    Flawed(
+        "sudden-load",
+        "artificial-viscosity",
+        f"""
+title = "a bar that runs against a wall"
+duration = 2e-5
+material = {SLENDER}
+[body.bar]
+shape = {{type = "interval", length = 0.1}}
+spacing = 0.001
+[[boundary]]
+type = "clamp"
+where = "left"
+[[initial]]
+velocity = {{x = -300}}
+""",
+    ),
+    Flawed(
+        "slow-load",
+        "[statics]",
+        f"""
+title = "a tension test of a minute"
+duration = 60.0
+material = {STEEL}
+[body.specimen]
+shape = {{type = "box", lengths = [0.1, 0.02]}}
+spacing = 0.002
+[[boundary]]
+type = "clamp"
+where = "left"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {{x = "1e8*t/60"}}
+""",
+    ),
+    Flawed(
+        "slow-load",
+        "[statics]",
+        f"""
+title = "a block that is damped until it rests"
+duration = 20.0
+material = {RUBBER}
+[body.block]
+shape = {{type = "box", lengths = [0.3, 0.2]}}
+spacing = 0.02
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[effect]]
+type = "body-force"
+acceleration = {{y = -9.81}}
+[[effect]]
+type = "mass-damping"
+rate = 200.0
+""",
+    ),
+    Flawed(
+        "bodies-meet",
+        "solidsph plugins",
+        f"""
+title = "two rings that fly at each other"
+duration = 0.02
+material = {RUBBER}
+[body.left]
+shape = {{type = "annulus", inner_radius = 0.03, outer_radius = 0.05}}
+spacing = 0.004
+[body.right]
+shape = {{type = "annulus", inner_radius = 0.03, outer_radius = 0.05, centre = [0.15, 0.0]}}
+spacing = 0.004
+[[initial]]
+where = "left"
+velocity = {{x = 5}}
+[[initial]]
+where = "right"
+velocity = {{x = -5}}
+""",
+    ),
+    Flawed(
+        "bodies-meet",
+        "move them apart",
+        f"""
+title = "a block laid on a table"
+duration = 0.02
+material = {RUBBER}
+[body.table]
+shape = {{type = "box", lengths = [0.4, 0.1]}}
+spacing = 0.02
+[body.block]
+shape = {{type = "box", lengths = [0.2, 0.2], origin = [0.1, 0.1]}}
+spacing = 0.02
+[[boundary]]
+type = "clamp"
+where = "Y < 0.02"
+[[effect]]
+type = "body-force"
+acceleration = {{y = -9.81}}
+where = "block"
+""",
+    ),
+    Flawed(
+        "deep-clamp",
+        "shorten",
+        f"""
+title = "a beam of which half is in the wall"
+duration = 0.02
+material = {RUBBER}
+[body.beam]
+shape = {{type = "box", lengths = [1.0, 0.1]}}
+spacing = 0.0125
+[formulation]
+type = "total-lagrangian"
+gradient = "quadratic"
+[[boundary]]
+type = "clamp"
+where = "X < 0.5"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {{x = "1e4*min(t/0.01, 1)"}}
+""",
+    ),
+    Flawed(
+        "units",
+        "7850",
+        """
+title = "density in g/cm^3"
+duration = 2e-5
+[material]
+type = "linear-elastic"
+youngs_modulus = 70e9
+poissons_ratio = 0.33
+density = 2.7
+[body.plate]
+shape = {type = "box", lengths = [0.2, 0.1]}
+spacing = 0.01
+[[boundary]]
+type = "clamp"
+where = "left"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {x = "1e6*min(t/1e-5, 1)"}
+""",
+    ),
+    Flawed(
+        "overloaded",
+        "check the units",
+        """
+title = "a modulus in MPa under a traction in Pa"
+duration = 0.5
+[material]
+type = "neo-hookean"
+youngs_modulus = 210e3
+poissons_ratio = 0.3
+density = 7850.0
+[body.plate]
+shape = {type = "box", lengths = [0.2, 0.1]}
+spacing = 0.01
+[[boundary]]
+type = "clamp"
+where = "left"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {x = "5e6*min(t/0.2, 1)"}
+""",
+    ),
+    Flawed(
+        "unheld",
+        "clamp",
+        f"""
+title = "a plate that somebody forgot to hold"
+duration = 10.0
+material = {RUBBER}
+[statics]
+load_steps = 1
+[body.plate]
+shape = {{type = "box", lengths = [0.2, 0.1]}}
+spacing = 0.01
+[[effect]]
+type = "body-force"
+acceleration = {{y = -9.81}}
+""",
+    ),
+    Flawed(
+        "nothing-happens",
+        "add a load",
+        f"""
+title = "a load that is nothing"
+duration = 0.02
+material = {RUBBER}
+[body.block]
+shape = {{type = "box", lengths = [0.2, 0.1]}}
+spacing = 0.01
+[[boundary]]
+type = "clamp"
+where = "left"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {{x = 0.0}}
+""",
+    ),
+    Flawed(
+        "viscosity-unneeded",
+        "leave the effect out",
+        f"""
+title = "a cantilever that swings gently"
+duration = 1.0
+material = {RUBBER}
+[body.beam]
+shape = {{type = "box", lengths = [0.5, 0.06]}}
+spacing = 0.01
+[formulation]
+type = "total-lagrangian"
+gradient = "quadratic"
+[[boundary]]
+type = "clamp"
+where = "left"
+[[initial]]
+velocity = {{y = "0.2*(X/0.5)**2"}}
+[[effect]]
+type = "artificial-viscosity"
+""",
+    ),
+    Flawed(
+        "hourglass-unneeded",
+        "leave the effect out",
+        f"""
+title = "a bar with a control of bending"
+duration = 1e-4
+material = {SLENDER}
+[body.bar]
+shape = {{type = "interval", length = 0.15}}
+spacing = 0.0025
+[[boundary]]
+type = "traction"
+where = "left"
+traction = {{x = "1e6*sin(pi*min(t/3e-5, 1))**2"}}
+[[effect]]
+type = "hourglass-control"
+""",
+    ),
+    Flawed(
+        "overdamped",
+        "rate = ",
+        f"""
+title = "a block in honey"
+duration = 0.5
+material = {RUBBER}
+[body.block]
+shape = {{type = "box", lengths = [0.3, 0.2]}}
+spacing = 0.02
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[effect]]
+type = "body-force"
+acceleration = {{y = -9.81}}
+[[effect]]
+type = "mass-damping"
+rate = 1e5
+""",
+    ),
+    Flawed(
+        "coarse-outputs",
+        "outputs = ",
+        f"""
+title = "a tuning fork of which twenty pictures are kept"
+duration = 0.2
+outputs = 20
+material = {STEEL}
+[body.tine]
+shape = {{type = "box", lengths = [0.1, 0.01]}}
+spacing = 0.002
+[formulation]
+type = "total-lagrangian"
+gradient = "quadratic"
+[[boundary]]
+type = "clamp"
+where = "left"
+[[initial]]
+velocity = {{y = "0.5*(X/0.1)**2"}}
+""",
+    ),
+    Flawed(
+        "twice",
+        "leave one out",
+        f"""
+title = "gravity by two files"
+duration = 0.5
+material = {RUBBER}
+[body.beam]
+shape = {{type = "box", lengths = [0.5, 0.06]}}
+spacing = 0.01
+[formulation]
+type = "total-lagrangian"
+gradient = "quadratic"
+[[boundary]]
+type = "clamp"
+where = "left"
+[[effect]]
+type = "body-force"
+acceleration = {{y = -9.81}}
+[[effect]]
+type = "body-force"
+acceleration = {{y = -9.81}}
+""",
+    ),
+    Flawed(
+        "few-steps",
+        "a longer duration",
+        f"""
+title = "milliseconds that were meant to be seconds"
+duration = 1e-3
+material = {RUBBER}
+[body.beam]
+shape = {{type = "box", lengths = [5.0, 0.6]}}
+spacing = 0.1
+[formulation]
+type = "total-lagrangian"
+gradient = "quadratic"
+[[boundary]]
+type = "clamp"
+where = "left"
+[[effect]]
+type = "body-force"
+acceleration = {{y = -9.81}}
+""",
+    ),
+]
+
+SOUND = [
+    f"""
+title = "a beam that sags and swings, fine enough"
+duration = 2.0
+outputs = 400
+material = {RUBBER}
+[body.beam]
+shape = {{type = "box", lengths = [0.35, 0.02]}}
+spacing = 0.004
+[formulation]
+type = "total-lagrangian"
+gradient = "quadratic"
+[[boundary]]
+type = "clamp"
+where = "left"
+[[effect]]
+type = "body-force"
+acceleration = {{y = -2.0}}
+[[effect]]
+type = "hourglass-control"
+""",
+    f"""
+title = "a smooth pulse in a slender bar"
+duration = 1e-4
+material = {SLENDER}
+[body.bar]
+shape = {{type = "interval", length = 0.15}}
+spacing = 0.0025
+[kernel]
+type = "modified-mollifier"
+cover = 5.5
+[[boundary]]
+type = "traction"
+where = "left"
+traction = {{x = "1e6*sin(pi*min(t/3e-5, 1))**2"}}
+""",
+    f"""
+title = "a bar against a wall, with viscosity"
+duration = 2e-5
+material = {SLENDER}
+[body.bar]
+shape = {{type = "interval", length = 0.1}}
+spacing = 0.001
+[[boundary]]
+type = "clamp"
+where = "left"
+[[initial]]
+velocity = {{x = -300}}
+[[effect]]
+type = "artificial-viscosity"
+""",
+    f"""
+title = "a disc that spins"
+duration = 0.1
+material = {RUBBER}
+[body.disc]
+shape = {{type = "disc", radius = 0.1}}
+spacing = 0.01
+[[initial]]
+velocity = {{x = "-40*Y", y = "40*X"}}
+""",
+    """
+title = "a slab that creeps under a slow load"
+duration = 20.0
+[material]
+type = "viscoelastic"
+youngs_modulus = 1e4
+poissons_ratio = 0.4
+density = 1000.0
+prony = [{share = 0.5, time = 5.0}]
+[body.slab]
+shape = {type = "box", lengths = [0.2, 0.1]}
+spacing = 0.01
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[boundary]]
+type = "traction"
+where = "top"
+traction = {y = "-500*min(t/10, 1)"}
+""",
+    f"""
+title = "a cube pressed in space"
+duration = 0.02
+material = {RUBBER}
+[body.cube]
+shape = {{type = "box", lengths = [0.1, 0.1, 0.1]}}
+spacing = 0.0125
+[kernel]
+type = "cubic-spline"
+cover = 2.6
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[boundary]]
+type = "traction"
+where = "top"
+traction = {{y = "-1e5*min(t/0.01, 1)"}}
+[[effect]]
+type = "hourglass-control"
+""",
+    """
+title = "a thick ring under its weight, at rest"
+duration = 1.0
+[statics]
+load_steps = 2
+[material]
+type = "saint-venant-kirchhoff"
+youngs_modulus = 1e6
+poissons_ratio = 0.3
+density = 1000.0
+[body.ring]
+shape = {type = "annulus", inner_radius = 0.1, outer_radius = 0.2}
+spacing = 0.0125
+[[boundary]]
+type = "clamp"
+where = "Y < -0.18"
+[[effect]]
+type = "body-force"
+acceleration = {y = -9.81}
+""",
+    """
+title = "a sheet with a hole, pulled quickly but smoothly"
+duration = 0.004
+[material]
+type = "neo-hookean"
+youngs_modulus = 7e7
+poissons_ratio = 0.3
+density = 1000.0
+[body.sheet]
+spacing = 0.025
+[body.sheet.shape]
+type = "difference"
+of = {type = "box", lengths = [1.0, 0.6]}
+minus = {type = "disc", radius = 0.15, centre = [0.5, 0.3]}
+[[boundary]]
+type = "clamp"
+where = "left"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {x = "3e6*min(t/2e-3, 1)"}
+""",
+    """
+title = "a rubber column thrown to the side, controlled"
+duration = 0.5
+[material]
+type = "neo-hookean"
+youngs_modulus = 17e6
+poissons_ratio = 0.45
+density = 1100.0
+[body.column]
+shape = {type = "box", lengths = [1.0, 3.0]}
+spacing = 0.125
+[formulation]
+type = "total-lagrangian"
+gradient = "quadratic"
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[initial]]
+velocity = {x = "10*Y"}
+[[effect]]
+type = "hourglass-control"
+""",
+    f"""
+title = "two blocks far apart, each held"
+duration = 0.05
+material = {RUBBER}
+[body.near]
+shape = {{type = "box", lengths = [0.2, 0.1]}}
+spacing = 0.01
+[body.far]
+shape = {{type = "box", lengths = [0.2, 0.1], origin = [1.0, 0.0]}}
+spacing = 0.01
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[boundary]]
+type = "traction"
+where = "top"
+traction = {{x = "5e3*min(t/0.02, 1)"}}
+""",
+    f"""
+title = "a plate swept by a wave from a ramp, in plane strain"
+duration = 1e-4
+material = {STEEL}
+[body.plate]
+shape = {{type = "polygon", vertices = [[0, 0], [0.2, 0], [0.2, 0.1], [0, 0.05]]}}
+spacing = 0.005
+[[boundary]]
+type = "traction"
+where = "surface and X < 1e-2"
+traction = {{x = "1e7*sin(pi*min(t/4e-5, 1))**2"}}
+""",
+    f"""
+title = "a block that comes to rest, damped at what is critical"
+duration = 0.3
+material = {RUBBER}
+[body.block]
+shape = {{type = "box", lengths = [0.3, 0.2]}}
+spacing = 0.02
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[effect]]
+type = "body-force"
+acceleration = {{y = -9.81}}
+[[effect]]
+type = "mass-damping"
+rate = 400.0
+""",
+    f"""
+title = "a ball that falls freely"
+duration = 0.05
+material = {RUBBER}
+[body.ball]
+shape = {{type = "ball", radius = 0.05}}
+spacing = 0.01
+[[effect]]
+type = "body-force"
+acceleration = {{z = -9.81}}
+""",
+]
