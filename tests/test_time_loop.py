@@ -18,9 +18,8 @@ from solidsph.interfaces.condition import ForceCondition, Observation
 from solidsph.interfaces.declared import PointwiseForce
 from solidsph.interfaces.effect import Effect
 from solidsph.particles import State
-from solidsph.testing import example_part
 from solidsph.time_loop import StepByStep, StepError
-from tests.scenes import box
+from tests.scenes import box, with_effect
 
 STEPS = 25
 
@@ -97,7 +96,7 @@ def test_every_integrator_and_condition_of_a_bar(integrator: str) -> None:
 
 @pytest.mark.parametrize("effect", registry.names("effects"))
 def test_every_effect(effect: str) -> None:
-    assert_agree(box(2, 7).effect(example_part("effects", effect)))
+    assert_agree(with_effect(effect, 2, 7))
 
 
 @pytest.mark.parametrize("divergence", registry.names("divergences"))

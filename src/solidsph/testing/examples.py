@@ -24,6 +24,8 @@ TYPICAL: Mapping[str, Any] = {
     "rate": 20.0,  # [1/s]
     "seed": 1,
     "prony": [{"share": 0.4, "time": 1e-2}, {"share": 0.2, "time": 1.0}],  # [-], [s]
+    "point": {"x": 0.05},  # [m]
+    "normal": {"x": 1.0},
     # Shapes
     "length": 1.3,  # [m]
     "lengths": [1.2, 0.8],  # [m]
