@@ -94,9 +94,25 @@ def test_every_integrator_and_condition_of_a_bar(integrator: str) -> None:
     )
 
 
-@pytest.mark.parametrize("effect", registry.names("effects"))
+# Of no declared kind: who is near whom is asked anew at every step.
+BY_STEP = {"contact", "rigid-wall"}
+
+
+@pytest.mark.parametrize("effect", sorted(set(registry.names("effects")) - BY_STEP))
 def test_every_effect(effect: str) -> None:
     assert_agree(with_effect(effect, 2, 7))
+
+
+@pytest.mark.parametrize("effect", sorted(BY_STEP))
+def test_others_go_step_by_step_with_compiled_forces(effect: str) -> None:
+    by_engine = []
+    for engine in ("compiled", "matrix"):
+        simulation = stretched(with_effect(effect, 2, 7).engine(engine)).build()
+        loop = simulation.time_loop()
+        assert isinstance(loop, StepByStep)
+        by_engine.append(loop.advance(simulation.start(), STEPS))
+    assert_same(*by_engine, simulation)
+    assert np.abs(by_engine[0].applied[effect]).max() > 0.0
 
 
 @pytest.mark.parametrize("divergence", registry.names("divergences"))

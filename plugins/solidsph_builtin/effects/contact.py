@@ -13,7 +13,12 @@ import numpy as np
 from solidsph.arrays import Array, Indices
 from solidsph.body import Body
 from solidsph.errors import SceneError
-from solidsph.interfaces.condition import ForceCondition, Observation, StoringCondition
+from solidsph.interfaces.condition import (
+    FieldCondition,
+    ForceCondition,
+    Observation,
+    StoringCondition,
+)
 from solidsph.interfaces.effect import Effect
 from solidsph.parameters import check_positive, number
 from solidsph.setting import Setting
@@ -172,7 +177,7 @@ class Contact(Effect):
 
 @final
 @attrs.frozen(eq=False)
-class _Contact(StoringCondition, ForceCondition):
+class _Contact(StoringCondition, FieldCondition, ForceCondition):
     label: str
     particles: Indices  # (k,)
     meetings: Sequence[Meeting]
@@ -267,6 +272,9 @@ class _Contact(StoringCondition, ForceCondition):
             f"{label} touching pairs [-]": float(pairs),
             f"{label} evaluations asleep [-]": float(asleep[0]),
         }
+
+    def fields(self, observation: Observation) -> Mapping[str, Array]:
+        return {f"{self.label} force [N]": observation.state.applied[self.label]}
 
     def _rubs(self, meeting: Meeting) -> bool:
         # On a line there is no way to slide.

@@ -13,7 +13,12 @@ from scipy.sparse import bsr_array, csr_array
 from solidsph.arrays import Array, Indices
 from solidsph.body import Body
 from solidsph.errors import SceneError
-from solidsph.interfaces.condition import ForceCondition, Observation, StoringCondition
+from solidsph.interfaces.condition import (
+    FieldCondition,
+    ForceCondition,
+    Observation,
+    StoringCondition,
+)
 from solidsph.interfaces.effect import Effect
 from solidsph.motion import Component, VectorField
 from solidsph.parameters import check_positive, number
@@ -114,7 +119,7 @@ class RigidWall(Effect):
 
 @final
 @attrs.frozen(eq=False)
-class _Wall(StoringCondition, ForceCondition):
+class _Wall(StoringCondition, FieldCondition, ForceCondition):
     label: str
     particles: Indices  # (k,)
     reference: Array  # X of all particles, (n, d) [m]
@@ -197,7 +202,7 @@ class _Wall(StoringCondition, ForceCondition):
     def report(self, observation: Observation) -> Mapping[str, float]:
         state, label = observation.state, self.label
         gaps = self.gaps(state.time, state.positions)
-        total = state.applied[label].sum(axis=0) if label in state.applied else 0.0 * self.point
+        total = state.applied[label].sum(axis=0)
         return {
             f"{label} energy [J]": float(self.energies(observation).sum()),
             **{
@@ -207,6 +212,9 @@ class _Wall(StoringCondition, ForceCondition):
             f"{label} least gap [m]": float(gaps.min()),
             f"{label} touching particles [-]": float(np.sum(gaps < 0.0)),
         }
+
+    def fields(self, observation: Observation) -> Mapping[str, Array]:
+        return {f"{self.label} force [N]": observation.state.applied[self.label]}
 
     def _slip(self, memory: Mapping[str, Array]) -> Array:
         return memory.get(self._slip_name, np.zeros((len(self.particles), len(self.point))))
