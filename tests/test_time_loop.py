@@ -107,12 +107,13 @@ def test_every_effect(effect: str) -> None:
 def test_others_go_step_by_step_with_compiled_forces(effect: str) -> None:
     by_engine = []
     for engine in ("compiled", "matrix"):
-        simulation = stretched(with_effect(effect, 2, 7).engine(engine)).build()
+        pressed = with_effect(effect, 2, 7).initial(velocity={"x": "-3*sin(2*X)"})
+        simulation = pressed.engine(engine).build()
         loop = simulation.time_loop()
         assert isinstance(loop, StepByStep)
         by_engine.append(loop.advance(simulation.start(), STEPS))
     assert_same(*by_engine, simulation)
-    assert np.abs(by_engine[0].applied[effect]).max() > 0.0
+    assert by_engine[0].work[effect] != 0.0
 
 
 @pytest.mark.parametrize("divergence", registry.names("divergences"))
