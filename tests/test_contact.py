@@ -157,7 +157,7 @@ def test_lattices_do_not_interlock() -> None:
         box(2, 10)
         .body(
             "other",
-            shape={"type": "box", "lengths": [s * 14, 0.5], "origin": [-0.2, 1.0]},
+            shape={"type": "box", "lengths": [2.2, 0.5], "origin": [-0.6, 1.0]},
             spacing=s,
         )
         .effect("contact")
@@ -171,7 +171,8 @@ def test_lattices_do_not_interlock() -> None:
         return energy(simulation, x)
 
     along = np.array([stored(0.1, k / 8.0) for k in range(9)])
-    assert along[0] == pytest.approx(along[-1], rel=1e-10)
+    # What the far ends weigh more fades from particle to particle, but does not end.
+    assert along[0] == pytest.approx(along[-1], rel=1e-5)
     hill = float(np.ptp(along)) / ((stored(0.11, 0.0) - stored(0.09, 0.0)) / 0.02)  # [spacings]
     assert hill < 2e-3
 
@@ -212,8 +213,8 @@ def test_a_body_that_folds_touches_itself() -> None:
     """Two arms of a U, closed by their motion: apart in the reference configuration."""
     arms = {
         "type": "difference",
-        "of": {"type": "box", "lengths": [1.0, 0.5]},
-        "minus": {"type": "box", "lengths": [0.8, 0.1], "origin": [0.3, 0.2]},
+        "of": {"type": "box", "lengths": [1.0, 0.55]},
+        "minus": {"type": "box", "lengths": [0.8, 0.15], "origin": [0.3, 0.2]},
     }
 
     def closed(itself: list[str]) -> tuple[float, float]:
@@ -224,8 +225,8 @@ def test_a_body_that_folds_touches_itself() -> None:
             .material("neo-hookean", **SOFT)
             .formulation("total-lagrangian")
             .effect("hourglass-control")
-            .initial(where="X > 0.3 and Y > 0.25", velocity={"y": "-10*(X-0.3)"})
-            .initial(where="X > 0.3 and Y < 0.25", velocity={"y": "10*(X-0.3)"})
+            .initial(where="X > 0.3 and Y > 0.275", velocity={"y": "-10*(X-0.3)"})
+            .initial(where="X > 0.3 and Y < 0.275", velocity={"y": "10*(X-0.3)"})
             .engine("matrix")
             .duration(0.03)
             .outputs(15)
@@ -234,7 +235,8 @@ def test_a_body_that_folds_touches_itself() -> None:
             builder.effect("contact", itself=itself)
         simulation = builder.build()
         X = simulation.particles.positions
-        tips = [(X[:, 0] > 0.9) & side for side in (X[:, 1] < 0.25, X[:, 1] > 0.25)]
+        slot = np.abs(X[:, 1] - 0.275) < 0.1
+        tips = [(X[:, 0] > 0.9) & slot & side for side in (X[:, 1] < 0.275, X[:, 1] > 0.275)]
         smallest, pairs = np.inf, 0.0
         state, loop = simulation.start(), simulation.time_loop()
         for stop in simulation.output_steps():
@@ -249,9 +251,9 @@ def test_a_body_that_folds_touches_itself() -> None:
 
     free, _ = closed([])
     held, pairs = closed(["fork"])
-    # The arms are 0.2 m thick, so their middles cannot come closer; a tenth of a spacing yields.
-    assert free < 0.15
-    assert held > 0.2 - 0.1 * 0.025
+    # Their outermost rows touch at one spacing, and yield by the strain of the impact, v / c.
+    assert free < -0.05
+    assert held > 0.025 * (1.0 - 1.5 * 7.0 / 36.7)
     assert pairs > 0.0
 
 
