@@ -59,9 +59,9 @@ class Meeting:
 
     def touch(self, positions: Array) -> Touch | None:
         """Who is near whom at `positions` (n, d) of all; None while no box is near another."""
-        x = positions[self.particles]
-        if self.search.asleep(x):
+        if self.search.asleep(positions):
             return None
+        x = positions[self.particles]
         i, j = self._near.pairs(x)
         offsets = x[i] - x[j]
         distances = np.sqrt(np.sum(offsets**2, axis=1))
@@ -105,44 +105,45 @@ class Meeting:
         """
         m, d = x.shape
         forces, slipped = np.zeros((m, d)), np.zeros((m, d))
-        # Both ways: the particle p that is in the way of q.
-        p = np.concatenate([touch.i, touch.j])
-        q = np.concatenate([touch.j, touch.i])
-        pressed = touch.excess[p] > 0.0
-        pair = np.tile(np.arange(len(touch.i)), 2)[pressed]
-        sign = np.repeat([1.0, -1.0], len(touch.i))[pressed]
-        p, q = p[pressed], q[pressed]
-        if not p.size:
+        # Both ways: the particle p that is in the way of q. Those in the way are numbered anew.
+        active = np.flatnonzero(touch.excess > 0.0)
+        count = len(active)
+        if not count:
             return forces, slipped
+        number = np.full(m, -1, dtype=np.intp)
+        number[active] = np.arange(count)
+        p = number[np.concatenate([touch.i, touch.j])]
+        chosen = np.flatnonzero(p >= 0)
+        p, q = p[chosen], np.concatenate([touch.j, touch.i])[chosen]
+        pair = chosen % len(touch.i)
+        sign = np.where(chosen < len(touch.i), 1.0, -1.0)
         fills = self.weights[q]
         slope = (fills * touch.slopes[pair] * sign)[:, None] * touch.offsets[pair]
-        inward = self._gathered(p, slope)  # gradient of what the other fills
+        inward = _summed(p, slope, count)  # gradient of what the other fills
         shares = fills * touch.values[pair]
-        shares /= np.bincount(p, shares, m)[p]
-        centre = self._gathered(p, shares[:, None] * x[q])
-        mean = self._gathered(p, shares[:, None] * v[q])
+        shares /= np.bincount(p, shares, count)[p]
+        centre = _summed(p, shares[:, None] * x[q], count)
+        mean = _summed(p, shares[:, None] * v[q], count)
         arms = x[q] - centre[p]
-        inertia = self._gathered(p, shares[:, None, None] * _inertia(arms))
-        spin = self._gathered(p, shares[:, None] * _cross(arms, v[q] - mean[p]))
+        inertia = _summed(p, shares[:, None, None] * _inertia(arms), count)
+        spin = _summed(p, shares[:, None] * _cross(arms, v[q] - mean[p]), count)
         steep = np.linalg.norm(inward, axis=1)
         floor = _SLENDER * self.kernel.support_radius**2
-        tied = (touch.excess > 0.0) & (steep > 0.0)
-        tied &= np.linalg.eigvalsh(inertia)[:, 0] > floor
-        k = np.flatnonzero(tied)
-        reach = x[k] - centre[k]
+        k = np.flatnonzero((steep > 0.0) & (np.linalg.eigvalsh(inertia)[:, 0] > floor))
+        own = active[k]
+        reach = x[own] - centre[k]
         rate = np.linalg.solve(inertia[k], spin[k][..., None])[..., 0]
         there = mean[k] + _turning(np.asarray(rate, dtype=np.float64), reach)
-        limits = friction * self.modulus * self.volumes[k] * touch.excess[k] * steep[k]
+        limits = friction * self.modulus * self.volumes[own] * touch.excess[own] * steep[k]
         normals = inward[k] / steep[k][:, None]
-        slipped[k] = slid(slip[k], v[k] - there, normals, step, self.spring[k], limits)
-        pull = -self.spring[k][:, None] * slipped[k]
-        forces[k] += pull
-        turn = np.zeros((m, inertia.shape[1]))
+        slipped[own] = slid(slip[own], v[own] - there, normals, step, self.spring[own], limits)
+        pull = -self.spring[own][:, None] * slipped[own]
+        forces[own] = pull
+        turn = np.zeros((count, inertia.shape[1]))
         turn[k] = np.linalg.solve(inertia[k], -_cross(reach, pull)[..., None])[..., 0]
-        back = np.zeros((m, d))
+        back = np.zeros((count, d))
         back[k] = -pull
-        on_q = shares[:, None] * (back[p] + _turning(turn[p], arms))
-        forces += self._gathered(q, on_q)
+        forces += _summed(q, shares[:, None] * (back[p] + _turning(turn[p], arms)), m)
         return forces, slipped
 
     def least_gap(self, positions: Array) -> float:
@@ -155,13 +156,17 @@ class Meeting:
         return float(gaps.min())
 
     def _gathered(self, rows: Indices, values: Array) -> Array:
-        """Sum of `values` (k, ...) by their rows, (m, ...), in the order of the pairs."""
-        m, shape = len(self.particles), values.shape[1:]
-        columns = values.reshape(len(values), prod(shape))
-        sums = np.empty((m, columns.shape[1]))
-        for k, one in enumerate(columns.T):
-            sums[:, k] = np.bincount(rows, one, m)
-        return sums.reshape(m, *shape)
+        return _summed(rows, values, len(self.particles))
+
+
+def _summed(rows: Indices, values: Array, count: int) -> Array:
+    """Sum of `values` (k, ...) by their rows, (count, ...), in the order of the pairs."""
+    shape = values.shape[1:]
+    columns = values.reshape(len(values), prod(shape))
+    sums = np.empty((count, columns.shape[1]))
+    for k, one in enumerate(columns.T):
+        sums[:, k] = np.bincount(rows, one, count)
+    return sums.reshape(count, *shape)
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -19,12 +19,15 @@ class Search(ABC):
     """Pairs of two groups of particles, or of one group with itself."""
 
     @abstractmethod
-    def asleep(self, x: Array) -> bool:
-        """Whether no pair at positions x (m, d) can be within the reach and the margin."""
+    def asleep(self, positions: Array) -> bool:
+        """Whether no pair can be within the reach and the margin; positions (n, d) of all."""
 
     @abstractmethod
     def within(self, x: Array, radius: float) -> tuple[Indices, Indices]:
-        """Pairs (k,), (k,) no further apart than `radius`, each once, in any order."""
+        """Pairs (k,), (k,) no further apart than `radius`, each once, in any order.
+
+        Positions x (m, d) and pairs are those of the groups alone, the first before the second.
+        """
 
 
 @final
@@ -32,13 +35,23 @@ class Search(ABC):
 class Between(Search):
     """Particles of two bodies, those of the first before the others."""
 
+    one: slice | Indices  # those of the first body, among all
+    other: slice | Indices  # and of the second
     split: int  # how many the first has
     wakes: float  # distance of the boxes at which the search begins [m]
+    # A pure cache: along which axis to look first. Bodies that stay apart do so along the same.
+    _first: list[int] = attrs.field(factory=lambda: [0], init=False, repr=False)
 
-    def asleep(self, x: Array) -> bool:
-        one, other = x[: self.split], x[self.split :]
-        gaps = np.maximum(one.min(axis=0) - other.max(axis=0), other.min(axis=0) - one.max(axis=0))
-        return bool(np.linalg.norm(np.maximum(gaps, 0.0)) > self.wakes)
+    def asleep(self, positions: Array) -> bool:
+        square, d = 0.0, positions.shape[1]
+        for axis in sorted(range(d), key=lambda k: k != self._first[0]):
+            x, y = positions[self.one, axis], positions[self.other, axis]
+            gap = max(0.0, float(x.min() - y.max()), float(y.min() - x.max()))
+            square += gap**2
+            if square > self.wakes**2:
+                self._first[0] = axis
+                return True
+        return False
 
     def within(self, x: Array, radius: float) -> tuple[Indices, Indices]:
         one = np.arange(self.split)
@@ -59,13 +72,14 @@ class Between(Search):
 class Within(Search):
     """Particles of one body that were far from each other."""
 
+    particles: Indices  # (m,) among all
     reference: Array  # X, (m, d) [m]
     apart: float  # distance from which on they count, in the reference configuration [m]
     wakes: float  # distance up to which the search goes on [m]
 
-    def asleep(self, x: Array) -> bool:
+    def asleep(self, positions: Array) -> bool:
         # No two displacements differ by more than the diagonal of the box that holds them all.
-        u = x - self.reference
+        u = positions[self.particles] - self.reference
         return bool(np.linalg.norm(np.ptp(u, axis=0)) < self.apart - self.wakes)
 
     def within(self, x: Array, radius: float) -> tuple[Indices, Indices]:
@@ -111,3 +125,10 @@ def _inside(x: Array, other: Array, margin: float) -> Array:
     """Which of x (k, d) are inside the box of `other`, or nearly, (k,)."""
     lower, upper = other.min(axis=0) - margin, other.max(axis=0) + margin
     return np.asarray(np.all((x >= lower) & (x <= upper), axis=1))
+
+
+def together(particles: Indices) -> slice | Indices:
+    """The same particles as a slice, where they follow each other: what it takes is no copy."""
+    first, count = int(particles[0]), len(particles)
+    whole = slice(first, first + count)
+    return whole if np.array_equal(particles, np.arange(first, first + count)) else particles

@@ -31,7 +31,7 @@ from solidsph_builtin.effects._crowding import (
     steepest,
 )
 from solidsph_builtin.effects._meeting import Meeting, Touch
-from solidsph_builtin.effects._search import Between, Search, Within
+from solidsph_builtin.effects._search import Between, Search, Within, together
 
 # 1 / integral of (dS/dz)^2 dz, in parts of the support: the depth of the layer that is squeezed.
 _LAYER = 0.87
@@ -200,19 +200,24 @@ class _Contact(StoringCondition, FieldCondition, ForceCondition):
         velocities: Array,
         memory: Mapping[str, Array],
     ) -> tuple[Array, Mapping[str, Array]]:
-        forces = np.zeros_like(positions)
+        forces: Array | None = None
         slips: dict[str, Array] = {}
         asleep = 0
         for meeting in self.meetings:
             touch = meeting.touch(positions)
             asleep += touch is None
             force, slip = self._of(meeting, touch, positions, velocities, step, memory)
-            if force is not None:
-                forces[meeting.particles] += force
             slips |= slip
+            if force is None:
+                continue
+            if forces is None:
+                forces = np.zeros_like(positions)
+            forces[meeting.particles] += force
         before = memory.get(self._asleep, np.zeros(1))
         count = before + asleep if step > 0.0 else before
-        return forces[self.particles], {self._asleep: count, **slips}
+        none = (len(self.particles), positions.shape[1])
+        found = np.zeros(none) if forces is None else forces[self.particles]
+        return found, {self._asleep: count, **slips}
 
     def _of(
         self,
@@ -300,10 +305,12 @@ def _made(one: Body, other: Body, strength: float, margin: float) -> Meeting:
     split = len(own[0].particles)
     modulus = _modulus(one, other, reach, strength)
     volumes = np.concatenate([part.volumes for part in own])
-    search: Search = Between(split, reach + margin)
+    search: Search = Between(
+        together(own[0].particles), together(own[-1].particles), split, reach + margin
+    )
     if alone:
         X = one.particles.positions[own[0].particles - one.extent.start]
-        search = Within(X, _APART * reach, reach + margin)
+        search = Within(own[0].particles, X, _APART * reach, reach + margin)
     return Meeting(
         first=one.name,
         second=other.name,
