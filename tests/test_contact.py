@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solidsph import BuildError, Record, SceneError, Simulation
+from solidsph import BuildError, Record, Scene, SceneError, Simulation
 from solidsph.arrays import Array
 from solidsph.body import Body
 from solidsph.builder import Builder
@@ -20,6 +21,7 @@ from solidsph_builtin.effects import _search
 from solidsph_builtin.effects._meeting import Meeting
 from solidsph_builtin.effects.contact import Contact
 from tests.scenes import SOFT, box, touching
+from tests.test_docs import blocks
 
 JITTERED = {"type": "jittered-lattice", "amplitude": 0.2, "seed": 3}
 MODULUS = 1e6 * 0.7 / (1.3 * 0.4)  # lambda + 2 mu of SOFT [Pa]
@@ -361,3 +363,15 @@ def test_the_declared_frequency_holds_however_they_meet() -> None:
                 columns.append((change / (2.0 * step * m[:, None])).ravel())
             largest = np.linalg.eigvals(np.column_stack(columns)).real.max()
             assert np.sqrt(largest) <= effect.stiffness_rate(bodies)
+
+
+def test_the_scenes_of_the_page_run() -> None:
+    shown = [text for text in blocks("docs/effects.md", "toml") if _OWN.search(text)]
+    assert len(shown) >= 2
+    for text in shown:
+        simulation = Simulation.builder(Scene.from_toml(text)).build()
+        state = simulation.time_loop().advance(simulation.start(), 20)
+        assert np.isfinite(state.positions).all()
+
+
+_OWN = re.compile('type = "(contact|rigid-wall)"')
