@@ -171,3 +171,13 @@ def test_a_bar_thrown_at_a_wall_comes_back() -> None:
         .build()
     )
     assert simulation.run().state.velocities.mean() == pytest.approx(0.1, rel=0.03)
+
+
+def test_no_step_changes_no_memory() -> None:
+    """An integrator begins by asking without a step: springs stay, even where nothing presses."""
+    simulation = dropped(friction=0.5).build()
+    (load,) = simulation.dynamics.loads
+    x = simulation.particles.positions + 1.0
+    slip = np.full((len(x), 2), 0.01)
+    _, memory = load.advance(0.0, 0.0, x, np.zeros_like(x), {"floor slip": slip})
+    assert np.array_equal(memory["floor slip"], slip)

@@ -53,9 +53,9 @@ class CollidingRings(Case):
     source: ClassVar[str] = _SOURCE
     sweep: ClassVar[Mapping[str, Sequence[Any]]] = {"through": (5, 7, 10, 14)}
     trials: ClassVar[Mapping[str, Trial]] = {
-        "0.059 c0": Trial({}, {"through": 4, "duration": 0.0095}),
+        "0.059 c0": Trial({}, {"through": 4}),
         "0.059 c0, off centre, friction 0.5": Trial(
-            {"offset": 0.03, "friction": 0.5}, {"through": 4, "duration": 0.01}
+            {"offset": 0.03, "friction": 0.5}, {"through": 4, "duration": 0.015}
         ),
         # They fold flat, touch themselves, and are pressed together by half where they fold.
         "0.12 c0": Trial({"speed": 0.12, "closest": 0.35}, {"through": 4, "duration": 0.009}),
