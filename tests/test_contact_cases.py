@@ -37,7 +37,8 @@ def test_hertz_with_few_particles(tmp_path: Path) -> None:
         CollidingBars(dimension=2),
         CollidingRings(),
         SlidingBlock(),
-        SlidingBlock(friction=0.6, steep=45.0, flat=30.0),
+        # What slides trembles, at the highest frequencies there are: the ledger needs small steps.
+        SlidingBlock(friction=0.6, steep=45.0, flat=28.0, time_step_factor=0.2),
         Hertz(),
     ],
     ids=lambda case: type(case).__name__,
