@@ -6,6 +6,7 @@ from typing import Any
 
 from solidsph import Simulation
 from solidsph.builder import Builder
+from solidsph.testing import example_part
 
 SOFT = {"youngs_modulus": 1e6, "poissons_ratio": 0.3, "density": 1000.0}
 
@@ -21,6 +22,23 @@ def box(d: int, cells: int = 6, **body: Any) -> Builder:
         .formulation("total-lagrangian")
         .duration(1e-2)
     )
+
+
+def touching(d: int, cells: int = 6, aside: float = 0.0, **body: Any) -> Builder:
+    """Two such boxes, the second beside the first with no gap, and moved aside."""
+    origin = [1.0, *[aside] * (d - 1)]
+    shape = (
+        {"type": "interval", "length": 1.0, "origin": 1.0}
+        if d == 1
+        else {"type": "box", "lengths": [1.0] * d, "origin": origin}
+    )
+    return box(d, cells, **body).body("other", shape=shape, spacing=1.0 / cells, **body)
+
+
+def with_effect(name: str, d: int, cells: int = 6) -> Builder:
+    """A scene with an effect of typical parameters, of as many bodies as it needs."""
+    scene = touching(d, cells) if name in ("contact", "joint") else box(d, cells)
+    return scene.effect(example_part("effects", name))
 
 
 SCENE_TOML = """

@@ -67,9 +67,10 @@ def test_csm1_approaches_the_reference_with_the_order_of_its_corners(
 
 @pytest.mark.parametrize("clamp", CLAMPS)
 def test_csm1_with_the_consistent_gradient(clamp: str, tmp_path: Path) -> None:
-    outcome = run_case(Csm1(clamp=clamp), tmp_path)
+    # At a straight clamp, whose corners are sharper, 5 across leave 0.6 %.
+    outcome = run_case(Csm1(clamp=clamp, across=9), tmp_path)
     assert outcome.passed
-    plain = run_case(Csm1(clamp=clamp, tolerance=0.1, **QUADRATIC), tmp_path)
+    plain = run_case(Csm1(clamp=clamp, across=9, tolerance=0.1, **QUADRATIC), tmp_path)
     # Without the push of surface particles it is better, and at the arc, where they stand
     # irregularly, more than twice so.
     factor = {"straight": 1.0, "arc": 0.5}[clamp]

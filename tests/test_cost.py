@@ -41,7 +41,7 @@ def test_a_frontier_of_a_case(tmp_path: Path) -> None:
 def test_the_cases_own_parameters_are_among_the_points(tmp_path: Path) -> None:
     case = Csm1(across=5)
     made = frontier(case, {"across": (9,), "cover": (2.6,)}, inline(tmp_path))
-    assert made.points[-1].settings == {"across": 5, "cover": 2.6}
+    assert made.points[-1].settings == {"across": 5, "cover": 3.0}
     assert own_settings(case, {"across": (), "precision": ()}) is None
 
 
@@ -96,7 +96,7 @@ def test_the_command_and_what_it_leaves(tmp_path: Path) -> None:
     # From here on nothing is run: the points are in the journal.
     table = solidsph("cost", "csm1", *axes, cwd=tmp_path)
     assert "the front, of 3 configurations" in table.stdout
-    assert "the case's own parameters: across 9" in table.stdout
+    assert "the case's own parameters: across 5" in table.stdout
     search = solidsph("cost", "csm1", *axes, "--accuracy", "1%", cwd=tmp_path)
     assert search.returncode == 0, search.stderr
     path = tmp_path / "results/cost/csm1/csm1.toml"

@@ -22,9 +22,8 @@ from solidsph.hooks import implementation
 from solidsph.results import checkpointer
 from solidsph.results.checkpoint import checkpoint_path, read_checkpoint
 from solidsph.results.resume import pending
-from solidsph.testing import example_part
 from tests.resuming import NEVER, OFTEN, Stop, assert_same_record, content
-from tests.scenes import REFERENCE_ONLY, SCENE_TOML, box
+from tests.scenes import REFERENCE_ONLY, SCENE_TOML, box, with_effect
 
 SOLIDSPH = str(Path(sys.executable).with_name("solidsph"))
 OUTPUTS = 4
@@ -51,6 +50,7 @@ BOUNDARIES: Mapping[str, Callable[[], Builder]] = {
     "prescribed-motion": lambda: box(2).boundary(
         "prescribed-motion", where="left", displacement={"x": "0.05*sin(500*t)"}
     ),
+    "pressure": lambda: box(2).boundary("pressure", where="right", pressure="1e4*t"),
     "traction": lambda: box(2).boundary("traction", where="right", traction={"y": "1e4*t"}),
     "symmetry": lambda: box(2, 8, discretisation={**GHOSTS, "ghost_faces": ["left"]}).boundary(
         "symmetry", axis="x"
@@ -121,7 +121,7 @@ def test_every_integrator(tmp_path: Path, integrator: str) -> None:
 @pytest.mark.usefixtures("often")
 @pytest.mark.parametrize("effect", registry.names("effects"))
 def test_every_effect(tmp_path: Path, effect: str) -> None:
-    assert_goes_on(moving(box(2).effect(example_part("effects", effect))), tmp_path)
+    assert_goes_on(moving(with_effect(effect, 2)), tmp_path)
 
 
 def test_every_boundary_has_a_scene() -> None:

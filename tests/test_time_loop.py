@@ -18,9 +18,8 @@ from solidsph.interfaces.condition import ForceCondition, Observation
 from solidsph.interfaces.declared import PointwiseForce
 from solidsph.interfaces.effect import Effect
 from solidsph.particles import State
-from solidsph.testing import example_part
 from solidsph.time_loop import StepByStep, StepError
-from tests.scenes import box
+from tests.scenes import box, with_effect
 
 STEPS = 25
 
@@ -95,9 +94,29 @@ def test_every_integrator_and_condition_of_a_bar(integrator: str) -> None:
     )
 
 
-@pytest.mark.parametrize("effect", registry.names("effects"))
+# Of no declared kind: who is near whom is asked anew at every step.
+BY_STEP = {
+    *("contact", "rigid-wall", "heat", "kelvin-voigt", "dynamic-relaxation", "bond-failure"),
+}
+
+
+@pytest.mark.parametrize("effect", sorted(set(registry.names("effects")) - BY_STEP))
 def test_every_effect(effect: str) -> None:
-    assert_agree(box(2, 7).effect(example_part("effects", effect)))
+    assert_agree(with_effect(effect, 2, 7))
+
+
+@pytest.mark.parametrize("effect", sorted(BY_STEP))
+def test_others_go_step_by_step_with_compiled_forces(effect: str) -> None:
+    by_engine = []
+    for engine in ("compiled", "matrix"):
+        pressed = with_effect(effect, 2, 7).initial(velocity={"x": "-3*sin(2*X)"})
+        simulation = pressed.engine(engine).build()
+        loop = simulation.time_loop()
+        assert isinstance(loop, StepByStep)
+        by_engine.append(loop.advance(simulation.start(), STEPS))
+    assert_same(*by_engine, simulation)
+    # Bonds that fail have no force of their own.
+    assert by_engine[0].work[effect] != 0.0 or effect == "bond-failure"
 
 
 @pytest.mark.parametrize("divergence", registry.names("divergences"))

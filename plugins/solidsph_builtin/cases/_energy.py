@@ -9,6 +9,8 @@ from solidsph.interfaces.case import Measurement
 from solidsph.results.record import Record
 from solidsph_builtin.cases._compare import FINISHED
 
+_RESIDUAL = 1e-3  # of the energy in play, by the bar of the stability suite
+
 
 def total_energy(record: Record) -> Array:
     """Kinetic, strain and, where there is one, the hourglass control's, (t,) [J]."""
@@ -35,6 +37,41 @@ def energy_kept(record: Record, tolerance: float) -> Measurement:
         source="nothing acts on the body",
         error=change,
         passed=record.outcome == FINISHED and change <= tolerance,
+    )
+
+
+def residual_over_start(record: Record) -> Measurement:
+    """What the ledger leaves at most, over the energy at the start."""
+    energy = record.history["kinetic energy [J]"][0] + record.history["strain energy [J]"][0]
+    left = float(np.abs(record.history["energy residual [J]"]).max() / energy)
+    return Measurement(
+        quantity="largest energy residual over the energy at the start",
+        value=left,
+        unit="1",
+        reference=0.0,
+        source="every force has an account",
+        error=left,
+        passed=record.outcome == FINISHED and left <= _RESIDUAL,
+    )
+
+
+def residual_over_work(record: Record, name: str) -> Measurement:
+    """What the ledger leaves at most, over the largest of its accounts."""
+    accounts = [
+        values
+        for column, values in record.history.items()
+        if column.startswith("work of ") or column in ("kinetic energy [J]", "strain energy [J]")
+    ]
+    largest = max(float(np.abs(one).max()) for one in accounts)
+    left = float(np.abs(record.history["energy residual [J]"]).max() / largest)
+    return Measurement(
+        quantity=f"largest energy residual over the largest account, {name}",
+        value=left,
+        unit="1",
+        reference=0.0,
+        source="every force has an account",
+        error=left,
+        passed=record.outcome == FINISHED and left <= _RESIDUAL,
     )
 
 

@@ -1,6 +1,7 @@
 """What every effect must keep, on free bodies of scattered particles in 1, 2 and 3D.
 
-An effect may refuse a dimension or a formulation; it must not refuse all of them.
+An effect may refuse a dimension or a formulation; it must not refuse all of them. One that refuses
+every single body is put to pairs of bodies that touch.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ _LABEL = "effect"
 _CELLS = {1: (12,), 2: (7, 6), 3: (4, 4, 3)}
 _SPACING = 0.1  # [m]
 _COVER = 2.5
+# How far two bodies are pressed into each other and moved aside, in spacings.
+_PRESSED, _ASIDE = 0.3, 0.35
 _FORMS = ("total-lagrangian", "updated-lagrangian")
 _MATERIAL = {"youngs_modulus": 1e6, "poissons_ratio": 0.3, "density": 1000.0}
 _SPEED = 37.0  # of its confined wave [m/s]
@@ -99,18 +102,20 @@ def _simulations(effect: Effect) -> list[tuple[Simulation, Mapping[str, Array]]]
     Raises:
         SceneError: all of them are.
     """
-    found: list[tuple[Simulation, Mapping[str, Array]]] = []
     refusals: list[str] = []
-    for d, form in product(DIMENSIONS, _FORMS):
-        try:
-            made = _scene(d, form).effect(effect, label=_LABEL).build()
+    for scene in (_scene, _touching):
+        found: list[tuple[Simulation, Mapping[str, Array]]] = []
+        for d, form in product(DIMENSIONS, _FORMS):
+            try:
+                made = scene(d, form).effect(effect, label=_LABEL).build()
+            except (BuildError, SceneError) as refusal:
+                refusals.append(f"{d}D, {form}: {refusal}")
+                continue
             begun = made.time_loop().advance(made.start(), _FIRST_STEPS)
             found.append((made, begun.memory))
-        except (BuildError, SceneError) as refusal:
-            refusals.append(f"{d}D, {form}: {refusal}")
-    if not found:
-        raise SceneError(f"every body is refused; the first, {refusals[0]}")
-    return found
+        if found:
+            return found
+    raise SceneError(f"every body is refused; the first, {refusals[0]}")
 
 
 def _samples(effect: Effect) -> list[_Sample]:
@@ -122,16 +127,29 @@ def _samples(effect: Effect) -> list[_Sample]:
 
 
 def _scene(d: int, form: str) -> Builder:
-    """Without any effect."""
-    shape: dict[str, Any] = {"type": "box", "lengths": [_SPACING * n for n in _CELLS[d]]}
+    """One body, without any effect."""
+    return _with_body(_empty(d, form), "body", d, [0.0] * d)
+
+
+def _touching(d: int, form: str) -> Builder:
+    """Two bodies whose outermost particles are less than a spacing apart, without any effect."""
+    beside = [_SPACING * (_CELLS[d][0] - _PRESSED), *[_ASIDE * _SPACING] * (d - 1)]
+    return _with_body(_scene(d, form), "other", d, beside)
+
+
+def _with_body(builder: Builder, name: str, d: int, origin: list[float]) -> Builder:
+    shape: dict[str, Any] = {
+        "type": "box",
+        "lengths": [_SPACING * n for n in _CELLS[d]],
+        "origin": origin,
+    }
+    scattered = {"type": "jittered-lattice", "amplitude": 0.1, "seed": d}
+    return builder.body(name, shape=shape, spacing=_SPACING, discretisation=scattered)
+
+
+def _empty(d: int, form: str) -> Builder:
     return (
         Builder()
-        .body(
-            "body",
-            shape=shape,
-            spacing=_SPACING,
-            discretisation={"type": "jittered-lattice", "amplitude": 0.1, "seed": d},
-        )
         .kernel("modified-mollifier", cover=_COVER)
         .material("neo-hookean", **_MATERIAL)
         .formulation(form)
@@ -269,14 +287,14 @@ def report(effect: Effect) -> Verdict:
 def nothing_when_absent(effect: Effect) -> Verdict:
     """A scene that does not name it has no account of it, and runs to the same bits whether or not
     the effect has been at work before."""
-    for d in DIMENSIONS[:2]:
-        before = _scene(d, _FORMS[0]).build()
+    for scene, d in product((_scene, _touching), DIMENSIONS[:2]):
+        before = scene(d, _FORMS[0]).build()
         expected = before.run().state
         try:
-            _scene(d, _FORMS[0]).effect(effect, label=_LABEL).build().run()
+            scene(d, _FORMS[0]).effect(effect, label=_LABEL).build().run()
         except (BuildError, SceneError):
             continue
-        found = _scene(d, _FORMS[0]).build().run().state
+        found = scene(d, _FORMS[0]).build().run().state
         again = before.run().state
         same = all(np.array_equal(expected.positions, one.positions) for one in (found, again))
         if not same or found.applied:

@@ -55,6 +55,8 @@ TYPICAL: Mapping[str, Any] = {
     "expansion": 1e-4,  # [1/K]
     "initial": "100*sin(4*X)",  # [K]
     "pressure": "1e3*sin(300*t)",  # [Pa]
+    "point": {"x": 0.05},  # [m]
+    "normal": {"x": 1.0},
     # Shapes
     "length": 1.3,  # [m]
     "lengths": [1.2, 0.8],  # [m]

@@ -1,0 +1,191 @@
+"""Two bodies that may touch, or a body and itself: what they do to each other."""
+
+from __future__ import annotations
+
+from math import prod
+
+import attrs
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solidsph.arrays import Array, Indices, Mask
+from solidsph.smoothing import SmoothingKernel
+from solidsph_builtin.effects._search import NeighbourList, Search
+from solidsph_builtin.effects._slip import slid
+
+# Below this part of the squared reach, particles in a line have no moment of inertia about it.
+_SLENDER = 1e-6
+
+
+@attrs.frozen(eq=False)
+class Touch:
+    """Pairs within reach, and how far particles are in each other's way."""
+
+    i: Indices  # (k,)
+    j: Indices  # (k,)
+    offsets: Array  # (k, d) x_i - x_j [m]
+    values: Array  # (k,) W [m^-d]
+    slopes: Array  # (k,) dW/dr / r [m^-(d+2)]
+    excess: Array  # (m,) o, by which the room of every particle is exceeded [-]
+
+
+@attrs.frozen(eq=False)
+class Meeting:
+    """Particles are numbered here among those of the meeting, those of the first body before."""
+
+    first: str  # name of a body
+    second: str  # the other's, or the same
+    particles: Indices  # (m,) among all
+    belongs: Mask  # (m,) to the first body
+    volumes: Array  # (m,) V [m^d]
+    weights: Array  # (m,) what they fill [m^d]
+    room: Array  # (m,) what they leave to others [-]
+    depths: Array  # (m,) below their own surface, half a spacing at most [m]
+    modulus: float  # K [Pa]
+    spring: Array  # (m,) of friction [N/m]
+    kernel: SmoothingKernel
+    search: Search
+    # A pure cache: no bit of a result depends on what is in it.
+    _near: NeighbourList = attrs.field(init=False, repr=False)
+
+    @_near.default
+    def _no_list(self) -> NeighbourList:
+        return NeighbourList(self.search, self.kernel.support_radius)
+
+    @property
+    def name(self) -> str:
+        """Who meets whom."""
+        return self.first if self.first == self.second else f"{self.first} and {self.second}"
+
+    def touch(self, positions: Array) -> Touch | None:
+        """Who is near whom at `positions` (n, d) of all; None while no box is near another."""
+        if self.search.asleep(positions):
+            return None
+        x = positions[self.particles]
+        i, j = self._near.pairs(x)
+        offsets = x[i] - x[j]
+        distances = np.sqrt(np.sum(offsets**2, axis=1))
+        values = self.kernel.value(distances)
+        filled = self._gathered(i, values * self.weights[j])
+        filled += self._gathered(j, values * self.weights[i])
+        return Touch(
+            i,
+            j,
+            offsets,
+            values,
+            self.kernel.slope_by_distance(distances),
+            np.maximum(filled - self.room, 0.0),
+        )
+
+    def pushes(self, touch: Touch) -> Array:
+        """Force on i of every pair, along the line between the two, (k, d) [N]; j has the other."""
+        own = self.modulus * self.volumes * touch.excess
+        pull = own[touch.i] * self.weights[touch.j] + own[touch.j] * self.weights[touch.i]
+        return np.asarray(-(pull * touch.slopes)[:, None] * touch.offsets)
+
+    def normal_forces(self, touch: Touch) -> Array:
+        """On every particle, (m, d) [N]: minus the derivative of the energies."""
+        pushes = self.pushes(touch)
+        return self._gathered(touch.i, pushes) - self._gathered(touch.j, pushes)
+
+    def energies(self, touch: Touch) -> Array:
+        """K V o^2 / 2 of every particle, (m,) [J]."""
+        return np.asarray(0.5 * self.modulus * self.volumes * touch.excess**2)
+
+    def rubbed(
+        self, touch: Touch, x: Array, v: Array, slip: Array, step: float, friction: float
+    ) -> tuple[Array, Array]:
+        """Friction on every particle, (m, d) [N], and the stretch of its spring after the step.
+
+        A particle that is in the other's way is tied by a spring to the place of the other where
+        it would be if the other's particles nearby, weighted by what they fill, went on as a rigid
+        body: that motion is the one with their linear and angular momentum. The force of the spring
+        acts on them as a force and a moment of the same weights, so that all momenta are kept and
+        the power is that of the spring.
+        """
+        m, d = x.shape
+        forces, slipped = np.zeros((m, d)), np.zeros((m, d))
+        # Both ways: the particle p that is in the way of q. Those in the way are numbered anew.
+        active = np.flatnonzero(touch.excess > 0.0)
+        count = len(active)
+        if not count:
+            return forces, slipped
+        number = np.full(m, -1, dtype=np.intp)
+        number[active] = np.arange(count)
+        p = number[np.concatenate([touch.i, touch.j])]
+        chosen = np.flatnonzero(p >= 0)
+        p, q = p[chosen], np.concatenate([touch.j, touch.i])[chosen]
+        pair = chosen % len(touch.i)
+        sign = np.where(chosen < len(touch.i), 1.0, -1.0)
+        fills = self.weights[q]
+        slope = (fills * touch.slopes[pair] * sign)[:, None] * touch.offsets[pair]
+        inward = _summed(p, slope, count)  # gradient of what the other fills
+        shares = fills * touch.values[pair]
+        shares /= np.bincount(p, shares, count)[p]
+        centre = _summed(p, shares[:, None] * x[q], count)
+        mean = _summed(p, shares[:, None] * v[q], count)
+        arms = x[q] - centre[p]
+        inertia = _summed(p, shares[:, None, None] * _inertia(arms), count)
+        spin = _summed(p, shares[:, None] * _cross(arms, v[q] - mean[p]), count)
+        steep = np.linalg.norm(inward, axis=1)
+        floor = _SLENDER * self.kernel.support_radius**2
+        k = np.flatnonzero((steep > 0.0) & (np.linalg.eigvalsh(inertia)[:, 0] > floor))
+        own = active[k]
+        reach = x[own] - centre[k]
+        rate = np.linalg.solve(inertia[k], spin[k][..., None])[..., 0]
+        there = mean[k] + _turning(np.asarray(rate, dtype=np.float64), reach)
+        limits = friction * self.modulus * self.volumes[own] * touch.excess[own] * steep[k]
+        normals = inward[k] / steep[k][:, None]
+        slipped[own] = slid(slip[own], v[own] - there, normals, step, self.spring[own], limits)
+        pull = -self.spring[own][:, None] * slipped[own]
+        forces[own] = pull
+        turn = np.zeros((count, inertia.shape[1]))
+        turn[k] = np.linalg.solve(inertia[k], -_cross(reach, pull)[..., None])[..., 0]
+        back = np.zeros((count, d))
+        back[k] = -pull
+        forces += _summed(q, shares[:, None] * (back[p] + _turning(turn[p], arms)), m)
+        return forces, slipped
+
+    def least_gap(self, positions: Array) -> float:
+        """Between the surfaces of two bodies [m], by the nearest of their outermost particles."""
+        x = positions[self.particles]
+        outer = self.room > 0.0
+        one, other = np.flatnonzero(outer & self.belongs), np.flatnonzero(outer & ~self.belongs)
+        distances, nearest = cKDTree(x[other]).query(x[one])
+        gaps = distances - self.depths[one] - self.depths[other[nearest]]
+        return float(gaps.min())
+
+    def _gathered(self, rows: Indices, values: Array) -> Array:
+        return _summed(rows, values, len(self.particles))
+
+
+def _summed(rows: Indices, values: Array, count: int) -> Array:
+    """Sum of `values` (k, ...) by their rows, (count, ...), in the order of the pairs."""
+    shape = values.shape[1:]
+    columns = values.reshape(len(values), prod(shape))
+    sums = np.empty((count, columns.shape[1]))
+    for k, one in enumerate(columns.T):
+        sums[:, k] = np.bincount(rows, one, count)
+    return sums.reshape(count, *shape)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """a x b of vectors (k, d): (k, 3), in the plane (k, 1)."""
+    if a.shape[1] == 2:
+        return np.asarray(a[:, :1] * b[:, 1:] - a[:, 1:] * b[:, :1])
+    return np.cross(a, b)
+
+
+def _turning(w: Array, r: Array) -> Array:
+    """w x r with w (k, 3), in the plane (k, 1), and r (k, d): (k, d)."""
+    if r.shape[1] == 2:
+        return np.column_stack([-w[:, 0] * r[:, 1], w[:, 0] * r[:, 0]])
+    return np.cross(w, r)
+
+
+def _inertia(r: Array) -> Array:
+    """|r|^2 I - r r^T of vectors (k, d): (k, 3, 3), in the plane (k, 1, 1)."""
+    squares = np.sum(r**2, axis=1)[:, None, None]
+    if r.shape[1] == 2:
+        return np.asarray(squares)
+    return np.asarray(squares * np.eye(3) - r[:, :, None] * r[:, None, :])

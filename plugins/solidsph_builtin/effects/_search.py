@@ -1,0 +1,134 @@
+"""Which particles are near each other: asked only where boxes say that some may be."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import final
+
+import attrs
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solidsph.arrays import Array, Indices
+
+# A list of pairs has room for this much motion, in parts of the reach.
+_SKIN = 0.2
+
+
+class Search(ABC):
+    """Pairs of two groups of particles, or of one group with itself."""
+
+    @abstractmethod
+    def asleep(self, positions: Array) -> bool:
+        """Whether no pair can be within the reach and the margin; positions (n, d) of all."""
+
+    @abstractmethod
+    def within(self, x: Array, radius: float) -> tuple[Indices, Indices]:
+        """Pairs (k,), (k,) no further apart than `radius`, each once, in any order.
+
+        Positions x (m, d) and pairs are those of the groups alone, the first before the second.
+        """
+
+
+@final
+@attrs.frozen(eq=False)
+class Between(Search):
+    """Particles of two bodies, those of the first before the others."""
+
+    one: slice | Indices  # those of the first body, among all
+    other: slice | Indices  # and of the second
+    split: int  # how many the first has
+    wakes: float  # distance of the boxes at which the search begins [m]
+    # A pure cache: along which axis to look first. Bodies that stay apart do so along the same.
+    _first: list[int] = attrs.field(factory=lambda: [0], init=False, repr=False)
+
+    def asleep(self, positions: Array) -> bool:
+        square, d = 0.0, positions.shape[1]
+        for axis in sorted(range(d), key=lambda k: k != self._first[0]):
+            x, y = positions[self.one, axis], positions[self.other, axis]
+            gap = max(0.0, float(x.min() - y.max()), float(y.min() - x.max()))
+            square += gap**2
+            if square > self.wakes**2:
+                self._first[0] = axis
+                return True
+        return False
+
+    def within(self, x: Array, radius: float) -> tuple[Indices, Indices]:
+        one = np.arange(self.split)
+        other = np.arange(self.split, len(x))
+        # All that is inside the other's box, however deep: interiors can touch, too.
+        one = one[_inside(x[one], x[other], radius)]
+        other = other[_inside(x[other], x[one], radius)] if one.size else other[:0]
+        if not other.size:
+            return one[:0], other
+        found = cKDTree(x[one]).sparse_distance_matrix(
+            cKDTree(x[other]), radius, output_type="ndarray"
+        )
+        return one[found["i"]], other[found["j"]]
+
+
+@final
+@attrs.frozen(eq=False)
+class Within(Search):
+    """Particles of one body that were far from each other."""
+
+    particles: Indices  # (m,) among all
+    reference: Array  # X, (m, d) [m]
+    apart: float  # distance from which on they count, in the reference configuration [m]
+    wakes: float  # distance up to which the search goes on [m]
+
+    def asleep(self, positions: Array) -> bool:
+        # No two displacements differ by more than the diagonal of the box that holds them all.
+        u = positions[self.particles] - self.reference
+        return bool(np.linalg.norm(np.ptp(u, axis=0)) < self.apart - self.wakes)
+
+    def within(self, x: Array, radius: float) -> tuple[Indices, Indices]:
+        found = cKDTree(x).query_pairs(radius, output_type="ndarray")
+        i, j = found[:, 0], found[:, 1]
+        X = self.reference
+        far = np.sum((X[i] - X[j]) ** 2, axis=1) > self.apart**2
+        return i[far], j[far]
+
+
+@attrs.define(eq=False)
+class NeighbourList:
+    """The pairs within a reach, found anew only when particles have moved by half the skin.
+
+    A pure cache: what it returns are all pairs closer than the reach, in rising order, whatever
+    it was asked before.
+    """
+
+    search: Search
+    reach: float  # [m]
+    _made: tuple[Array, Indices, Indices] | None = None  # positions, and pairs within both
+
+    def pairs(self, x: Array) -> tuple[Indices, Indices]:
+        """(k,), (k,) at positions x (m, d)."""
+        if not np.isfinite(x).all():  # a run that is lost; whoever runs it will see
+            return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
+        if self._made is None or self._moved(self._made[0], x):
+            i, j = self.search.within(x, (1.0 + _SKIN) * self.reach)
+            order = np.lexsort((j, i))
+            self._made = x.copy(), i[order], j[order]
+        _, i, j = self._made
+        squares = np.sum((x[i] - x[j]) ** 2, axis=1)
+        near = squares < self.reach**2
+        return i[near], j[near]
+
+    def _moved(self, before: Array, x: Array) -> bool:
+        # With a little to spare, for rounding.
+        largest = 0.49 * _SKIN * self.reach
+        return bool(np.max(np.sum((x - before) ** 2, axis=1), initial=0.0) > largest**2)
+
+
+def _inside(x: Array, other: Array, margin: float) -> Array:
+    """Which of x (k, d) are inside the box of `other`, or nearly, (k,)."""
+    lower, upper = other.min(axis=0) - margin, other.max(axis=0) + margin
+    return np.asarray(np.all((x >= lower) & (x <= upper), axis=1))
+
+
+def together(particles: Indices) -> slice | Indices:
+    """The same particles as a slice, where they follow each other: what it takes is no copy."""
+    first, count = int(particles[0]), len(particles)
+    whole = slice(first, first + count)
+    return whole if np.array_equal(particles, np.arange(first, first + count)) else particles

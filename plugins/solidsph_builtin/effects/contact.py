@@ -1,0 +1,353 @@
+"""Contact of bodies, with each other and with themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from math import sqrt
+from typing import ClassVar, final
+
+import attrs
+import numpy as np
+
+from solidsph.arrays import Array, Indices
+from solidsph.body import Body
+from solidsph.errors import SceneError
+from solidsph.interfaces.condition import (
+    FieldCondition,
+    ForceCondition,
+    Observation,
+    StoringCondition,
+)
+from solidsph.interfaces.effect import Effect, Need
+from solidsph.parameters import check_positive, number
+from solidsph.setting import Setting
+from solidsph.smoothing import SmoothingKernel
+from solidsph_builtin.effects._crowding import (
+    REACH,
+    crowding_kernel,
+    sensitivity,
+    sites,
+    steepest,
+)
+from solidsph_builtin.effects._meeting import Meeting, Touch
+from solidsph_builtin.effects._search import Between, Search, Within, together
+
+# 1 / integral of (dS/dz)^2 dz, in parts of the support: the depth of the layer that is squeezed.
+_LAYER = 0.87
+
+# Particles of one body count as touching from so many supports of the smoothing on.
+_APART = 2.0
+
+# Stiffness of the spring of friction over that against penetration, as between elastic bodies of
+# usual Poisson's ratio (Mindlin 1949: 2 (1 - nu) / (2 - nu)).
+_TANGENTIAL = 0.8
+
+# For the stable step: what is squeezed more than this is squeezed by half a spacing.
+_EXCESS = 0.2
+
+_NAMES = ("x", "y", "z")
+
+
+@final
+@attrs.frozen
+class Contact(Effect):
+    """Where two bodies together fill more than there is, they push each other out.
+
+    With S_B(x) = sum over b of w_b W(x - X_b) the part that body B fills around x, smoothed over
+    2.5 spacings, a particle a has the room r_a = 1 - S_A(X_a) that its own body leaves in the
+    reference configuration, and the excess o_a = max(0, S_B(x_a) - r_a). The energy
+
+        U = K / 2 (sum over a of V_a o_a^2 + sum over b of V_b o_b^2)
+
+    has the form of the embedded atom, Daw & Baskes (1984): it depends on distances only, so its
+    exact derivative is a force along the line between two particles, opposite at its ends, and
+    momentum, angular momentum and energy are kept. Bodies touch where S_A + S_B = 1: particles at
+    the centres of their cells at the distance (s_a + s_b) / 2, particles on the surface where
+    they meet. The usual pair force of a range of one spacing lets a lattice sink into another one,
+    half a spacing off, by 0.13 spacings, and sliding bodies interlock; here it is below 0.001.
+
+    K is such that the contact yields as much as `1 / strength` spacings of material with the
+    harmonic mean of both confined moduli. Deep inside, where S_B no longer changes, nothing pushes
+    back any more: a strength that is too low, or a body thinner than two spacings, may be passed.
+
+    With `friction`, a spring along the surface for every particle with an excess pulls with at
+    most that part of the particle's normal force, and slides there: Coulomb's law, with an
+    elastic play as small as that of the contact itself (Cundall & Strack 1979). Its force acts
+    on the other's particles nearby with its moment. The springs are in `State.memory`.
+
+    Of a body with itself, particles count that were further apart than two supports, so a crease
+    does not close. Search begins where the boxes of two bodies come within `margin` of the
+    reach; all particles in both boxes take part, so that nothing is missed however deep it goes.
+    Of a body with itself only those near its surface do.
+    """
+
+    conserves_momentum: ClassVar[bool] = True
+    answers: ClassVar[frozenset[Need] | None] = frozenset({Need.MEETING})
+
+    between: Sequence[Sequence[str]] | None = None  # pairs of names of bodies; all if none
+    itself: Sequence[str] = ()  # names of bodies that may touch themselves; ["all"] for each
+    friction: float = number(default=0.0)  # coefficient [-]
+    strength: float = number(default=1.0)  # [-]
+    margin: float = number(default=1.0)  # [spacings]; infinite to search always
+
+    def __attrs_post_init__(self) -> None:
+        check_positive("contact", "strength", self.strength, "1 / spacings that it yields, near 1")
+        if not 0.0 <= self.friction < 100.0:
+            raise SceneError(
+                f"contact: friction must lie between 0 and 100, got {self.friction}; it is "
+                "Coulomb's coefficient"
+            )
+        if not self.margin >= 0.0:
+            raise SceneError(
+                f"contact: margin must not be negative, got {self.margin}; it is in spacings, "
+                "and 1 is usual"
+            )
+        object.__setattr__(self, "itself", _names("itself", self.itself))
+        if self.between is not None:
+            if isinstance(self.between, str) or not isinstance(self.between, Sequence):
+                raise SceneError(_not_pairs(self.between))
+            pairs = tuple(_names("between", pair) for pair in self.between)
+            if any(len(pair) != 2 or pair[0] == pair[1] for pair in pairs):
+                raise SceneError(_not_pairs(self.between))
+            object.__setattr__(self, "between", pairs)
+
+    def bind(self, setting: Setting, label: str) -> ForceCondition:
+        meetings = [self._meeting(one, other) for one, other in self._who(setting.bodies)]
+        return _Contact(
+            label=label,
+            particles=np.unique(np.concatenate([one.particles for one in meetings])),
+            meetings=meetings,
+            friction=self.friction,
+        )
+
+    def arrays(self, setting: Setting) -> Mapping[str, int]:
+        d = setting.particles.dimension
+        found: dict[str, int] = {}
+        for one, other in self._who(setting.bodies):
+            meeting = self._meeting(one, other)
+            count = len(meeting.particles)
+            found[f"sites of {meeting.name}"] = 50 * count
+            if self.friction:
+                found[f"slip of {meeting.name}"] = 8 * d * count
+        return found
+
+    def damping_rate(self, bodies: Sequence[Body]) -> float:
+        # The springs of friction give way by how far they are stretched, not how fast.
+        return 0.0
+
+    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
+        squares = []
+        for one, other in self._who(bodies):
+            kernel = _kernel(one, other)
+            density = min(one.material.density, other.material.density)
+            modulus = _modulus(one, other, kernel.support_radius, self.strength)
+            squares.append(modulus / density * sensitivity(kernel, _EXCESS))
+        return sqrt(max(squares))
+
+    def pair_work(self, particles: float, pairs: float) -> float:
+        # Asleep it asks for boxes only; awake, surfaces meet, and they have few of all pairs.
+        return particles
+
+    def _who(self, bodies: Sequence[Body]) -> Sequence[tuple[Body, Body]]:
+        """Pairs of bodies, the same twice where it may touch itself."""
+        known = {body.name: body for body in bodies}
+        for name in {*(n for pair in self.between or () for n in pair), *self.itself} - {"all"}:
+            if name not in known:
+                raise SceneError(
+                    f"contact: there is no body {name!r}; bodies: {', '.join(map(repr, known))}"
+                )
+        pairs = combinations(known, 2) if self.between is None else self.between
+        alone = known if "all" in self.itself else self.itself
+        found = [(known[a], known[b]) for a, b in (*pairs, *((one, one) for one in alone))]
+        if not found:
+            raise SceneError(
+                "contact: there is one body, and nothing that it could touch; add a body, or let "
+                f"it touch itself: itself = [{next(iter(known))!r}]"
+            )
+        return found
+
+    def _meeting(self, one: Body, other: Body) -> Meeting:
+        """Of two bodies; what is made once serves the accounts of arrays and of forces."""
+        key = (Contact, other.name, self.strength, self.margin)
+        if key not in one.made:
+            one.made[key] = _made(one, other, self.strength, self.margin)
+        meeting: Meeting = one.made[key]
+        return attrs.evolve(meeting)  # with a list of pairs of its own
+
+
+@final
+@attrs.frozen(eq=False)
+class _Contact(StoringCondition, FieldCondition, ForceCondition):
+    label: str
+    particles: Indices  # (k,)
+    meetings: Sequence[Meeting]
+    friction: float
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        """Without friction, which depends on what has been."""
+        forces = np.zeros_like(positions)
+        for meeting in self.meetings:
+            touch = meeting.touch(positions)
+            if touch is not None:
+                forces[meeting.particles] += meeting.normal_forces(touch)
+        return np.asarray(forces[self.particles])
+
+    def advance(
+        self,
+        time: float,
+        step: float,
+        positions: Array,
+        velocities: Array,
+        memory: Mapping[str, Array],
+    ) -> tuple[Array, Mapping[str, Array]]:
+        forces: Array | None = None
+        slips: dict[str, Array] = {}
+        asleep = 0
+        for meeting in self.meetings:
+            touch = meeting.touch(positions)
+            asleep += touch is None
+            force, slip = self._of(meeting, touch, positions, velocities, step, memory)
+            slips |= slip
+            if force is None:
+                continue
+            if forces is None:
+                forces = np.zeros_like(positions)
+            forces[meeting.particles] += force
+        before = memory.get(self._asleep, np.zeros(1))
+        count = before + asleep if step > 0.0 else before
+        none = (len(self.particles), positions.shape[1])
+        found = np.zeros(none) if forces is None else forces[self.particles]
+        return found, {self._asleep: count, **slips}
+
+    def _of(
+        self,
+        meeting: Meeting,
+        touch: Touch | None,
+        positions: Array,
+        velocities: Array,
+        step: float,
+        memory: Mapping[str, Array],
+    ) -> tuple[Array | None, Mapping[str, Array]]:
+        """Force on the particles of a meeting, (m, d), if there is any, and the new stretches."""
+        if not self._rubs(meeting):
+            return None if touch is None else meeting.normal_forces(touch), {}
+        slip = self._slip(meeting, memory)
+        if touch is None:
+            return None, {self._slip_name(meeting): np.zeros_like(slip)}
+        x, v = positions[meeting.particles], velocities[meeting.particles]
+        rubbed, slipped = meeting.rubbed(touch, x, v, slip, step, self.friction)
+        return meeting.normal_forces(touch) + rubbed, {self._slip_name(meeting): slipped}
+
+    def energies(self, observation: Observation) -> Array:
+        """What is squeezed and what the springs of friction hold, (n,) [J]."""
+        state = observation.state
+        energies = np.zeros(len(state.positions))
+        for meeting in self.meetings:
+            touch = meeting.touch(state.positions)
+            if touch is None:
+                continue
+            energies[meeting.particles] += meeting.energies(touch)
+            if self._rubs(meeting):
+                slip = self._slip(meeting, state.memory)
+                held = 0.5 * meeting.spring * np.sum(slip**2, axis=1)
+                energies[meeting.particles] += held
+        return energies
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        positions, label = observation.state.positions, self.label
+        columns = {f"{label} energy [J]": float(self.energies(observation).sum())}
+        pairs, gaps = 0, []
+        for meeting in self.meetings:
+            touch = meeting.touch(positions)
+            force = np.zeros(positions.shape[1])
+            if touch is not None:
+                excess = touch.excess
+                pairs += int(np.sum((excess[touch.i] > 0.0) | (excess[touch.j] > 0.0)))
+                force = -meeting.normal_forces(touch)[meeting.belongs].sum(axis=0)
+            if meeting.first == meeting.second:
+                continue
+            gaps.append(meeting.least_gap(positions))
+            for name, value in zip(_NAMES, force, strict=False):
+                column = f"{label} force of {meeting.first} on {meeting.second} {name} [N]"
+                columns[column] = float(value)
+        asleep = observation.state.memory.get(self._asleep, np.zeros(1))
+        return {
+            **columns,
+            **({f"{label} least gap [m]": min(gaps)} if gaps else {}),
+            f"{label} touching pairs [-]": float(pairs),
+            f"{label} evaluations asleep [-]": float(asleep[0]),
+        }
+
+    def fields(self, observation: Observation) -> Mapping[str, Array]:
+        return {f"{self.label} force [N]": observation.state.applied[self.label]}
+
+    def _rubs(self, meeting: Meeting) -> bool:
+        # On a line there is no way to slide.
+        return self.friction > 0.0 and meeting.kernel.dimension > 1
+
+    def _slip(self, meeting: Meeting, memory: Mapping[str, Array]) -> Array:
+        none = (len(meeting.particles), meeting.kernel.dimension)
+        return memory.get(self._slip_name(meeting), np.zeros(none))
+
+    def _slip_name(self, meeting: Meeting) -> str:
+        return f"{self.label} slip of {meeting.name}"
+
+    @property
+    def _asleep(self) -> str:
+        return f"{self.label} evaluations asleep"
+
+
+def _made(one: Body, other: Body, strength: float, margin: float) -> Meeting:
+    kernel, alone = _kernel(one, other), one is other
+    own = [sites(body, kernel, near_surface=alone) for body in ((one,) if alone else (one, other))]
+    reach = kernel.support_radius
+    margin *= reach / REACH
+    split = len(own[0].particles)
+    modulus = _modulus(one, other, reach, strength)
+    volumes = np.concatenate([part.volumes for part in own])
+    search: Search = Between(
+        together(own[0].particles), together(own[-1].particles), split, reach + margin
+    )
+    if alone:
+        X = one.particles.positions[own[0].particles - one.extent.start]
+        search = Within(own[0].particles, X, _APART * reach, reach + margin)
+    return Meeting(
+        first=one.name,
+        second=other.name,
+        particles=np.concatenate([part.particles for part in own]),
+        belongs=np.arange(len(volumes)) < split,
+        volumes=volumes,
+        weights=np.concatenate([part.weights for part in own]),
+        room=np.concatenate([part.room for part in own]),
+        depths=np.concatenate([part.depths for part in own]),
+        modulus=modulus,
+        spring=_TANGENTIAL * 0.5 * modulus * volumes * steepest(kernel) ** 2,
+        kernel=kernel,
+        search=search,
+    )
+
+
+def _kernel(one: Body, other: Body) -> SmoothingKernel:
+    spacing = max(float(body.particles.spacings.max()) for body in (one, other))
+    return crowding_kernel(one.particles.dimension, REACH * spacing)
+
+
+def _modulus(one: Body, other: Body, reach: float, strength: float) -> float:
+    """K [Pa]: the pressure of a penetration z is K z over the depth of the layer squeezed."""
+    first, second = (body.material.density * body.material.wave_speed**2 for body in (one, other))
+    spacing = 0.5 * sum(float(body.particles.spacings.max()) for body in (one, other))
+    return strength * 2.0 * first * second / (first + second) * _LAYER * reach / spacing
+
+
+def _names(field: str, given: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(given, str) or not all(isinstance(name, str) for name in given):
+        raise SceneError(f"contact: {field} must be a list of names of bodies, got {given!r}")
+    return tuple(given)
+
+
+def _not_pairs(given: object) -> str:
+    return (
+        'contact: between must be a list of pairs of different bodies such as [["ball", "plate"]], '
+        f"got {given!r}"
+    )

@@ -1,0 +1,248 @@
+"""A plane that nothing passes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite, sqrt
+from typing import ClassVar, final
+
+import attrs
+import numpy as np
+from scipy.sparse import bsr_array, csr_array
+
+from solidsph.arrays import Array, Indices
+from solidsph.body import Body
+from solidsph.errors import SceneError
+from solidsph.interfaces.condition import (
+    FieldCondition,
+    ForceCondition,
+    Observation,
+    StoringCondition,
+)
+from solidsph.interfaces.effect import Effect, Need
+from solidsph.motion import Component, VectorField
+from solidsph.parameters import check_positive, number
+from solidsph.setting import Setting
+from solidsph.where import Where
+from solidsph_builtin.effects._slip import slid
+
+# Stiffness of the spring of friction over that against penetration (Mindlin 1949, as for contact).
+_TANGENTIAL = 0.8
+
+_NAMES = ("x", "y", "z")
+
+
+@final
+@attrs.frozen
+class RigidWall(Effect):
+    """A particle nearer to the plane than `clearance` spacings is pushed back, as by a spring.
+
+    The normal points to the side where bodies are. With g the distance from the plane less the
+    clearance, the energy is k min(g, 0)^2 / 2, and k = strength (lambda + 2 mu) V / s^2: the
+    wall yields as much as 1 / strength spacings of material. Particles at the centres of their
+    cells touch at half a spacing, the default; those of bodies with particles on their surface
+    at 0. A wall may move by formulas in t; what it gives is the work of its account.
+
+    Friction is Coulomb's law with a spring along the plane for each particle that touches, which
+    gives way where it would pull with more than `friction` times the normal force, Cundall &
+    Strack (1979). A law by velocity alone would let every block creep down its incline; with
+    the spring it stands, for an elastic play that is known: f N / (0.8 k). The stretches are in
+    `State.memory`; what is lost by sliding is what the account has taken and does not store.
+    """
+
+    answers: ClassVar[frozenset[Need] | None] = frozenset()
+
+    point: Mapping[str, float]  # of the plane, such as {y = -0.1}; components not given are 0 [m]
+    normal: Mapping[str, float]  # such as {y = 1}; it need not have the length 1 [-]
+    where: Where = "all"
+    friction: float = number(default=0.0)  # coefficient [-]
+    strength: float = number(default=1.0)  # [-]
+    clearance: float = number(default=0.5)  # of particles that touch [spacings]
+    displacement: Mapping[str, Component] | None = None  # such as {y = "-0.1*t"} [m]
+
+    def __attrs_post_init__(self) -> None:
+        check_positive("rigid-wall", "strength", self.strength, "1 / spacings that it yields")
+        for name, value in (("friction", self.friction), ("clearance", self.clearance)):
+            if not 0.0 <= value < 100.0:
+                raise SceneError(
+                    f"rigid-wall: {name} must lie between 0 and 100, got {value}; friction is "
+                    "Coulomb's coefficient, clearance is in spacings, 0.5 or 0"
+                )
+        for name in ("point", "normal"):
+            _check_vector(name, getattr(self, name))
+        if not any(self.normal.values()):
+            raise SceneError("rigid-wall: the normal has no length; give it one, such as {y = 1}")
+
+    def bind(self, setting: Setting, label: str) -> ForceCondition:
+        particles, d = setting.particles, setting.particles.dimension
+        normal = _vector("normal", self.normal, d)
+        indices = setting.select(self.where)
+        field = None
+        if self.displacement is not None:
+            field = VectorField.of(self.displacement, "rigid-wall: displacement")
+            field.check_dimension(d, "rigid-wall")
+        moduli = np.concatenate(
+            [
+                np.full(body.particles.count, body.material.density * body.material.wave_speed**2)
+                for body in setting.bodies
+            ]
+        )[indices]
+        V, s = particles.volumes[indices], particles.spacings[indices]
+        wall = _Wall(
+            label=label,
+            particles=indices,
+            reference=particles.positions,
+            point=_vector("point", self.point, d),
+            normal=normal / np.linalg.norm(normal),
+            clearances=self.clearance * s,
+            springs=self.strength * moduli * V / s**2,
+            friction=self.friction,
+            field=field,
+            step_size=setting.step_size,
+        )
+        wall.motion(0.0, 0)  # a formula out of its domain shows now, not in mid-run
+        return wall
+
+    def arrays(self, setting: Setting) -> Mapping[str, int]:
+        count = len(setting.select(self.where))
+        slip = 8 * count * setting.particles.dimension
+        own = {"chosen particles": 8 * count, "clearances": 8 * count, "stiffness": 8 * count}
+        return {**own, "slip": slip} if self.friction else own
+
+    def damping_rate(self, bodies: Sequence[Body]) -> float:
+        return 0.0
+
+    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
+        # Every particle is tied to the wall alone: k / m, and the spring along it is softer.
+        return sqrt(self.strength) * max(
+            body.material.wave_speed / float(body.particles.spacings.min()) for body in bodies
+        )
+
+
+@final
+@attrs.frozen(eq=False)
+class _Wall(StoringCondition, FieldCondition, ForceCondition):
+    label: str
+    particles: Indices  # (k,)
+    reference: Array  # X of all particles, (n, d) [m]
+    point: Array  # (d,) at the start [m]
+    normal: Array  # (d,) of length 1
+    clearances: Array  # (k,) [m]
+    springs: Array  # (k,) k [N/m]
+    friction: float
+    field: VectorField | None
+    step_size: float  # [s]
+
+    def motion(self, time: float, order: int) -> Array:
+        """Displacement of the plane, (d,) [m], or its derivative of the given order."""
+        moved = np.zeros(len(self.point))
+        if self.field is not None:
+            for axis in self.field.components:
+                moved[axis] = self.field.derivative(
+                    axis, self.point[None, :], time, order, self.step_size
+                )[0]
+        return moved
+
+    def gaps(self, time: float, positions: Array) -> Array:
+        """Distance of each particle's surface from the plane, (k,) [m]."""
+        plane = self.point + self.motion(time, 0)
+        return np.asarray((positions[self.particles] - plane) @ self.normal - self.clearances)
+
+    def pressed(self, time: float, positions: Array) -> Array:
+        """Normal force on every particle, (k,) [N]."""
+        return np.asarray(self.springs * np.maximum(-self.gaps(time, positions), 0.0))
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        """Without friction, which depends on what has been."""
+        return np.asarray(self.pressed(time, positions)[:, None] * self.normal)
+
+    def advance(
+        self,
+        time: float,
+        step: float,
+        positions: Array,
+        velocities: Array,
+        memory: Mapping[str, Array],
+    ) -> tuple[Array, Mapping[str, Array]]:
+        if not self.friction:
+            return self.forces(time, positions, velocities), {}
+        pressed = self.pressed(time, positions)
+        slip = slid(
+            self._slip(memory),
+            velocities[self.particles] - self.motion(time, 1),
+            self.normal,
+            step,
+            _TANGENTIAL * self.springs,
+            self.friction * pressed,
+        )
+        forces = pressed[:, None] * self.normal - _TANGENTIAL * self.springs[:, None] * slip
+        return forces, {self._slip_name: slip}
+
+    def stiffness(self, displacements: Array) -> csr_array | None:
+        """As `solidsph.statics.stiff.Stiff` has it, without friction; a wall that moves has none
+        to tell, since it depends on time."""
+        if self.field is not None:
+            return None
+        n, d = displacements.shape
+        touching = self.gaps(0.0, self.reference + displacements) < 0.0
+        springs = np.zeros(n)
+        springs[self.particles] = np.where(touching, self.springs, 0.0)
+        blocks = springs[:, None, None] * np.outer(self.normal, self.normal)
+        rows = np.arange(n)
+        matrix = bsr_array((blocks, rows, np.append(rows, n)), shape=(n * d, n * d))
+        return csr_array(matrix)
+
+    def energies(self, observation: Observation) -> Array:
+        """What the springs hold, (n,) [J]."""
+        state = observation.state
+        gaps = np.minimum(self.gaps(state.time, state.positions), 0.0)
+        slips = np.sum(self._slip(state.memory) ** 2, axis=1) if self.friction else 0.0
+        energies = np.zeros(len(state.positions))
+        energies[self.particles] = 0.5 * self.springs * (gaps**2 + _TANGENTIAL * slips)
+        return energies
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        state, label = observation.state, self.label
+        gaps = self.gaps(state.time, state.positions)
+        total = state.applied[label].sum(axis=0)
+        return {
+            f"{label} energy [J]": float(self.energies(observation).sum()),
+            **{
+                f"{label} force {name} [N]": float(value)
+                for name, value in zip(_NAMES, total, strict=False)
+            },
+            f"{label} least gap [m]": float(gaps.min()),
+            f"{label} touching particles [-]": float(np.sum(gaps < 0.0)),
+        }
+
+    def fields(self, observation: Observation) -> Mapping[str, Array]:
+        return {f"{self.label} force [N]": observation.state.applied[self.label]}
+
+    def _slip(self, memory: Mapping[str, Array]) -> Array:
+        return memory.get(self._slip_name, np.zeros((len(self.particles), len(self.point))))
+
+    @property
+    def _slip_name(self) -> str:
+        return f"{self.label} slip"
+
+
+def _check_vector(name: str, given: object) -> None:
+    if not isinstance(given, Mapping) or not all(
+        key in _NAMES
+        and isinstance(value, (int, float))
+        and not isinstance(value, bool)
+        and isfinite(value)
+        for key, value in given.items()
+    ):
+        raise SceneError(
+            f"rigid-wall: {name} must be a table of numbers such as {{y = 1.0}}, got {given!r}"
+        )
+
+
+def _vector(name: str, given: Mapping[str, float], d: int) -> Array:
+    beyond = [key for key in given if _NAMES.index(key) >= d and given[key] != 0.0]
+    if beyond:
+        raise SceneError(
+            f"rigid-wall: {name} has a component {beyond[0]!r} in a {d}D scene; leave it out"
+        )
+    return np.array([float(given.get(key, 0.0)) for key in _NAMES[:d]])
