@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.special import erf
@@ -10,6 +12,8 @@ from solidsph import Simulation, carry_out
 from solidsph.arrays import Array
 from solidsph.builder import Builder
 from solidsph.errors import BuildError
+from solidsph.studies.case_run import run_case
+from solidsph_builtin.cases.stiffness_jump import StiffnessJump
 
 DENSITY, NU = 1000.0, 0.3
 
@@ -184,3 +188,16 @@ def test_bodies_that_do_not_touch_cannot_be_joined() -> None:
     )
     with pytest.raises(BuildError, match="let the bodies touch"):
         builder.build()
+
+
+@pytest.mark.validation
+def test_a_jump_of_a_thousand_converges(tmp_path: Path) -> None:
+    """The period of a slab on a soft layer, in the first order of the spacing."""
+    errors = []
+    for along in (10, 20, 40):
+        outcome = run_case(StiffnessJump(along=along, across=4, tolerance=0.05), tmp_path)
+        assert outcome.passed
+        errors.append(next(m.error for m in outcome.measurements if m.quantity == "period"))
+        print(f"{along} along: period off by {100.0 * errors[-1]:.2f} %")
+    assert errors[1] < 0.6 * errors[0]
+    assert errors[2] < 0.6 * errors[1]
