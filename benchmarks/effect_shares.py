@@ -46,6 +46,16 @@ def block(engine: str, lengths: list[float], spacing: float = 0.01) -> Builder:
     )
 
 
+def touching(engine: str) -> Builder:
+    """That block, thrown against another."""
+    right = {"type": "box", "lengths": [0.3, 0.4], "origin": [0.3, 0.0]}
+    return (
+        block(engine, [0.3, 0.4])
+        .body("other", shape=right, spacing=0.01)
+        .initial(where="X > 0.3", velocity={"x": -0.5})
+    )
+
+
 def typical(name: str) -> Callable[[str], Builder]:
     """The block with the effect of that name and typical values."""
     return lambda engine: block(engine, [0.6, 0.4]).effect(
@@ -58,6 +68,15 @@ OWN: Mapping[str, Callable[[str], Builder]] = {
     # Not in a few particles at a face, which nobody would notice.
     "body-force": lambda engine: block(engine, [0.6, 0.4]).effect(
         "body-force", acceleration={"y": -9.81}, label="it"
+    ),
+    # Where no bond fails: at a failure the sums are formed anew, which takes as long as many steps.
+    "bond-failure": lambda engine: block(engine, [0.6, 0.4]).effect(
+        "bond-failure", critical_stretch=0.5, label="it"
+    ),
+    "contact": lambda engine: touching(engine).effect("contact", label="it"),
+    "joint": lambda engine: touching(engine).effect("joint", label="it"),
+    "rigid-wall": lambda engine: block(engine, [0.6, 0.4]).effect(
+        "rigid-wall", point={"x": 0.0}, normal={"x": 1.0}, label="it"
     ),
     "mass-damping": lambda engine: block(engine, [0.6, 0.4]).effect(
         "mass-damping", rate=2.0, label="it"

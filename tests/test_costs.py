@@ -22,8 +22,10 @@ from solidsph.costs.coefficients import REFERENCE
 from solidsph.costs.counted import ITERATIONS, counted
 from solidsph.costs.dissection import dissected
 from solidsph.costs.estimated import ball, cut_off, estimated, lattice_neighbours
+from solidsph.costs.foreseen import foreseen
 from solidsph.costs.model import Built, coefficient, predicted
 from solidsph.costs.shares import shares, without
+from solidsph.costs.timed import timed
 from solidsph.costs.work import Loop, Piece
 from solidsph.engines.tally import Way
 from solidsph.errors import SceneError
@@ -462,3 +464,45 @@ def test_shares_are_of_what_the_effects_add() -> None:
     )
     assert found["v"].step < 0.9 < found["mass-damping"].step < 1.0
     assert without(simulation, "v").step_size == simulation.step_size
+
+
+# --- What counts cannot price --------------------------------------------------------------------
+
+
+def heated(conductivity: float | None) -> Simulation:
+    builder = (
+        Simulation.builder()
+        .body("block", shape={"type": "box", "lengths": [1.0, 0.5]}, spacing=0.05)
+        .kernel("cubic-spline", cover=2.6)
+        .material("neo-hookean", youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
+        .effect("mass-damping", rate=1.0)
+        .engine("matrix")
+        .duration(0.01)
+    )
+    if conductivity is not None:
+        builder.effect("heat", conductivity=conductivity, heat_capacity=1.0, expansion=1e-5)
+    return builder.build()
+
+
+def test_only_what_is_of_no_declared_kind_is_timed() -> None:
+    plain, hot = heated(None), heated(1.0)
+    assert timed(plain, counted(plain)).loads == {}
+    found = timed(hot, counted(hot))
+    assert list(found.loads) == ["heat"]
+    assert 0.0 < found.seconds < 1.0
+    assert found.without("heat").seconds == 0.0
+    # What is timed is not counted as well.
+    ways = {part.way for part in found.rest(counted(hot), hot).tally}
+    assert Way.UNKNOWN in {part.way for part in counted(hot).tally}
+    assert not any(p.way is Way.UNKNOWN and p.pairs for p in found.rest(counted(hot), hot).tally)
+    assert Way.PRODUCTS in ways
+
+
+def test_what_was_timed_is_in_the_prediction() -> None:
+    hot = heated(1.0)
+    work = counted(hot)
+    rest = predicted(timed(hot, work).rest(work, hot), REFERENCE)
+    more = predicted(timed(hot, work).rest(work, hot), REFERENCE, besides=1e-3)
+    assert more.steps - rest.steps == pytest.approx(1e-3 * work.evaluations)
+    assert foreseen(hot, REFERENCE).steps > rest.steps
+    assert foreseen(hot, REFERENCE).work == work

@@ -15,8 +15,9 @@ from solidsph.commands.console import say, show_json, show_table
 from solidsph.commands.target import parameters, resolve
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.cluster import Cluster
-from solidsph.costs.counted import compiles_steps, counted
+from solidsph.costs.counted import compiles_steps
 from solidsph.costs.estimated import estimated
+from solidsph.costs.foreseen import foreseen
 from solidsph.costs.model import Prediction, predicted
 from solidsph.costs.process import machine_memory
 from solidsph.costs.shares import Share, shares
@@ -130,7 +131,7 @@ def _explained(
     if on_paper is not None and on_paper.memory > machine_memory():
         return on_paper, _too_large(scene, on_paper, machine, cluster)
     simulation, build = told.built(scene)
-    found = predicted(counted(simulation), machine, built=build, compiled=compiled)
+    found = foreseen(simulation, machine, built=build, compiled=compiled)
     return found, {
         "parts": _parts(scene, simulation.parts),
         "numbers": _numbers(simulation),

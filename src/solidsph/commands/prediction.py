@@ -15,8 +15,8 @@ from solidsph.costs import calibration
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.cluster import Cluster, ClusterPrice, priced
 from solidsph.costs.coefficients import REFERENCE
-from solidsph.costs.counted import counted
-from solidsph.costs.model import Built, Prediction, predicted
+from solidsph.costs.foreseen import foreseen
+from solidsph.costs.model import Built, Prediction
 from solidsph.costs.process import company, machine_memory, memory_now, peak_memory
 from solidsph.costs.work import Compilation, Work
 from solidsph.scene import Scene
@@ -59,13 +59,12 @@ def of_run(
     The machine is calibrated only where there is something worth predicting.
     """
     try:
-        work = counted(simulation)
-        about = predicted(work, REFERENCE, built=build, compiled=compiled)
+        about = foreseen(simulation, REFERENCE, built=build, compiled=compiled)
         known = calibration.kept()
         if known is None and about.run_seconds < _NOT_WORTH_IT:
             return about
         machine = known or calibrated()
-        return predicted(work, machine, built=build, compiled=compiled)
+        return foreseen(simulation, machine, built=build, compiled=compiled)
     except Exception:
         return None
 

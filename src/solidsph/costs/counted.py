@@ -91,14 +91,15 @@ def compiles_steps(simulation: Simulation) -> bool:
     return (
         all(part.way in _COMPILED for part in tally)
         and isinstance(simulation.integrator, PointwiseIntegrator)
-        and all(isinstance(load, _DECLARED_LOADS) for load in dynamics.loads)
+        and all(isinstance(load, DECLARED_LOADS) for load in dynamics.loads)
         and all(isinstance(one, (ScheduledMotion, LinearExtension)) for one in dynamics.motions)
         and all(isinstance(one, LinearExtension) for one in stresses)
         and (not stresses or len(simulation.setting.bodies) == 1)
     )
 
 
-_DECLARED_LOADS = (ScheduledForce, PointwiseForce, PairForce, MismatchForce)
+DECLARED_LOADS = (ScheduledForce, PointwiseForce, PairForce, MismatchForce)
+"""Kinds of load that loops can be compiled of, and whose costs are known by count."""
 
 
 def _of_loads(simulation: Simulation, *, compiled: bool) -> Iterator[Tally]:

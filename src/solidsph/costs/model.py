@@ -79,6 +79,7 @@ def predicted(
     *,
     built: Built | None = None,
     compiled: Collection[Compilation] = (),
+    besides: float = 0.0,
 ) -> Prediction:
     """What a run of this work takes on this machine.
 
@@ -87,13 +88,14 @@ def predicted(
         machine: its calibration.
         built: what the build took, if there was one; otherwise it is predicted too.
         compiled: what this process has compiled before.
+        besides: seconds of every evaluation that `work` does not count, since they were timed.
     """
     new = attrs.evolve(work, compilations=work.compilations - frozenset(compiled))
     return Prediction(
         work=work,
         build=_seconds(terms.build_terms(new), machine) if built is None else built.seconds,
         compiling=_seconds(terms.compile_terms(new), machine),
-        steps=_stepping(work, machine),
+        steps=_stepping(work, machine) + work.evaluations * besides,
         outputs=work.outputs * _seconds(terms.output_terms(work), machine)
         + _seconds(terms.start_terms(work), machine),
         memory=_memory(new, machine, built),

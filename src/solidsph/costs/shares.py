@@ -9,6 +9,11 @@ import attrs
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.counted import counted
 from solidsph.costs.model import predicted
+from solidsph.costs.timed import timed
+from solidsph.engines.engine import InternalForces
+from solidsph.engines.history import remembering
+from solidsph.interfaces.condition import StressCondition
+from solidsph.interfaces.effect import Effect
 from solidsph.simulation import Simulation
 from solidsph.step_size import step_by_rates
 
@@ -23,14 +28,19 @@ class Share:
 
 def shares(simulation: Simulation, machine: Calibration) -> Mapping[str, Share]:
     """Of every effect, by label: the scene is priced with it and without it."""
-    whole = predicted(counted(simulation), machine).steps
+    work = counted(simulation)
+    apart = timed(simulation, work)
+    whole = predicted(apart.rest(work, simulation), machine, besides=apart.seconds).steps
     bodies, effects = simulation.setting.bodies, simulation.effects
     rates = {n: (e.stiffness_rate(bodies), e.damping_rate(bodies)) for n, e in effects.items()}
     step = step_by_rates(simulation.integrator, rates.values(), bodies)
     found = {}
     for label in effects:
         others = [rate for name, rate in rates.items() if name != label]
-        rest = predicted(counted(without(simulation, label)), machine).steps
+        fewer = without(simulation, label)
+        own = counted(fewer)
+        left = timed(fewer, own) if _acts_within(effects[label]) else apart.without(label)
+        rest = predicted(left.rest(own, fewer), machine, besides=left.seconds).steps
         found[label] = Share(
             time=1.0 - rest / whole if whole > 0.0 else 0.0,
             step=step / step_by_rates(simulation.integrator, others, bodies),
@@ -41,11 +51,29 @@ def shares(simulation: Simulation, machine: Calibration) -> Mapping[str, Share]:
 def without(simulation: Simulation, label: str) -> Simulation:
     """The same, with the same step, without the effect of that label."""
     dynamics = simulation.dynamics
+    effects = {name: one for name, one in simulation.effects.items() if name != label}
+    loads = [one for one in dynamics.loads if one.label != label]
+    internal = dynamics.internal
+    if _acts_within(simulation.effects[label]):
+        internal = _internal(simulation, effects)
     return attrs.evolve(
         simulation,
-        effects={name: one for name, one in simulation.effects.items() if name != label},
+        effects=effects,
         conditions=[one for one in simulation.conditions if one.label != label],
-        dynamics=attrs.evolve(
-            dynamics, loads=[one for one in dynamics.loads if one.label != label]
-        ),
+        dynamics=attrs.evolve(dynamics, loads=loads, internal=internal),
     )
+
+
+def _acts_within(effect: Effect) -> bool:
+    """Whether it changes how bodies act on themselves."""
+    return type(effect).within is not Effect.within
+
+
+def _internal(simulation: Simulation, effects: Mapping[str, Effect]) -> InternalForces:
+    """The internal forces as these effects let them act."""
+    setting = simulation.setting
+    stresses = [c for c in simulation.conditions if isinstance(c, StressCondition)]
+    internal = simulation.engine.prepare(setting.bodies, stresses, simulation.steps)
+    for effect in effects.values():
+        internal = effect.within(internal, setting, stresses)
+    return remembering(internal, setting.bodies, stresses)
