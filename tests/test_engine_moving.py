@@ -142,8 +142,14 @@ def test_agrees_for_every_operator(
         assert_same(forces, reference, random_displacements(simulation, seed))
 
 
+# A law takes seconds to compile, in every dimension anew: here in one, in all by `make validate`.
+mostly_in_2d = pytest.mark.parametrize(
+    "d", [pytest.param(d, marks=() if d == 2 else pytest.mark.validation) for d in (1, 2, 3)]
+)
+
+
 @pytest.mark.parametrize("material", registry.names("materials"))
-@in_every_dimension
+@mostly_in_2d
 def test_agrees_for_every_material(d: int, material: str) -> None:
     part = example_part("materials", material)
     simulation = block(d, JITTERED, lengths=LENGTHS[d], formulation=UPDATED, material=part).build()

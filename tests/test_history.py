@@ -59,8 +59,14 @@ def bar(material: object, **motion: str) -> Builder:
     )
 
 
+# A law takes seconds to compile, in every dimension anew: here in one, in all by `make validate`.
+mostly_in_2d = pytest.mark.parametrize(
+    "d", [pytest.param(d, marks=() if d == 2 else pytest.mark.validation) for d in (1, 2, 3)]
+)
+
+
 @every_history
-@pytest.mark.parametrize("d", [1, 2, 3])
+@mostly_in_2d
 def test_every_engine_remembers_the_same(name: str, d: int) -> None:
     """Both engines advance the histories alike, and what they lead to."""
     runs = [
@@ -78,7 +84,7 @@ def test_every_engine_remembers_the_same(name: str, d: int) -> None:
 
 
 @every_history
-@pytest.mark.parametrize("d", [1, 2, 3])
+@mostly_in_2d
 def test_the_compiled_law_is_that_of_arrays(name: str, d: int) -> None:
     """Where a law compiles, its loop over points is the array formula to rounding."""
     simulation = block(d, example_part("materials", name)).engine("compiled").build()

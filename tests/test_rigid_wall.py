@@ -138,7 +138,7 @@ def test_newton_finds_a_block_at_rest_on_it() -> None:
     du = 1e-6 * np.random.default_rng(0).standard_normal(u.shape)
     X, rest = simulation.particles.positions, np.zeros_like(u)
     change = load.forces(0.0, X + u + du, rest) - load.forces(0.0, X + u - du, rest)
-    expected = -2.0 * (load.stiffness(u) @ du.ravel()).reshape(du.shape)  # type: ignore[attr-defined]
+    expected = -2.0 * (load.stiffness(u, 0.0) @ du.ravel()).reshape(du.shape)  # type: ignore[attr-defined]
     assert np.abs(change - expected).max() <= 1e-9 * np.abs(expected).max()
 
 

@@ -105,7 +105,9 @@ def strip(engine: str = "matrix") -> Builder:
     )
 
 
-@pytest.mark.parametrize("engine", ["matrix", "compiled"])
+@pytest.mark.parametrize(
+    "engine", ["matrix", pytest.param("compiled", marks=pytest.mark.validation)]
+)
 def test_motions_and_loads_act_on_what_is_awake(engine: str) -> None:
     full, asleep = strip(engine).build(), strip(engine).sleep(slabs=40).build()
     one, other = full.run(), asleep.run()

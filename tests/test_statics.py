@@ -69,6 +69,9 @@ def test_tangent_is_minus_the_derivative_of_the_forces(
         .build()
     )
     u = shaken(simulation)
+    if not simulation.setting.bodies[0].material.smooth:
+        # Away from where fibres slacken: there the law has two tangents.
+        u = u + 0.15 * simulation.particles.positions
     K = tangent(simulation, u)
     direction = np.random.default_rng(4).uniform(-1.0, 1.0, u.shape)
     # Error of a central difference: (h / spacing)^2 of the third derivative, 1e-8 here.

@@ -147,6 +147,7 @@ def test_the_paper_s_bar() -> None:
     )
 
 
+@pytest.mark.validation  # half a minute of compiling
 @pytest.mark.skipif(NUMBA_NUM_THREADS < 2, reason="there is one thread only")
 def test_several_bodies_and_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shares, "WORTH_A_THREAD", 1)

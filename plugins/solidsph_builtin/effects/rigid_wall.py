@@ -178,13 +178,10 @@ class _Wall(StoringCondition, FieldCondition, ForceCondition):
         forces = pressed[:, None] * self.normal - _TANGENTIAL * self.springs[:, None] * slip
         return forces, {self._slip_name: slip}
 
-    def stiffness(self, displacements: Array) -> csr_array | None:
-        """As `solidsph.statics.stiff.Stiff` has it, without friction; a wall that moves has none
-        to tell, since it depends on time."""
-        if self.field is not None:
-            return None
+    def stiffness(self, displacements: Array, time: float) -> csr_array:
+        """As `solidsph.statics.stiff.Stiff` has it, without friction."""
         n, d = displacements.shape
-        touching = self.gaps(0.0, self.reference + displacements) < 0.0
+        touching = self.gaps(time, self.reference + displacements) < 0.0
         springs = np.zeros(n)
         springs[self.particles] = np.where(touching, self.springs, 0.0)
         blocks = springs[:, None, None] * np.outer(self.normal, self.normal)

@@ -31,6 +31,11 @@ from solidsph_builtin.materials._symmetric import (
 )
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 
+# Plain functions by names of their own: what compiles a law looks for those.
+_spring_energy = NeoHookean.energy
+_spring_stress = NeoHookean.first_piola
+_spring_tangent = NeoHookean.tangent
+
 
 def _elements(given: Any) -> tuple[tuple[float, float], ...]:
     """(share, time [s]) of every element, from what a scene gives."""
@@ -101,21 +106,21 @@ class Viscoelastic(HistoryMaterial):
 
     @staticmethod
     def energy(F: Tensor, params: tuple[float, ...]) -> Scalar:
-        E, psi = green_lagrange(F), NeoHookean.energy(F, params[:2])
+        E, psi = green_lagrange(F), _spring_energy(F, params[:2])
         for i in range(2, len(params), 2):
             psi = psi + params[i] * _deviator_product(E, E)
         return psi
 
     @staticmethod
     def first_piola(F: Tensor, params: tuple[float, ...]) -> Tensor:
-        E, P = green_lagrange(F), NeoHookean.first_piola(F, params[:2])
+        E, P = green_lagrange(F), _spring_stress(F, params[:2])
         for i in range(2, len(params), 2):
             P = add(P, product(F, scale(2.0 * params[i], _deviator(E))))
         return P
 
     @staticmethod
     def tangent(F: Tensor, dF: Tensor, params: tuple[float, ...]) -> Tensor:
-        E, dP = green_lagrange(F), NeoHookean.tangent(F, dF, params[:2])
+        E, dP = green_lagrange(F), _spring_tangent(F, dF, params[:2])
         half = product(transpose(F), dF)
         dE = scale(0.5, add(half, transpose(half)))
         for i in range(2, len(params), 2):
@@ -152,7 +157,7 @@ class Viscoelastic(HistoryMaterial):
     def stored(F: Tensor, history: History, params: tuple[float, ...]) -> Scalar:
         E, d = green_lagrange(F), len(F)
         size = component_count(d)
-        psi = NeoHookean.energy(F, params[:2])
+        psi = _spring_energy(F, params[:2])
         for i in range((len(params) - 2) // 2):
             strain = symmetric(history[i * size : (i + 1) * size], d)
             e = add(E, scale(-1.0, strain))
@@ -163,7 +168,7 @@ class Viscoelastic(HistoryMaterial):
     def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:
         E, d = green_lagrange(F), len(F)
         size = component_count(d)
-        P = NeoHookean.first_piola(F, params[:2])
+        P = _spring_stress(F, params[:2])
         for i in range((len(params) - 2) // 2):
             strain = symmetric(history[i * size : (i + 1) * size], d)
             overstress = _deviator(add(E, scale(-1.0, strain)))

@@ -15,7 +15,7 @@ from solidsph.testing.check import Check, Verdict, at_most, check, more_than, no
 from solidsph.testing.samples import ANGLES, central_difference, random_rotation, rotation, seeded
 
 _COUNT = 8  # paths in each dimension
-_STEPS = 400
+_STEPS = 200
 _LARGEST = 0.15  # displacement gradient, far beyond what any metal takes elastically
 
 # Durations of a path [s], since nothing is known of the times that a law has.
@@ -27,7 +27,7 @@ _SOLVED = 1e-9
 
 _DIFFERENCE_STEP, _DIFFERENCE_TOLERANCE = 2e-3, 1e-10
 
-# The trapezoidal rule, on a path of 400 steps through a kink of the law.
+# The trapezoidal rule, on a path of 200 steps through a kink of the law.
 _BALANCE = 2e-3
 
 
