@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
@@ -53,6 +53,7 @@ def test_at_rest_the_slowest_wave_is_the_shear_wave(dimension: int) -> None:
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @given(seed=st.integers(0, 10_000))
+@example(seed=3041)  # beside a pole of the angles
 def test_the_weakest_direction_is_found_wherever_it_lies(dimension: int, seed: int) -> None:
     """Far beyond the loss the least eigenvalue is mu + k / s^2, with s the smallest stretch."""
     random = np.random.default_rng(seed)
@@ -63,7 +64,7 @@ def test_the_weakest_direction_is_found_wherever_it_lies(dimension: int, seed: i
     k = lam * (1.0 - np.log(np.prod(stretches))) + mu
     assert k < 0.0
     found = least_stiffness(RUBBER, F)
-    # The square of the last grid's width, 1e-9, some hundred times mu; with room.
+    # The square of the last grid's spacing, 6e-11, some hundred times mu; with room.
     assert found.value == pytest.approx(mu + k / 1.1**2, abs=1e-6 * lam)
     assert abs(found.direction @ turn[:, 0]) == pytest.approx(1.0, abs=1e-6)
 

@@ -20,11 +20,11 @@ from solidsph.errors import SolidsphError
 from solidsph.interfaces.material import Material
 from solidsph.tensors import components_first, particles_first
 
-# Angles of a direction are looked for on a grid, then on finer ones around the best: the
-# eigenvalue is off by the square of the last grid's width, (pi / 2 / 20^4)^2.
+# Directions are looked for on a grid of angles, then on finer ones in the plane across the best,
+# which know no pole: the eigenvalue is off by the square of the last grid's spacing, 8e-6.
 _POINTS = 41
-_FINER = 0.05
-_GRIDS = 4
+_FINER = 0.1  # two spacings of the grid before
+_GRIDS = 5
 
 
 @attrs.frozen(eq=False)
@@ -57,18 +57,16 @@ def acoustic_tensors(material: Material, F: Array, directions: Array) -> Array:
 
 def least_stiffness(material: Material, F: Array) -> Stiffness:
     """The smallest eigenvalue of the acoustic tensors at F (d, d), and its direction."""
-    dimension = len(F)
-    centre = np.full(dimension - 1, 0.5 * np.pi)
-    width = 0.5 * np.pi
+    across, width = len(F) - 1, 0.5 * np.pi
+    directions = _directions(0.5 * np.pi + _grid(across, width))
     for _ in range(_GRIDS):
-        offsets = np.linspace(-width, width, _POINTS)
-        angles = np.array(list(product(*(angle + offsets for angle in centre))))
-        directions = _directions(angles)
         # Symmetric, since the stress has an energy.
         values = np.linalg.eigvalsh(acoustic_tensors(material, F, directions))[:, 0]
         best = int(np.argmin(values))
-        centre, width = angles[best], _FINER * width
-    return Stiffness(float(values[best]), directions[best])
+        least = Stiffness(float(values[best]), directions[best])
+        width *= _FINER
+        directions = _around(least.direction, _grid(across, width))
+    return least
 
 
 def losses_of_ellipticity(
@@ -101,6 +99,19 @@ def losses_of_ellipticity(
     values = np.array([stiffness(float(parameter)) for parameter in at])
     changes = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1]))
     return [float(brentq(stiffness, at[k], at[k + 1], xtol=1e-12)) for k in changes]
+
+
+def _grid(dimension: int, width: float) -> Array:
+    """Points (m, dimension) from -width to width along every axis."""
+    offsets = np.linspace(-width, width, _POINTS)
+    return np.array(list(product(offsets, repeat=dimension)))
+
+
+def _around(direction: Array, offsets: Array) -> Array:
+    """Unit vectors (m, d) by offsets (m, d - 1) in the plane across a direction."""
+    _, _, basis = np.linalg.svd(direction[None, :])
+    found = direction + offsets @ basis[1:]
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
 
 
 def _directions(angles: Array) -> Array:
