@@ -80,7 +80,13 @@ def assert_agree(builder: Builder) -> None:
     assert_same(ours, theirs, simulation)
 
 
-@pytest.mark.parametrize("integrator", registry.names("integrators"))
+@pytest.mark.parametrize(
+    "integrator",
+    [
+        pytest.param(name, marks=() if name == "velocity-verlet" else pytest.mark.validation)
+        for name in registry.names("integrators")
+    ],
+)
 def test_every_integrator_and_condition_of_a_bar(integrator: str) -> None:
     assert_agree(
         box(1, 24)

@@ -29,7 +29,8 @@ class Lattice(Discretisation):
 
     `ghosts` adds so many layers of lattice points beyond the surface, in holes as well, or only
     behind some faces: with `ghost_faces = ["left", "bottom"]` at those two and their corner. Each
-    has XX
+    has the volume of a whole cell, and as image its mirror image in the surface.
+
     Tags: each face of the shape, `surface`, `interior` and `ghosts`; with ghosts also each face
     with `-ghosts` appended, for those nearest to it.
 
