@@ -120,6 +120,19 @@ def test_motions_and_loads_act_on_what_is_awake(engine: str) -> None:
     assert np.array_equal(other.state.positions, again.state.positions)
 
 
+@pytest.mark.parametrize(
+    "engine", ["matrix", pytest.param("compiled", marks=pytest.mark.validation)]
+)
+def test_hourglass_control_acts_on_what_is_awake(engine: str) -> None:
+    scene = strip(engine).effect("hourglass-control").scene()
+    full, asleep = Builder(scene).build(), Builder(scene).sleep(slabs=40).build()
+    one, other = full.run(), asleep.run()
+    assert other.effort["awake [-]"] < 0.95
+    assert worst(one.state, other.state, full.particles.positions) < 1e-9
+    without = strip(engine).build().run().state
+    assert worst(one.state, without, full.particles.positions) > 1e-4  # or else nothing is tested
+
+
 def test_what_changes_far_away_wakes_what_it_acts_on() -> None:
     """A load at the right end that comes late, while the pulse is at the left."""
     scene = strip().effect("body-force", where="X > 3.5", acceleration={"y": "0.01*(t > 1)"})
@@ -171,7 +184,7 @@ def test_slabs_cut_the_longest_side_and_hold_some_rows() -> None:
 @pytest.mark.parametrize(
     ("builder", "said"),
     [
-        (strip().effect("hourglass-control"), "particle by particle"),
+        (strip().effect("kelvin-voigt", time=1e-3), "particle by particle"),
         (bar(100).formulation("updated-lagrangian"), "cannot form the forces of some"),
         (
             strip().material("viscoelastic", **UNIT, prony=[{"share": 0.5, "time": 1.0}]),

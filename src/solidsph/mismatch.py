@@ -22,7 +22,7 @@ from scipy.sparse import csr_array, diags_array, eye_array, hstack, vstack
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from solidsph.arrays import Array, Indices
-from solidsph.body import Body
+from solidsph.body import Body, part_of
 from solidsph.engines.tally import Tally, Way, vectors
 from solidsph.neighbours import Pairs
 
@@ -49,6 +49,18 @@ class Mismatch:
         counts = np.bincount(pairs.rows[kept], minlength=pairs.row_count)
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
         return cls(body, starts, pairs.columns[kept].astype(np.int32), weights[kept])
+
+    def part(self, chosen: Indices) -> Mismatch:
+        """That of the chosen particles (m,) alone, by the pairs both ends of which are chosen."""
+        n = self.body.particles.count
+        places = np.full(n, -1, dtype=np.intp)
+        places[chosen] = np.arange(len(chosen))
+        rows, columns = places[self.rows], places[self.columns]
+        kept = (rows >= 0) & (columns >= 0)
+        counts = np.bincount(rows[kept], minlength=len(chosen))
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+        body = part_of(self.body, chosen)
+        return Mismatch(body, starts, columns[kept].astype(np.int32), self.weights[kept])
 
     @property
     def rows(self) -> Indices:
@@ -105,6 +117,14 @@ class MismatchOperator(ABC):
     @abstractmethod
     def forces(self, displacements: Array) -> Array:
         """Forces (n, d) [N] from displacements (n, d) [m]."""
+
+    @abstractmethod
+    def part(self, chosen: Indices) -> MismatchOperator:
+        """Those of the chosen particles (m,) alone, numbered in their order.
+
+        Right for those that stand deep enough among the chosen: the gradients of a particle's
+        partners, and of the partners of its neighbours, need all of their own neighbours.
+        """
 
     def highest_frequency(self) -> float:
         """At most by 1 % above the largest angular frequency of these forces alone [rad/s].
@@ -167,6 +187,13 @@ class MismatchProducts(MismatchOperator):
     def forces(self, displacements: Array) -> Array:
         forces: Array = -(self.jet.T @ (self.pull @ (self.jet @ displacements)))
         return forces
+
+    def part(self, chosen: Indices) -> MismatchOperator:
+        mismatch = self.mismatch.part(chosen)
+        n, d = self.mismatch.body.particles.positions.shape
+        jets = np.concatenate([k * n + chosen for k in range(1 + d)])
+        jet = csr_array(csr_array(self.jet[jets])[:, chosen])
+        return MismatchProducts(mismatch, jet, _pull(mismatch))
 
     def matrix(self) -> csr_array:
         """K (n, n) [N/m], with neighbours of neighbours of neighbours: in 3D, large."""

@@ -14,7 +14,7 @@ from solidsph.asleep.slabs import Slabs
 from solidsph.body import Body, part_of
 from solidsph.dynamics import Dynamics
 from solidsph.errors import SceneError
-from solidsph.interfaces.declared import ScheduledForce, ScheduledMotion
+from solidsph.interfaces.declared import MismatchForce, ScheduledForce, ScheduledMotion
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
 from solidsph.particles import State
 from solidsph.time_loop import StepError, TimeLoop
@@ -56,6 +56,7 @@ def sleeping_loop(simulation: Simulation) -> SleepingLoop:
     check_sleep(simulation)
     (body,) = simulation.setting.bodies
     slabs = Slabs.across(simulation.particles, wanted.slabs)
+    mismatched = any(isinstance(one, MismatchForce) for one in simulation.dynamics.loads)
     fastest = body.material.wave_speed * simulation.step_size
     steps = max(1, int(_CROSSED * slabs.width / fastest))
     spacing = float(body.particles.spacings.max())
@@ -69,8 +70,9 @@ def sleeping_loop(simulation: Simulation) -> SleepingLoop:
         steps_at_once=steps,
         reach=steps * fastest + _PRECURSOR * spacing,
         highest=2.0 * body.material.wave_speed / float(body.particles.spacings.min()),
-        # Forces are right where the neighbours of the neighbours are there too.
-        halo=2.0 * body.smoothing.support_radius,
+        # Forces are right where the neighbours of the neighbours are there too; those of a mismatch
+        # need them of the partners of the neighbours.
+        halo=(4.0 if mismatched else 2.0) * body.smoothing.support_radius,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, final
 
 import attrs
@@ -12,20 +12,25 @@ from solidsph.arrays import Array, Indices, Mask
 from solidsph.errors import SceneError
 from solidsph.interfaces.condition import Condition, ForceCondition, Observation
 from solidsph.interfaces.declared import (
+    MismatchForce,
     PairForce,
     PairTable,
     PointwiseForce,
     ScheduledForce,
     ScheduledMotion,
 )
+from solidsph.mismatch import MismatchOperator
 
 ASLEEP = "asleep"
 """Account of what holds particles that sleep; it does no work, and is told to nobody."""
 
 
+_KINDS = (ScheduledMotion, ScheduledForce, PointwiseForce, PairForce, MismatchForce)
+
+
 def check_restrictable(condition: Condition) -> None:
     """Raise SceneError unless a condition can act on some of the particles alone."""
-    if not isinstance(condition, (ScheduledMotion, ScheduledForce, PointwiseForce, PairForce)):
+    if not isinstance(condition, _KINDS):
         raise SceneError(
             f"sleep: {condition.label!r} does not say what it depends on particle by particle, so "
             "that it cannot act on those alone that are awake; leave out it, or [sleep]"
@@ -61,6 +66,9 @@ class Chosen:
                 return _Scheduled(whole, kept, own)
             case PointwiseForce():
                 return _Pointwise(whole.label, own, whole.values[kept], whole.force)
+            case MismatchForce():
+                operators = [one.part(self.particles) for one in whole.operators]
+                return _Mismatched(whole.label, whole.reference[self.particles], operators)
             case PairForce():
                 return _Paired(whole.label, self._pairs(whole.pairs), whole.pull)
         raise AssertionError("`check_restrictable` has refused it")
@@ -163,6 +171,17 @@ class _Paired(PairForce):
     label: str
     pairs: PairTable
     pull: Callable[..., Any]
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {}
+
+
+@final
+@attrs.frozen(eq=False)
+class _Mismatched(MismatchForce):
+    label: str
+    reference: Array
+    operators: Sequence[MismatchOperator]
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         return {}

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from solidsph.arrays import Array, Indices
 from solidsph.engines.compiled.blocks import STRIDE, group
 from solidsph.engines.compiled.chunks import weighted_chunks
+from solidsph.engines.compiled.part import part_of_rows
 from solidsph.engines.compiled.pointwise import no_law
 from solidsph.engines.compiled.rows import Rows, compressed
 from solidsph.engines.compiled.shares import aligned, passes, shared, spread_pass, thread_count
@@ -55,11 +56,22 @@ class MismatchSweeps(MismatchOperator):
     @classmethod
     def of(cls, mismatch: Mismatch) -> MismatchSweeps:
         """The operator of a mismatch."""
+        n, d = mismatch.body.particles.positions.shape
+        shortest_run = max(2, group(d, _DTYPE) // 2)
+        chunks = weighted_chunks(mismatch.body, np.ones(n, dtype=np.bool_))
+        return cls._by_rows(mismatch, compressed(chunks, d, _DTYPE, shortest_run))
+
+    def part(self, chosen: Indices) -> MismatchSweeps:
+        count = self.mismatch.body.particles.count
+        return self._by_rows(
+            self.mismatch.part(chosen), part_of_rows(self.arrays.rows, chosen, count)
+        )
+
+    @classmethod
+    def _by_rows(cls, mismatch: Mismatch, rows: Rows) -> MismatchSweeps:
+        """By rows of the gradient's weights."""
         body = mismatch.body
         n, d = body.particles.positions.shape
-        shortest_run = max(2, group(d, _DTYPE) // 2)
-        chunks = weighted_chunks(body, np.ones(n, dtype=np.bool_))
-        rows = compressed(chunks, d, _DTYPE, shortest_run)
         # Beside the near pairs there are those of the gradient, twice.
         threads = thread_count(3 * len(mismatch.columns))
         shares = shared(rows, d, _DTYPE, threads)
