@@ -15,8 +15,10 @@ from solidsph import SceneError, Simulation, registry
 from solidsph.interfaces.case import Case, Measurement, Trial
 from solidsph.results.record import Record
 from solidsph.scene import Scene
+from solidsph.studies.case_run import run_case
 from solidsph.studies.suite import Grade, energy_residual, judged, trials
 from solidsph.studies.suite_picture import draw_suite
+from solidsph_builtin.cases.twisting_column import TwistingColumn
 from tests.test_cli import solidsph
 
 ALL = list(trials())
@@ -162,3 +164,15 @@ def test_the_residual_is_over_the_energy_in_play(tmp_path: Path) -> None:
         energy = history["kinetic energy [J]"] + history["strain energy [J]"]
         expected = np.abs(energy - energy[0]).max() / energy.max()
         assert energy_residual(record) == pytest.approx(expected)
+
+
+@pytest.mark.validation
+def test_the_column_winds_up_by_the_same_angle_at_every_resolution(tmp_path: Path) -> None:
+    angles = []
+    for across in (6, 12):
+        outcome = run_case(TwistingColumn(across=across, duration=0.12), tmp_path)
+        assert outcome.passed
+        angles += [m.value for m in outcome.measurements if m.quantity.startswith("largest twist")]
+        print(f"{across} across: {angles[-1]:.1f} degrees")
+    assert angles[0] == pytest.approx(angles[1], rel=0.05)
+    assert angles[1] > 300.0
