@@ -79,6 +79,7 @@ def test_a_pulse_costs_what_it_takes_itself() -> None:
     assert v[X < 7.0].max() < 1e-8 * v.max()
 
 
+@pytest.mark.validation  # it compiles twice
 def test_the_compiled_engine_lets_the_same_regions_sleep() -> None:
     runs = [pulse(bar(600)).engine(name).sleep().build().run() for name in ("matrix", "compiled")]
     awake = [run.effort["awake [-]"] for run in runs]
