@@ -23,9 +23,14 @@ def step_by_rates(
 ) -> float:
     """As `largest_step`, from each effect's stiffness rate [rad/s] and damping rate [1/s]."""
     rates = list(rates)
+    squares = lattice_frequency(bodies) ** 2 + sum(stiffness**2 for stiffness, _ in rates)
+    frequency = sqrt(squares)
+    return integrator.stability_limit / (frequency + sum(damping for _, damping in rates))
+
+
+def lattice_frequency(bodies: Iterable[Body]) -> float:
+    """The highest of a lattice of point masses and springs, 2 c / spacing [rad/s]."""
     wave_time = min(
         float(body.particles.spacings.min()) / body.material.wave_speed for body in bodies
     )
-    # A lattice of point masses and springs has its highest frequency at 2 c / spacing.
-    frequency = sqrt((2.0 / wave_time) ** 2 + sum(stiffness**2 for stiffness, _ in rates))
-    return integrator.stability_limit / (frequency + sum(damping for _, damping in rates))
+    return 2.0 / wave_time

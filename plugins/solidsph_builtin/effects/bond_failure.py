@@ -23,6 +23,7 @@ from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.gradient import PointwiseGradient
 from solidsph.parameters import check_positive, number
 from solidsph.setting import Setting
+from solidsph.step_size import lattice_frequency
 from solidsph.where import Where
 from solidsph_builtin.effects._breaking import Bonds, BreakingForces
 from solidsph_builtin.effects._gradients import in_the_reference
@@ -83,9 +84,7 @@ class BondFailure(Effect):
         return 0.0
 
     def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        return _RUBBLE * max(
-            2.0 * body.material.wave_speed / float(body.particles.spacings.min()) for body in bodies
-        )
+        return _RUBBLE * lattice_frequency(bodies)
 
     def pair_work(self, particles: float, pairs: float) -> float:
         return pairs

@@ -15,6 +15,7 @@ from solidsph.interfaces.condition import ForceCondition, Observation
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.parameters import number
 from solidsph.setting import Setting
+from solidsph.step_size import lattice_frequency
 
 # Of the highest frequency of a lattice: no motion worth waiting for is that fast, and a rate that
 # stays below costs a tenth of the time step at most.
@@ -61,9 +62,7 @@ class DynamicRelaxation(Effect):
         return {"masses": 8 * n, "first step": 2 * 8 * n * d, "last velocity": 8 * n * d}
 
     def damping_rate(self, bodies: Sequence[Body]) -> float:
-        return _CAP * max(
-            2.0 * body.material.wave_speed / float(body.particles.spacings.min()) for body in bodies
-        )
+        return _CAP * lattice_frequency(bodies)
 
     def stiffness_rate(self, bodies: Sequence[Body]) -> float:
         return 0.0

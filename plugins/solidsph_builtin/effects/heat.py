@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import ceil
+from functools import cached_property
+from math import ceil, sqrt
 from typing import Any, ClassVar, final
 
 import attrs
@@ -20,6 +21,7 @@ from solidsph.interfaces.material import Material
 from solidsph.motion import Component, VectorField
 from solidsph.parameters import check_positive, number
 from solidsph.setting import Setting
+from solidsph.step_size import lattice_frequency
 from solidsph.tensors import particles_first
 from solidsph.where import Where
 from solidsph_builtin.effects._gradients import BodyGradient, body_gradient, in_the_reference
@@ -126,10 +128,7 @@ class Heat(Effect):
 
     def stiffness_rate(self, bodies: Sequence[Body]) -> float:
         # A body that has swollen is stiffer by about three times its stretch.
-        highest = max(
-            2.0 * body.material.wave_speed / float(body.particles.spacings.min()) for body in bodies
-        )
-        return float(np.sqrt(3.0 * abs(self.expansion) * self.largest) * highest)
+        return sqrt(3.0 * abs(self.expansion) * self.largest) * lattice_frequency(bodies)
 
     def pair_work(self, particles: float, pairs: float) -> float:
         return 3.0 * pairs if self.expansion else pairs
@@ -199,23 +198,26 @@ class _Conduction(FieldCondition, ForceCondition):
 
     def _conducted(self, T: Array, time: float, step: float) -> Array:
         """T after a step that ends at `time`, in as many parts as stability asks for."""
-        parts = ceil(step * self._fastest / (2.0 * _PART))
-        part = step / max(1, parts)
-        inverse = np.zeros_like(self.capacities)
-        np.divide(1.0, self.capacities, out=inverse, where=self.capacities > 0.0)
-        for k in range(max(1, parts)):
+        parts = max(1, ceil(step * self._fastest / (2.0 * _PART)))
+        part = step / parts
+        for k in range(parts):
             now = time - step + k * part
             source = self.source.values(0, self.reference, now) * self.volumes
-            T = T + part * inverse * (self.conduction @ T + source)
+            T = T + part * self._inverse * (self.conduction @ T + source)
             T = self._holding(now + part, T)
         return T
 
-    @property
+    @cached_property
+    def _inverse(self) -> Array:
+        """One over the capacities, (n,) [K/J]; 0 of ghosts."""
+        inverse = np.zeros_like(self.capacities)
+        np.divide(1.0, self.capacities, out=inverse, where=self.capacities > 0.0)
+        return inverse
+
+    @cached_property
     def _fastest(self) -> float:
         """A bound on the rate at which differences of temperature decay [1/s]."""
-        diagonal = -self.conduction.diagonal()
-        real = self.capacities > 0.0
-        return float(2.0 * (diagonal[real] / self.capacities[real]).max())
+        return float(2.0 * (-self.conduction.diagonal() * self._inverse).max())
 
     def _holding(self, time: float, T: Array) -> Array:
         if not self.held:

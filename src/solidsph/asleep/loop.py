@@ -17,6 +17,7 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.declared import MismatchForce, ScheduledForce, ScheduledMotion
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
 from solidsph.particles import State
+from solidsph.step_size import lattice_frequency
 from solidsph.time_loop import StepError, TimeLoop
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def sleeping_loop(simulation: Simulation) -> SleepingLoop:
         tolerance=wanted.tolerance,
         steps_at_once=steps,
         reach=steps * fastest + _PRECURSOR * spacing,
-        highest=2.0 * body.material.wave_speed / float(body.particles.spacings.min()),
+        highest=lattice_frequency([body]),
         # Forces are right where the neighbours of the neighbours are there too; those of a mismatch
         # need them of the partners of the neighbours.
         halo=(4.0 if mismatched else 2.0) * body.smoothing.support_radius,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import attrs
 import numpy as np
@@ -51,11 +52,11 @@ def timed(simulation: Simulation, work: Work) -> Timed:
     if work.loop is not Loop.STEPS:
         return Timed()
     dynamics = simulation.dynamics
-    state = simulation.start()
-    x, v, memory = state.positions, state.velocities, state.memory
+    # Not by the run's own start, whose forces may have to be compiled.
+    x, v = simulation.initial.positions, simulation.initial.velocities
     u, step = x - dynamics.particles.positions, simulation.step_size
     loads = {
-        load.label: _seconds(lambda load=load: load.advance(step, step, x, v, memory))  # type: ignore[misc]
+        load.label: _seconds(partial(load.advance, step, step, x, v, {}))
         for load in dynamics.loads
         if not isinstance(load, DECLARED_LOADS)
     }
@@ -64,7 +65,7 @@ def timed(simulation: Simulation, work: Work) -> Timed:
     own = internal.advances_histories and by_arrays
     return Timed(
         loads,
-        _seconds(lambda: internal.advance(step, step, u, memory)) if own else None,
+        _seconds(partial(internal.advance, step, step, u, {})) if own else None,
     )
 
 
