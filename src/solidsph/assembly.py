@@ -92,7 +92,9 @@ class Assembly:
         particles = self._tagged(Particles.joined(sets))
         problems.add(compatibility.apart(shapes, particles))
         bodies = [
-            problems.attempt(self._body, name, particles, own, material, kernel, formulation)
+            problems.attempt(
+                self._body, name, shapes[name], particles, own, material, kernel, formulation
+            )
             for (name, own), material in zip(sets.items(), materials.values(), strict=True)
         ]
         problems.stop_if_any()
@@ -233,6 +235,7 @@ class Assembly:
     def _body(
         self,
         name: str,
+        shape: Shape,
         particles: Particles,
         own: Particles,
         material: Material,
@@ -242,6 +245,7 @@ class Assembly:
         radius = self._scene.cover * float(own.spacings.max())
         body = Body(
             name=name,
+            shape=shape,
             extent=particles.bodies[name],
             particles=own,
             smoothing=smoothing_kernel(kernel, own.dimension, radius),

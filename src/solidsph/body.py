@@ -10,6 +10,7 @@ import numpy as np
 from solidsph.arrays import Array, Indices
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.material import Material
+from solidsph.interfaces.shape import Shape
 from solidsph.neighbours import Pairs, neighbour_pairs
 from solidsph.particles import Particles
 from solidsph.smoothing import SmoothingKernel
@@ -20,6 +21,7 @@ class Body:
     """What an engine needs to know to find the internal forces of one body."""
 
     name: str
+    shape: Shape  # that its particles fill
     extent: slice  # its place among all particles
     particles: Particles  # its own only
     smoothing: SmoothingKernel

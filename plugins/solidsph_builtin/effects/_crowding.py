@@ -8,7 +8,6 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 from numpy.polynomial.legendre import leggauss
-from scipy.spatial import cKDTree
 
 from solidsph.arrays import Array, Indices, Scalar
 from solidsph.body import Body
@@ -19,11 +18,11 @@ REACH = 2.5
 """Support of the smoothing in spacings: beside a lattice the place where two bodies touch then
 varies by less than a thousandth of a spacing, in 2D by less than a ten-thousandth."""
 
-# Passes that give edges and corners their weight; each halves what is missing there.
-_PASSES = 6
-_LARGEST_WEIGHT = 3.0
-
 _NODES, _WEIGHTS = leggauss(64)
+
+# Depths at which the filling beside a plane face is tabulated: read off between two of them, it is
+# right to 1e-6.
+_TABULATED = 1000
 
 
 @final
@@ -52,13 +51,13 @@ class _QuinticSpline(Kernel):
 
 @attrs.frozen(eq=False)
 class Sites:
-    """Particles of a body that may touch others."""
+    """Particles of a body that may touch another body."""
 
     particles: Indices  # (m,) among those of all bodies
+    positions: Array  # (m, d) X [m]
     volumes: Array  # (m,) V [m^d]
-    weights: Array  # (m,) what they fill: V, and more in corners and at edges [m^d]
-    room: Array  # (m,) the part around each that the body leaves to others [-]
-    depths: Array  # (m,) below the surface, where that is less than half a spacing, or that [m]
+    room: Array  # (m,) the part around each that the other may fill [-]
+    depths: Array  # (m,) below the body's surface [m]
 
 
 def crowding_kernel(dimension: int, radius: float) -> SmoothingKernel:
@@ -88,81 +87,56 @@ def sensitivity(kernel: SmoothingKernel, excess: float) -> float:
     return first**2 + 2.0 * excess * second
 
 
-def sites(body: Body, kernel: SmoothingKernel, *, near_surface: bool = False) -> Sites:
-    """The particles of a body that have a mass, or only those `near_surface`.
+def sites(
+    body: Body, other: Body, kernel: SmoothingKernel, *, near_surface: bool = False
+) -> Sites:
+    """The particles of a body that have a mass, or only those `near_surface`, to touch the `other`.
 
-    What a body leaves free around a particle is 1 - sum of V W over its own particles, so that
-    two surfaces touch where the two sums together make 1, wherever in their cells the particles
-    stand. An edge or a corner leaves more than the plane face does, and would sink in before it
-    touches; so what is left to others is at most what a plane face leaves at the particle's depth,
-    and the particles nearby count for more, until they fill what is not left.
+    Around a particle below a plane face, another plane face that lies on that face fills a part
+    that depends on the particle's depth and on the other's rows of particles: a sum over rows is
+    not the integral, and unlike rows make unlike sums. That part is the particle's room, so that
+    faces touch where their surfaces are, however both bodies are divided. Less than a plane face,
+    such as its edge, never fills more.
     """
-    particles = body.particles
-    X, V = particles.positions, particles.volumes
-    real = np.flatnonzero(~particles.ghosts)
-    spacing = float(particles.spacings[real].max())
-    depths = _depths(body, spacing)
-    owners = real[np.isfinite(depths[real])]
-    near = real
-    if owners.size:
-        gaps = cKDTree(X[owners]).query(X[real])[0]
-        near = real[gaps <= kernel.support_radius]
-    found = cKDTree(X[near]).sparse_distance_matrix(
-        cKDTree(X[real]), kernel.support_radius, output_type="ndarray"
-    )
-    order = np.lexsort((found["j"], found["i"]))
-    rows, columns, distances = (found[name][order] for name in ("i", "j", "v"))
-    terms = kernel.value(distances) * V[real][columns]
-
-    filled = np.bincount(rows, terms, len(near))
-    plane = _filled_by_half_space(kernel, spacing, depths[near])
-    wanted = np.maximum(filled, plane)
-    weight = np.ones(len(real))
-    places = np.searchsorted(real, near)
-    for _ in range(_PASSES):
-        missing = wanted - np.bincount(rows, terms * weight[columns], len(near))
-        weight[places] = np.clip(weight[places] + missing, 0.5, _LARGEST_WEIGHT)
-    room = np.zeros(len(real))
-    room[places] = np.maximum(0.0, 1.0 - wanted)
-    chosen = places if near_surface else np.arange(len(real))
+    own = body.particles
+    real = np.flatnonzero(~own.ghosts)
+    depths = np.maximum(0.0, -body.shape.signed_distance(own.positions[real]))
+    if near_surface:
+        near = depths < kernel.support_radius
+        real, depths = real[near], depths[near]
     return Sites(
-        particles=real[chosen] + body.extent.start,
-        volumes=V[real][chosen],
-        weights=(weight * V[real])[chosen],
-        room=room[chosen],
-        depths=np.minimum(depths[real], 0.5 * spacing)[chosen],
+        particles=real + body.extent.start,
+        positions=own.positions[real],
+        volumes=own.volumes[real],
+        room=_filled_beside(other, kernel, depths),
+        depths=depths,
     )
 
 
-def _depths(body: Body, spacing: float) -> Array:
-    """How deep below the surface particles that own some of it stand, (n,) [m]; others inf.
+def _filled_beside(body: Body, kernel: SmoothingKernel, heights: Array) -> Array:
+    """What the body fills at `heights` (m,) above a plane face of it, (m,) [-]."""
+    table = np.linspace(0.0, kernel.support_radius, _TABULATED)
+    filled = np.zeros(_TABULATED)
+    for depth, thickness in _rows(body, kernel.support_radius):
+        filled += thickness * _layer(kernel, table + depth)
+    return np.interp(heights, table, filled)
 
-    A cell on a plane face has the volume of the column from the surface to half a spacing below
-    its particle.
+
+def _rows(body: Body, reach: float) -> list[tuple[float, float]]:
+    """Depth and thickness of the rows of particles below a plane face [m], down to `reach`.
+
+    The first is as deep as the particles that own the surface usually are: half a spacing at the
+    centres of cells, and 0 on the surface, where a row is half as thick as the others.
     """
-    particles = body.particles
-    depths = np.full(particles.count, np.inf)
-    for face in particles.faces.values():
-        owners, areas = face.particles, face.areas
-        column = particles.volumes[owners] / np.where(areas > 0.0, areas, np.inf)
-        below = np.where(areas > 0.0, column - 0.5 * spacing, np.inf)
-        depths[owners] = np.minimum(depths[owners], np.clip(below, 0.0, None))
-    # Of what owns a sliver of a face nothing can be told.
-    depths[depths > spacing] = np.inf
-    return depths
-
-
-def _filled_by_half_space(kernel: SmoothingKernel, spacing: float, depths: Array) -> Array:
-    """What layers of particles below a plane surface fill at `depths` (m,) below it, (m,) [-].
-
-    0 where the depth is infinite.
-    """
-    layers = (np.arange(int(2.0 * kernel.support_radius / spacing) + 2) + 0.5) * spacing
-    finite = np.isfinite(depths)
-    filled = np.zeros(len(depths))
-    away = np.abs(layers[None, :] - depths[finite][:, None])
-    filled[finite] = spacing * _layer(kernel, away.ravel()).reshape(away.shape).sum(axis=1)
-    return filled
+    own = body.particles
+    spacing = float(np.median(own.spacings[~own.ghosts]))
+    owners = np.any(own.area_vectors != 0.0, axis=1) & ~own.ghosts
+    first = 0.5 * spacing
+    if owners.any():
+        first = float(np.median(-body.shape.signed_distance(own.positions[owners])))
+        first = min(max(first, 0.0), spacing)
+    depths = np.arange(first, reach, spacing)
+    return [(float(z), spacing if k else first + 0.5 * spacing) for k, z in enumerate(depths)]
 
 
 def _layer(kernel: SmoothingKernel, heights: Array) -> Array:

@@ -10,11 +10,15 @@ from scipy.spatial import cKDTree
 
 from solidsph.arrays import Array, Indices, Mask
 from solidsph.smoothing import SmoothingKernel
+from solidsph_builtin.effects._crowding import REACH
 from solidsph_builtin.effects._search import NeighbourList, Search
 from solidsph_builtin.effects._slip import slid
 
 # Below this part of the squared reach, particles in a line have no moment of inertia about it.
 _SLENDER = 1e-6
+
+# Sums of the same terms, taken in another order or moved as one, differ by less.
+_ROUNDING = 1e-9
 
 
 @attrs.frozen(eq=False)
@@ -38,9 +42,8 @@ class Meeting:
     particles: Indices  # (m,) among all
     belongs: Mask  # (m,) to the first body
     volumes: Array  # (m,) V [m^d]
-    weights: Array  # (m,) what they fill [m^d]
-    room: Array  # (m,) what they leave to others [-]
-    depths: Array  # (m,) below their own surface, half a spacing at most [m]
+    room: Array  # (m,) what the other may fill around them [-]
+    depths: Array  # (m,) below their own surface [m]
     modulus: float  # K [Pa]
     spring: Array  # (m,) of friction [N/m]
     kernel: SmoothingKernel
@@ -66,21 +69,37 @@ class Meeting:
         offsets = x[i] - x[j]
         distances = np.sqrt(np.sum(offsets**2, axis=1))
         values = self.kernel.value(distances)
-        filled = self._gathered(i, values * self.weights[j])
-        filled += self._gathered(j, values * self.weights[i])
         return Touch(
             i,
             j,
             offsets,
             values,
             self.kernel.slope_by_distance(distances),
-            np.maximum(filled - self.room, 0.0),
+            np.maximum(self._filled(i, j, values) - self.room, 0.0),
         )
+
+    def unloaded(self, X: Array) -> Meeting:
+        """The same, without a force at the reference positions X (m, d) of its own particles.
+
+        Bodies are apart there, so what one fills around the other's particles is theirs to fill.
+        That settles faces that lie on each other at the start to rounding, also of scattered
+        particles, and in corners of the other, which fill more than a plane face does.
+        """
+        i, j = self.search.within(X, self.kernel.support_radius)
+        values = self.kernel.value(np.linalg.norm(X[i] - X[j], axis=1))
+        filled = (1.0 + _ROUNDING) * self._filled(i, j, values)
+        return attrs.evolve(self, room=np.maximum(self.room, filled))
+
+    def _filled(self, i: Indices, j: Indices, values: Array) -> Array:
+        """What the other body fills around every particle, (m,) [-], by W of the pairs."""
+        filled = self._gathered(i, values * self.volumes[j])
+        return filled + self._gathered(j, values * self.volumes[i])
 
     def pushes(self, touch: Touch) -> Array:
         """Force on i of every pair, along the line between the two, (k, d) [N]; j has the other."""
-        own = self.modulus * self.volumes * touch.excess
-        pull = own[touch.i] * self.weights[touch.j] + own[touch.j] * self.weights[touch.i]
+        i, j = touch.i, touch.j
+        both = touch.excess[i] + touch.excess[j]
+        pull = self.modulus * self.volumes[i] * self.volumes[j] * both
         return np.asarray(-(pull * touch.slopes)[:, None] * touch.offsets)
 
     def normal_forces(self, touch: Touch) -> Array:
@@ -117,7 +136,7 @@ class Meeting:
         p, q = p[chosen], np.concatenate([touch.j, touch.i])[chosen]
         pair = chosen % len(touch.i)
         sign = np.where(chosen < len(touch.i), 1.0, -1.0)
-        fills = self.weights[q]
+        fills = self.volumes[q]
         slope = (fills * touch.slopes[pair] * sign)[:, None] * touch.offsets[pair]
         inward = _summed(p, slope, count)  # gradient of what the other fills
         shares = fills * touch.values[pair]
@@ -149,7 +168,7 @@ class Meeting:
     def least_gap(self, positions: Array) -> float:
         """Between the surfaces of two bodies [m], by the nearest of their outermost particles."""
         x = positions[self.particles]
-        outer = self.room > 0.0
+        outer = self.depths <= self.kernel.support_radius / REACH
         one, other = np.flatnonzero(outer & self.belongs), np.flatnonzero(outer & ~self.belongs)
         distances, nearest = cKDTree(x[other]).query(x[one])
         gaps = distances - self.depths[one] - self.depths[other[nearest]]

@@ -255,7 +255,8 @@ class _Contact(StoringCondition, FieldCondition, ForceCondition):
         return energies
 
     def report(self, observation: Observation) -> Mapping[str, float]:
-        positions, label = observation.state.positions, self.label
+        state, label = observation.state, self.label
+        positions = state.positions
         columns = {f"{label} energy [J]": float(self.energies(observation).sum())}
         pairs, gaps = 0, []
         for meeting in self.meetings:
@@ -264,7 +265,9 @@ class _Contact(StoringCondition, FieldCondition, ForceCondition):
             if touch is not None:
                 excess = touch.excess
                 pairs += int(np.sum((excess[touch.i] > 0.0) | (excess[touch.j] > 0.0)))
-                force = -meeting.normal_forces(touch)[meeting.belongs].sum(axis=0)
+                # Over a step of no length springs of friction stay as they are: what acted.
+                acted, _ = self._of(meeting, touch, positions, state.velocities, 0.0, state.memory)
+                force -= 0.0 if acted is None else acted[meeting.belongs].sum(axis=0)
             if meeting.first == meeting.second:
                 continue
             gaps.append(meeting.least_gap(positions))
@@ -300,25 +303,26 @@ class _Contact(StoringCondition, FieldCondition, ForceCondition):
 
 def _made(one: Body, other: Body, strength: float, margin: float) -> Meeting:
     kernel, alone = _kernel(one, other), one is other
-    own = [sites(body, kernel, near_surface=alone) for body in ((one,) if alone else (one, other))]
     reach = kernel.support_radius
     margin *= reach / REACH
+    own = [sites(one, other, kernel, near_surface=alone)]
+    if not alone:
+        own.append(sites(other, one, kernel))
     split = len(own[0].particles)
     modulus = _modulus(one, other, reach, strength)
     volumes = np.concatenate([part.volumes for part in own])
+    X = np.concatenate([part.positions for part in own])
     search: Search = Between(
         together(own[0].particles), together(own[-1].particles), split, reach + margin
     )
     if alone:
-        X = one.particles.positions[own[0].particles - one.extent.start]
         search = Within(own[0].particles, X, _APART * reach, reach + margin)
-    return Meeting(
+    meeting = Meeting(
         first=one.name,
         second=other.name,
         particles=np.concatenate([part.particles for part in own]),
         belongs=np.arange(len(volumes)) < split,
         volumes=volumes,
-        weights=np.concatenate([part.weights for part in own]),
         room=np.concatenate([part.room for part in own]),
         depths=np.concatenate([part.depths for part in own]),
         modulus=modulus,
@@ -326,6 +330,7 @@ def _made(one: Body, other: Body, strength: float, margin: float) -> Meeting:
         kernel=kernel,
         search=search,
     )
+    return meeting.unloaded(X)
 
 
 def _kernel(one: Body, other: Body) -> SmoothingKernel:
