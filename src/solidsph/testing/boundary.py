@@ -329,7 +329,7 @@ def force_problem(simulation: Simulation, condition: ForceCondition, u: Array) -
     """What is wrong with the forces of a condition at displacements `u` (n, d); nothing if all is
     well."""
     particles = simulation.particles
-    x, v = particles.positions + u, 1e2 * u[::-1]
+    x, v = simulation.initial.positions + u, 1e2 * u[::-1]
     chosen = np.asarray(condition.particles)
     before = x.copy(), v.copy()
     f = condition.forces(1e-3, x, v)

@@ -58,7 +58,8 @@ class _Sample:
 
     @property
     def positions(self) -> Array:
-        return self.simulation.particles.positions
+        """At the start, (n, d) [m]."""
+        return self.simulation.initial.positions
 
     def smooth(self) -> Array:
         """A displacement (n, d) of one wave or so, in random directions [m]."""
@@ -84,7 +85,7 @@ class _Sample:
 
     def internal(self, time: float, positions: Array) -> Array:
         """Internal forces as the effect lets them act, (n, d) [N]."""
-        u = positions - self.positions
+        u = positions - self.simulation.particles.positions
         return self.simulation.dynamics.internal.advance(time, 0.0, u, self.memory)[0]
 
     def plain(self, time: float, positions: Array) -> Array:
@@ -92,7 +93,7 @@ class _Sample:
         if not self.engines:
             prepare = self.simulation.engine.prepare
             self.engines.append(prepare(self.simulation.setting.bodies, ()))
-        return self.engines[0].forces(time, positions - self.positions)
+        return self.engines[0].forces(time, positions - self.simulation.particles.positions)
 
 
 @made_once
@@ -132,9 +133,12 @@ def _scene(d: int, form: str) -> Builder:
 
 
 def _touching(d: int, form: str) -> Builder:
-    """Two bodies whose outermost particles are less than a spacing apart, without any effect."""
-    beside = [_SPACING * (_CELLS[d][0] - _PRESSED), *[_ASIDE * _SPACING] * (d - 1)]
-    return _with_body(_scene(d, form), "other", d, beside)
+    """Two bodies that lie on each other, and are pressed together at the start, without any
+    effect."""
+    beside = [_SPACING * _CELLS[d][0], *[_ASIDE * _SPACING] * (d - 1)]
+    return _with_body(_scene(d, form), "other", d, beside).initial(
+        where="other", displacement={"x": -_PRESSED * _SPACING}
+    )
 
 
 def _with_body(builder: Builder, name: str, d: int, origin: list[float]) -> Builder:
