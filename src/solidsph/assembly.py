@@ -90,7 +90,7 @@ class Assembly:
         problems.add(compatibility.names(sets))
         problems.stop_if_any()
         particles = self._tagged(Particles.joined(sets))
-        problems.add(compatibility.apart(shapes, particles))
+        problems.add(compatibility.apart(shapes, sets))
         bodies = [
             problems.attempt(
                 self._body, name, shapes[name], particles, own, material, kernel, formulation

@@ -22,12 +22,13 @@ from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.shape import Shape
+from solidsph.overlap import overlap
 from solidsph.particles import Particles
 from solidsph.scene import Scene
 from solidsph.where import AXES, EVERYWHERE
 
-# Deeper than this inside another body, in spacings, a particle is not merely touching it.
-_TOUCHING = 1e-6
+# Bodies that overlap by less, in spacings, merely touch: their shapes are drawn no more exactly.
+_TOUCHING = 0.05
 
 # No kernel is of use so wide, and its pairs would fill any memory.
 MOST_COVER = 100.0
@@ -157,19 +158,24 @@ def dimensions(shapes: Mapping[str, Shape], cover: float) -> Iterator[str]:
         )
 
 
-def apart(shapes: Mapping[str, Shape], particles: Particles) -> Iterator[str]:
+def apart(shapes: Mapping[str, Shape], sets: Mapping[str, Particles]) -> Iterator[str]:
     """No two bodies in one place."""
-    for name, extent in particles.bodies.items():
-        X = particles.positions[extent][~particles.ghosts[extent]]
-        spacing = particles.spacings[extent].min()
-        for other, shape in shapes.items():
-            if other == name:
-                continue
-            inside = int(np.sum(shape.signed_distance(X) < -_TOUCHING * spacing))
-            if inside:
+    names = list(shapes)
+    boxes = np.array([shape.bounds() for shape in shapes.values()])  # (b, 2, d)
+    spacings = np.array([float(sets[name].spacings.min()) for name in names])
+    for k, name in enumerate(names[:-1]):
+        rest = boxes[k + 1 :]
+        common = np.minimum(rest[:, 1], boxes[k, 1]) - np.maximum(rest[:, 0], boxes[k, 0])
+        for other in k + 1 + np.flatnonzero(np.all(common > 0.0, axis=1)):
+            spacing = min(spacings[k], spacings[other])
+            found = overlap(shapes[name], shapes[names[other]], _TOUCHING * spacing)
+            if found is not None:
+                place = ", ".join(f"{x:.4g}" for x in found.place)
                 yield (
-                    f"bodies {name!r} and {other!r} are in one place: {inside} particles of "
-                    f"{name!r} lie inside {other!r}; move one, or cut it out with a 'difference'"
+                    f"bodies {name!r} and {names[other]!r} are in one place: they overlap by "
+                    f"{found.depth:.3g} m ({found.depth / spacing:.2g} spacings) around "
+                    f"({place}); move one, or cut it out with a 'difference'. To press bodies "
+                    "together, let them touch, and move one by an initial displacement"
                 )
 
 

@@ -87,9 +87,7 @@ def sensitivity(kernel: SmoothingKernel, excess: float) -> float:
     return first**2 + 2.0 * excess * second
 
 
-def sites(
-    body: Body, other: Body, kernel: SmoothingKernel, *, near_surface: bool = False
-) -> Sites:
+def sites(body: Body, other: Body, kernel: SmoothingKernel, *, near_surface: bool = False) -> Sites:
     """The particles of a body that have a mass, or only those `near_surface`, to touch the `other`.
 
     Around a particle below a plane face, another plane face that lies on that face fills a part
