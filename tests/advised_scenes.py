@@ -241,6 +241,51 @@ rate = 200.0
 """,
     ),
     Flawed(
+        "pressed-at-start",
+        "move them apart",
+        f"""
+title = "a block dropped into a table"
+silence = ["unheld"]
+duration = 0.1
+material = {RUBBER}
+[body.table]
+shape = {{type = "box", lengths = [0.4, 0.1]}}
+spacing = 0.01
+[body.block]
+shape = {{type = "box", lengths = [0.2, 0.2], origin = [0.1, 0.1]}}
+spacing = 0.02
+[[boundary]]
+type = "clamp"
+where = "table and Y < 0.01"
+[[initial]]
+where = "block"
+displacement = {{y = -0.001}}
+[[effect]]
+type = "contact"
+""",
+    ),
+    Flawed(
+        "pressed-at-start",
+        "clearance = 0",
+        f"""
+title = "a block with particles on its lower side, on the ground"
+silence = ["unheld"]
+duration = 0.1
+material = {RUBBER}
+[body.block]
+shape = {{type = "box", lengths = [0.2, 0.2]}}
+spacing = 0.02
+discretisation = {{type = "lattice", on_boundary = true}}
+[[effect]]
+type = "body-force"
+acceleration = {{y = -9.81}}
+[[effect]]
+type = "rigid-wall"
+point = {{y = 0}}
+normal = {{y = 1}}
+""",
+    ),
+    Flawed(
         "bodies-meet",
         "solidsph plugins",
         f"""

@@ -21,6 +21,7 @@ from solidsph.advice.near_incompressible import near_incompressible
 from solidsph.advice.nothing_happens import nothing_happens
 from solidsph.advice.overdamped import overdamped
 from solidsph.advice.overloaded import overloaded
+from solidsph.advice.pressed_at_start import pressed_at_start
 from solidsph.advice.seen import Seen
 from solidsph.advice.slow_load import slow_load
 from solidsph.advice.small_cover import small_cover
@@ -48,6 +49,7 @@ _LOOKS: tuple[Look, ...] = (
     sudden_load,
     slow_load,
     bodies_meet,
+    pressed_at_start,
     deep_clamp,
     viscosity_unneeded,
     hourglass_unneeded,
