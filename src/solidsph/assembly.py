@@ -29,7 +29,7 @@ from solidsph.interfaces.condition import (
 )
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.effect import Effect
-from solidsph.interfaces.formulation import Formulation
+from solidsph.interfaces.formulation import Configuration, Formulation
 from solidsph.interfaces.gradient import Gradient
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.integrator import Integrator
@@ -45,6 +45,7 @@ from solidsph.setting import Setting
 from solidsph.simulation import Simulation
 from solidsph.smoothing import smoothing_kernel
 from solidsph.step_size import largest_step
+from solidsph.visibility import hidden_pairs
 from solidsph.where import EVERYWHERE, select
 
 # No run of more steps ends; a scene that asks for them has its units wrong.
@@ -251,6 +252,12 @@ class Assembly:
             smoothing=smoothing_kernel(kernel, own.dimension, radius),
             material=material,
             formulation=formulation,
+            hidden=hidden_pairs(
+                shape,
+                own,
+                radius,
+                moving=formulation.configuration is Configuration.CURRENT,
+            ),
         )
         gradient = formulation.gradient.of_body(body)
         if gradient is formulation.gradient:

@@ -11,7 +11,7 @@ from solidsph.arrays import Array, Indices
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.material import Material
 from solidsph.interfaces.shape import Shape
-from solidsph.neighbours import Pairs, neighbour_pairs
+from solidsph.neighbours import Hidden, Pairs, neighbour_pairs
 from solidsph.particles import Particles
 from solidsph.smoothing import SmoothingKernel
 
@@ -27,15 +27,18 @@ class Body:
     smoothing: SmoothingKernel
     material: Material
     formulation: Formulation
+    hidden: Hidden | None = None  # near particles that do not see each other
     # What parts have made of these arrays, by keys of theirs; it lives as long as the body does.
     made: dict[object, Any] = attrs.field(factory=dict, init=False, repr=False)
 
-    def pairs(self) -> Pairs:
-        """Neighbours in the reference configuration, numbered within the body.
+    def pairs(self, radius: float | None = None) -> Pairs:
+        """Neighbours in the reference configuration, numbered within the body: within the support,
+        or within a smaller `radius` [m].
 
         Found anew at every call: an engine that needs them for longer keeps what it needs.
         """
-        return neighbour_pairs(self.particles.positions, self.smoothing.support_radius)
+        within = self.smoothing.support_radius if radius is None else radius
+        return neighbour_pairs(self.particles.positions, within, self.hidden)
 
     @property
     def masses(self) -> Array:
@@ -56,4 +59,5 @@ def part_of(body: Body, chosen: Indices) -> Body:
         images=own.images[chosen],
         cells=own.cells[chosen],
     )
-    return attrs.evolve(body, particles=particles, extent=slice(0, len(chosen)))
+    hidden = None if body.hidden is None else body.hidden.part(chosen)
+    return attrs.evolve(body, particles=particles, extent=slice(0, len(chosen)), hidden=hidden)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices
+from solidsph.arrays import Array, Indices, Mask
 
 
 @attrs.frozen(eq=False)
@@ -69,9 +69,45 @@ class Pairs:
         return np.flatnonzero(self.rows == self.columns)
 
 
-def neighbour_pairs(positions: Array, radius: float) -> Pairs:
-    """All pairs closer than `radius` [m] among `positions` (n, d), self pairs included."""
+@attrs.frozen(eq=False)
+class Hidden:
+    """Particles that are no neighbours however near they are: the body is not between them.
+
+    `visibility.hidden_pairs` finds them in the reference configuration.
+    """
+
+    keys: Indices  # (k,) rising: p n + q of every hidden pair, (q, p) as well as (p, q)
+    count: int  # number of particles n
+    pieces: Indices | None = None  # (n,) if pieces of the body may meet, which piece each is of
+
+    def between(self, rows: Indices, columns: Indices) -> Mask:
+        """Whether p and q are hidden from each other, for pairs of `rows` and `columns` (m,)."""
+        if len(self.keys):
+            wanted = np.asarray(rows, dtype=np.intp) * self.count + columns
+            places = np.minimum(np.searchsorted(self.keys, wanted), len(self.keys) - 1)
+            hidden: Mask = self.keys[places] == wanted
+        else:
+            hidden = np.zeros(len(rows), dtype=np.bool_)
+        if self.pieces is not None:
+            hidden |= self.pieces[rows] != self.pieces[columns]
+        return hidden
+
+    def part(self, chosen: Indices) -> Hidden:
+        """The same among the chosen particles (k,), numbered in their order."""
+        place = np.full(self.count, -1, dtype=np.intp)
+        place[chosen] = np.arange(len(chosen))
+        p, q = (place[ends] for ends in np.divmod(self.keys, self.count))
+        kept = (p >= 0) & (q >= 0)
+        keys = np.sort(p[kept] * len(chosen) + q[kept])
+        return Hidden(keys, len(chosen), None if self.pieces is None else self.pieces[chosen])
+
+
+def neighbour_pairs(positions: Array, radius: float, hidden: Hidden | None = None) -> Pairs:
+    """All pairs closer than `radius` [m] among `positions` (n, d), self pairs included, but for
+    those that are hidden from each other."""
     found = cKDTree(positions).query_pairs(radius, output_type="ndarray")
+    if hidden is not None:
+        found = found[~hidden.between(found[:, 0], found[:, 1])]
     own = np.arange(len(positions), dtype=np.intp)
     rows = np.concatenate([found[:, 0], found[:, 1], own]).astype(np.intp)
     columns = np.concatenate([found[:, 1], found[:, 0], own]).astype(np.intp)

@@ -22,7 +22,6 @@ from solidsph.interfaces.declared import MismatchForce
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.formulation import Configuration
 from solidsph.mismatch import Mismatch, MismatchOperator
-from solidsph.neighbours import neighbour_pairs
 from solidsph.parameters import check_positive, number
 from solidsph.setting import Setting
 
@@ -111,7 +110,7 @@ def _operator(body: Body, strength: float) -> MismatchOperator:
 def penalised(body: Body, strength: float) -> Mismatch:
     """Near pairs with c_ab = strength mu V_a V_b W(X_ab) / |X_ab|^2; ghosts have none."""
     particles = body.particles
-    pairs = neighbour_pairs(particles.positions, _reach(body))
+    pairs = body.pairs(_reach(body))
     real = ~particles.ghosts
     apart = (pairs.distances > 0.0) & real[pairs.rows] & real[pairs.columns]
     weights = np.zeros(pairs.count)

@@ -31,6 +31,11 @@ class Ball(Shape):
         """3."""
         return 3
 
+    @property
+    def convex(self) -> bool:
+        """True."""
+        return True
+
     def bounds(self) -> tuple[Array, Array]:
         """As in the interface."""
         centre = np.array(self.centre)

@@ -53,6 +53,11 @@ class Box(Shape):
         """1, 2 or 3: the number of lengths."""
         return len(self.lengths)
 
+    @property
+    def convex(self) -> bool:
+        """True."""
+        return True
+
     def bounds(self) -> tuple[Array, Array]:
         """As in the interface."""
         lower = np.array(self.origin)

@@ -49,6 +49,11 @@ class Cylinder(Shape):
         """3."""
         return 3
 
+    @property
+    def convex(self) -> bool:
+        """True."""
+        return True
+
     def bounds(self) -> tuple[Array, Array]:
         """As in the interface."""
         across = np.full(3, self.radius)

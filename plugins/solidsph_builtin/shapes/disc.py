@@ -31,6 +31,11 @@ class Disc(Shape):
         """2."""
         return 2
 
+    @property
+    def convex(self) -> bool:
+        """True."""
+        return True
+
     def bounds(self) -> tuple[Array, Array]:
         """As in the interface."""
         centre = np.array(self.centre)

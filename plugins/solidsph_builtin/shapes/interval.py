@@ -28,6 +28,11 @@ class Interval(Shape):
         """1."""
         return 1
 
+    @property
+    def convex(self) -> bool:
+        """True."""
+        return True
+
     def bounds(self) -> tuple[Array, Array]:
         """As in the interface."""
         return np.array([self.origin]), np.array([self.origin + self.length])

@@ -56,6 +56,14 @@ class Polygon(Shape):
         """2."""
         return 2
 
+    @property
+    def convex(self) -> bool:
+        """Whether it turns the same way at every vertex."""
+        starts, ends = self._edges()
+        edges = ends - starts
+        turns = _cross(edges, np.roll(edges, -1, axis=0)) * self._signed_area()
+        return bool(np.all(turns >= 0.0))
+
     def bounds(self) -> tuple[Array, Array]:
         """As in the interface."""
         vertices = np.array(self.vertices)

@@ -106,7 +106,7 @@ class _FollowedBody:
     def operators(self, displacements: Array) -> Operators:
         body, particles = self.body, self.body.particles
         positions = particles.positions + displacements
-        pairs = neighbour_pairs(positions, body.smoothing.support_radius)
+        pairs = neighbour_pairs(positions, body.smoothing.support_radius, body.hidden)
         # The volume follows the crowding of particles, relative to that of the reference
         # configuration, so that the deficit at a surface cancels.
         return operators(body, pairs, self.reference_sums / kernel_sums(body, pairs))

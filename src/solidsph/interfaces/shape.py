@@ -38,8 +38,17 @@ class Shape(ABC):
     def signed_distance(self, points: Array) -> Array:
         """Distance to the boundary of each of `points` (n, d), negative inside, (n,) [m].
 
-        Exact in sign everywhere, and in value near the boundary away from corners.
+        Exact in sign everywhere, and in value near the boundary away from corners; elsewhere no
+        more than the distance, so that a point is inside as far around as its depth.
         """
+
+    @property
+    def convex(self) -> bool:
+        """Whether every straight line between two points of the shape stays inside it.
+
+        Where it does, no lines between neighbours need be followed. False if not known.
+        """
+        return False
 
     @abstractmethod
     def surface(self, spacing: float) -> Surface:

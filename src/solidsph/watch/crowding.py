@@ -79,6 +79,8 @@ def _nearest(body: Body) -> tuple[Indices, Indices, Array]:
             _NEAR * float(particles.spacings.max()), output_type="ndarray"
         )
         pairs = pairs[~particles.ghosts[pairs].any(axis=1)]
+        if body.hidden is not None:
+            pairs = pairs[~body.hidden.between(pairs[:, 0], pairs[:, 1])]
         a, b = (
             np.ascontiguousarray(one) for one in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].T
         )

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from solidsph.arrays import Array, Indices, Mask
+from solidsph.neighbours import Hidden
 
 # The list holds pairs up to this much beyond the support radius. A wider margin lasts longer, but
 # in 3D a step tests a third more pairs than there are already.
@@ -61,6 +62,7 @@ class NeighbourSearch:
     """
 
     radius: float  # [m]
+    hidden: Hidden | None = None  # near particles that are no neighbours
     _made_at: Array = attrs.field(init=False)  # (n, d) positions of the list
     _list: Near = attrs.field(init=False)  # pairs up to the margin beyond the radius
     _found: Near = attrs.field(init=False)
@@ -93,6 +95,11 @@ class NeighbourSearch:
         n = len(positions)
         self._made_at = positions.copy()
         starts, columns = candidates(positions, (1.0 + _MARGIN) * self.radius)
+        if self.hidden is not None:
+            rows = np.repeat(np.arange(n), np.diff(starts))
+            seen = ~self.hidden.between(rows, columns)
+            starts = np.concatenate([[0], np.cumsum(seen)])[starts]
+            columns = columns[seen]
         self._list = Near(starts, columns, np.empty(0))  # distances are asked for when they count
         most = len(columns) + 1  # the loop writes a pair before it knows whether it counts
         if len(self._found.starts) != n + 1 or len(self._found.columns) < most:

@@ -22,7 +22,7 @@ def weighted_chunks(body: Body, wanted: Mask) -> Iterator[tuple[Pairs, Array]]:
     positions, cells = body.particles.positions, body.particles.cells
     tree = cKDTree(positions)
     for rows in _chunks(wanted):
-        pairs = _pairs_of(tree, positions, rows, body.smoothing.support_radius)
+        pairs = _pairs_of(tree, body, rows)
         kernel_gradients = body.smoothing.gradient(pairs.offsets, pairs.distances)
         yield pairs, body.formulation.gradient.weights(pairs, kernel_gradients, cells)
 
@@ -35,11 +35,15 @@ def _chunks(wanted: Mask) -> Iterator[slice]:
             yield slice(first, min(first + _ROWS_AT_ONCE, end))
 
 
-def _pairs_of(tree: cKDTree, positions: Array, rows: slice, radius: float) -> Pairs:
+def _pairs_of(tree: cKDTree, body: Body, rows: slice) -> Pairs:
+    positions, radius = body.particles.positions, body.smoothing.support_radius
     n, k = len(positions), rows.stop - rows.start
     found = cKDTree(positions[rows]).sparse_distance_matrix(tree, radius, output_type="ndarray")
     keys = np.sort(found["i"] * n + found["j"])
     own, columns = np.divmod(keys, n)
+    if body.hidden is not None:
+        seen = ~body.hidden.between(own + rows.start, columns)
+        own, columns = own[seen], columns[seen]
     offsets = positions[columns] - positions[own + rows.start]
     return Pairs(
         starts=np.searchsorted(own, np.arange(k + 1)).astype(np.intp),

@@ -150,7 +150,7 @@ def moving_body(body: Body, law: Any) -> MovingBody:
     return MovingBody(
         body=body,
         law=_law_loop(body.particles.dimension, law),
-        search=NeighbourSearch(body.smoothing.support_radius),
+        search=NeighbourSearch(body.smoothing.support_radius, body.hidden),
         kernel=kernel_pass(body.smoothing),
         sums=sums,
     )
