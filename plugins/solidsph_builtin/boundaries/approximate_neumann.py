@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import ClassVar, final
 
 import attrs
 import numpy as np
@@ -20,7 +20,6 @@ from solidsph_builtin.boundaries._dirichlet import factorised
 from solidsph_builtin.boundaries._images import interpolation
 from solidsph_builtin.boundaries._reports import COMPONENTS
 from solidsph_builtin.boundaries.ghost_extension import chosen_ghosts
-from solidsph_builtin.boundaries.traction import surface_at
 
 
 @final
@@ -35,7 +34,9 @@ class ApproximateNeumann(BoundaryHandler):
     must move by another handler, such as `ghost-extension`.
     """
 
-    where: Where  # a face such as "left", or any condition that matches surface particles
+    loads_surface: ClassVar[bool] = True
+
+    where: Where  # a face such as "left", or a condition on the surface
     traction: Mapping[str, Component]  # such as {x = 0, y = "-1e5"} [Pa]
     ghosts: Where = "ghosts"  # those whose stress may change with it
 
@@ -43,7 +44,7 @@ class ApproximateNeumann(BoundaryHandler):
         particles = setting.particles
         field = VectorField.of(self.traction, "approximate-neumann: traction")
         field.check_dimension(particles.dimension, "approximate-neumann")
-        face = surface_at(setting, self.where, "approximate-neumann")
+        face = setting.surface(self.where)
         boundary, area_vectors = face.particles, face.area_vectors
         ghosts = chosen_ghosts(setting, self.ghosts, "approximate-neumann")
         normals = area_vectors / np.linalg.norm(area_vectors, axis=1)[:, None]

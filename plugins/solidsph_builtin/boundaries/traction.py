@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import ClassVar, final
 
 import attrs
 import numpy as np
 
 from solidsph.arrays import Array, Indices
-from solidsph.errors import SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.condition import Condition, Observation, SurfaceLoad
 from solidsph.interfaces.declared import ScheduledForce
@@ -32,14 +31,16 @@ class Traction(BoundaryHandler):
     up to twice, or half, the stress that it asks for, though the mean strain is right.
     """
 
-    where: Where  # a face such as "right", or any condition that matches surface particles
+    loads_surface: ClassVar[bool] = True
+
+    where: Where  # a face such as "right", or a condition on the surface
     traction: Mapping[str, Component]  # such as {x = "5e6*min(t/1e-3, 1)"} [Pa]
 
     def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
         particles = setting.particles
         field = VectorField.of(self.traction, "traction: traction")
         field.check_dimension(particles.dimension, "traction")
-        face = surface_at(setting, self.where, "traction")
+        face = setting.surface(self.where)
         indices = face.particles
         for axis in field.components:
             field.values(axis, particles.positions[indices], 0.0)
@@ -52,24 +53,6 @@ class Traction(BoundaryHandler):
                 field=field,
             )
         ]
-
-
-def surface_at(setting: Setting, where: Where, handler: str) -> Face:
-    """The surface that particles at `where` own: of the face of that name, or of all faces."""
-    particles = setting.particles
-    if isinstance(where, str) and where in particles.faces:
-        return particles.faces[where]
-    areas = np.zeros(particles.count)
-    for face in particles.faces.values():
-        np.add.at(areas, face.particles, face.areas)
-    chosen = setting.select(where)
-    chosen = chosen[areas[chosen] > 0.0]
-    if not len(chosen):
-        raise SceneError(
-            f"{handler}: no particle at where = {where!r} lies on the surface; name a face: "
-            f"{', '.join(particles.faces)}"
-        )
-    return Face(chosen, particles.area_vectors[chosen], areas[chosen])
 
 
 @final
