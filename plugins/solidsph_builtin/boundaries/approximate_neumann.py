@@ -18,7 +18,7 @@ from solidsph.setting import Setting
 from solidsph.where import Where
 from solidsph_builtin.boundaries._dirichlet import factorised
 from solidsph_builtin.boundaries._images import interpolation
-from solidsph_builtin.boundaries._reports import COMPONENTS
+from solidsph_builtin.boundaries._reports import COMPONENTS, asked_resultant
 from solidsph_builtin.boundaries.ghost_extension import chosen_ghosts
 
 
@@ -59,6 +59,7 @@ class ApproximateNeumann(BoundaryHandler):
                 boundary=boundary,
                 ghosts=ghosts,
                 normals=normals,
+                areas=face.areas,
                 field=field,
                 smoothing=smoothing,
                 rows=rows,
@@ -78,6 +79,7 @@ class SmoothedTraction(StressCondition):
     boundary: Indices  # (b,)
     ghosts: Indices  # (g,)
     normals: Array  # (b, d)
+    areas: Array  # (b,) [m^(d-1)]
     field: VectorField
     smoothing: csr_array  # (b, n) rows of W
     rows: csr_array  # (b, b + g) its columns of boundary and ghosts
@@ -119,4 +121,8 @@ class SmoothedTraction(StressCondition):
                 np.mean(self._traction(stress, axis))
             )
             columns[f"{self.label} unset {name} [Pa]"] = float(np.mean(unset))
-        return columns
+        asked = np.zeros(X.shape)
+        for axis in self.field.components:
+            asked[:, axis] = self.field.values(axis, X, time) * self.areas
+        positions = observation.state.positions[self.boundary]
+        return columns | asked_resultant(self.label, positions, asked)

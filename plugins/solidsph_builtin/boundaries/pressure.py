@@ -18,6 +18,7 @@ from solidsph.particles import Face
 from solidsph.setting import Setting
 from solidsph.tensors import cofactor, components_first, particles_first
 from solidsph.where import Where
+from solidsph_builtin.boundaries._reports import asked_resultant
 from solidsph_builtin.effects._gradients import body_gradient, in_the_reference
 
 
@@ -128,5 +129,5 @@ class FollowerLoad(SurfaceLoad):
         against = -float(np.sum(traction * areas / size[:, None]))
         return {
             f"{self.label} asked [Pa]": float(p @ size / size.sum()),
-            f"{self.label} achieved [Pa]": against / float(size.sum()),
-        }
+            f"{self.label} particle stress [Pa]": against / float(size.sum()),
+        } | asked_resultant(self.label, state.positions[self.particles], -p[:, None] * areas)

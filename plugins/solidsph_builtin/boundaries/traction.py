@@ -16,7 +16,7 @@ from solidsph.motion import Component, VectorField, scheduled_forces
 from solidsph.particles import Face
 from solidsph.setting import Setting
 from solidsph.where import Where
-from solidsph_builtin.boundaries._reports import COMPONENTS
+from solidsph_builtin.boundaries._reports import COMPONENTS, asked_resultant
 
 
 @final
@@ -25,10 +25,11 @@ class Traction(BoundaryHandler):
     """Force per reference area on a face, fixed in direction (a dead load).
 
     The weak form's own natural condition: each particle receives traction times the area of the
-    surface that it owns, so the total force is that of the sampled area. Reported beside it is the
-    traction that the stress at those particles balances. That is a harder test: linear gradients
-    are one-sided there, and a dead load on a discrete surface leaves the outermost particles with
-    up to twice, or half, the stress that it asks for, though the mean strain is right.
+    surface that it owns, so the total force is that of the sampled area, and nothing of it is lost.
+    It is reported as the mean traction asked, as its resultant and as its moment about the origin.
+    The particle stress beside them is the mean of P N at the loaded particles. These stand up to
+    half a spacing inside, where the stress is another one, and linear gradients are one-sided
+    there: it may be twice, or half, the traction asked, though the mean strain is right.
     """
 
     loads_surface: ClassVar[bool] = True
@@ -70,12 +71,14 @@ class DeadLoad(SurfaceLoad, ScheduledForce):
         return scheduled_forces(self.field, self.positions, self.face.areas, times)
 
     def report(self, observation: Observation) -> Mapping[str, float]:
-        total_area = self.face.areas.sum()
-        asked = observation.state.applied[self.label].sum(axis=0) / total_area
+        state, total_area = observation.state, self.face.areas.sum()
         P = observation.stresses[self.particles]
-        achieved = np.einsum("pij,pj->i", P, self.face.area_vectors) / total_area
+        forces = state.applied[self.label][self.particles]
+        asked = forces.sum(axis=0) / total_area
+        inside = np.einsum("pij,pj->i", P, self.face.area_vectors) / total_area
         columns: dict[str, float] = {}
         for k, name in enumerate(COMPONENTS[: len(asked)]):
             columns[f"{self.label} asked {name} [Pa]"] = float(asked[k])
-            columns[f"{self.label} achieved {name} [Pa]"] = float(achieved[k])
-        return columns
+            columns[f"{self.label} particle stress {name} [Pa]"] = float(inside[k])
+        x = state.positions[self.particles]
+        return columns | asked_resultant(self.label, x, forces)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from solidsph.advice.advice import Advice
 from solidsph.advice.seen import Seen
@@ -17,13 +18,17 @@ from solidsph.where import AXES, Where, names_used
 
 _SHOWN = 6  # faces of one load
 
+# Cosine from the normal, and distance over that of particles of two bodies that touch, within which
+# a particle of another body covers a piece of surface.
+_AHEAD, _TOUCHING = 0.75, 1.5
+
 
 def several_faces(seen: Seen) -> Iterator[Advice]:
     """By the area that a load takes of each face.
 
-    A corner that is picked by coordinates owns some of every face that meets there, and a face of
-    one name may be there on several bodies. Where the condition consists of names alone, such as
-    "not left" or "surface", whole faces are meant.
+    A corner that is picked by coordinates owns some of every face that meets there. Where the
+    condition says "surface", or consists of names alone, such as "not left", all of it is meant. So
+    are the faces of one name on several bodies, unless one of them lies against another body.
     """
     pieces = Pieces.of(seen.simulation.particles)
     for entry in seen.scene.boundaries:
@@ -35,12 +40,13 @@ def several_faces(seen: Seen) -> Iterator[Advice]:
         chosen = pieces.at(where) & (pieces.areas > 0.0)
         loose = pieces.unnamed(where) & chosen
         shares = _shares(pieces, chosen)
-        if loose.any() and len(shares) > 1 and names & {*AXES}:
+        picked = names & {*AXES} and "surface" not in {name.split(".")[-1] for name in names}
+        if loose.any() and len(shares) > 1 and picked:
             why = (
                 "names no face" if loose.sum() == chosen.sum() else "names one face, and meets more"
             )
-        elif _in_several_bodies(pieces, chosen, names):
-            why = "names a face that several bodies have"
+        elif _in_several_bodies(pieces, chosen, names) and _covered(pieces, chosen):
+            why = "names a face that several bodies have, one of which lies against another"
         else:
             continue
         largest = sorted(shares, key=lambda face: -shares[face])
@@ -89,6 +95,27 @@ def _in_several_bodies(pieces: Pieces, chosen: Mask, names: frozenset[str]) -> b
         return False
     named = np.isin(pieces.faces, [pieces.names.index(f) for f in names if f in pieces.names])
     return bool(np.unique(pieces.bodies[chosen & named]).size > 1)
+
+
+def _covered(pieces: Pieces, chosen: Mask) -> bool:
+    """Whether some of the chosen surface faces a particle of another body that touches it."""
+    particles = pieces.particles
+    X, spacings = particles.positions, particles.spacings
+    numbers = np.flatnonzero(chosen)
+    for k, extent in enumerate(particles.bodies.values()):
+        own = numbers[pieces.bodies[numbers] == k]
+        others = ~particles.ghosts
+        others[extent] = False
+        if not len(own) or not others.any():
+            continue
+        owners, normals = pieces.owners[own], pieces.area_vectors[own]
+        gaps, near = cKDTree(X[others]).query(X[owners])
+        ahead = np.einsum("ki,ki->k", X[others][near] - X[owners], normals)
+        facing = ahead > _AHEAD * gaps * np.linalg.norm(normals, axis=1)
+        touching = gaps < _TOUCHING * 0.5 * (spacings[owners] + spacings[others][near])
+        if np.any(facing & touching):
+            return True
+    return False
 
 
 def _remedy(where: Where, faces: list[str], names: frozenset[str]) -> str:
