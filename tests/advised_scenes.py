@@ -19,6 +19,131 @@ class Flawed(NamedTuple):
 
 FLAWED = [
     Flawed(
+        "several-faces",
+        "where = 'top and (Y > 0.09)'",
+        f"""
+title = "a load on all particles of the upper row, those at its ends included"
+duration = 0.05
+material = {RUBBER}
+[body.block]
+shape = {{type = "box", lengths = [0.2, 0.1]}}
+spacing = 0.01
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[boundary]]
+type = "traction"
+where = "Y > 0.09"
+traction = {{x = "5e3*min(t/0.02, 1)"}}
+""",
+    ),
+    Flawed(
+        "several-faces",
+        "where = 'right and (corner)'",
+        f"""
+title = "a load on a corner that is a tag of coordinates"
+duration = 0.05
+material = {RUBBER}
+[body.block]
+shape = {{type = "box", lengths = [0.2, 0.1]}}
+spacing = 0.01
+tags = {{corner = "X > 0.19 and Y > 0.07"}}
+[[boundary]]
+type = "clamp"
+where = "left"
+[[boundary]]
+type = "pressure"
+where = "corner"
+pressure = "5e3*min(t/0.02, 1)"
+""",
+    ),
+    Flawed(
+        "several-faces",
+        "where = 'foot.right', or 'foot.right or head.right'",
+        f"""
+title = "a load on the right of two bodies, one of which is joined to the other there"
+duration = 0.05
+material = {RUBBER}
+[body.foot]
+shape = {{type = "box", lengths = [0.1, 0.1]}}
+spacing = 0.01
+[body.head]
+shape = {{type = "box", lengths = [0.1, 0.1], origin = [0.1, 0.0]}}
+spacing = 0.01
+[[effect]]
+type = "joint"
+[[boundary]]
+type = "clamp"
+where = "foot.left"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {{y = "5e3*min(t/0.02, 1)"}}
+""",
+    ),
+    Flawed(
+        "few-across",
+        "spacing = 0.01",
+        f"""
+title = "a sharp corner, and a web far thinner than the body beside it"
+duration = 0.01
+material = {RUBBER}
+[body.sheet]
+spacing = 0.02
+shape = {{type = "polygon", vertices = [[0, 0], [1, 0], [1, 0.4], [1.5, 0.4], [1.5, 0],
+  [2.5, 1.0], [1.5, 1.0], [1.5, 0.45], [1, 0.45], [1, 1], [0, 1]]}}
+[[boundary]]
+type = "clamp"
+where = "edge-10"
+[[boundary]]
+type = "traction"
+where = "edge-5"
+traction = {{y = "1e3*min(t/0.008, 1)"}}
+""",
+    ),
+    Flawed(
+        "few-across",
+        "gradient = 'quadratic'",
+        f"""
+title = "a neck between two notches, nowhere parallel"
+duration = 0.01
+material = {RUBBER}
+[body.sheet]
+spacing = 0.025
+[body.sheet.shape]
+type = "difference"
+of = {{type = "box", lengths = [2.0, 1.0]}}
+minus = [{{type = "polygon", vertices = [[0.55, 1.1], [1.45, 1.1], [1.0, 0.55]]}},
+  {{type = "polygon", vertices = [[0.55, -0.1], [1.45, -0.1], [1.0, 0.45]]}}]
+[[boundary]]
+type = "clamp"
+where = "left"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {{x = "1e3*min(t/0.008, 1)"}}
+""",
+    ),
+    Flawed(
+        "units",
+        "density is in kg/m^3",
+        """
+title = "a block that sags under its weight, its density in g/cm^3"
+duration = 1.0
+statics = {}
+material = {type = "neo-hookean", youngs_modulus = 2e6, poissons_ratio = 0.3, density = 1.1}
+[body.block]
+shape = {type = "box", lengths = [0.3, 0.2]}
+spacing = 0.02
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[effect]]
+type = "body-force"
+acceleration = {y = -9.81}
+""",
+    ),
+    Flawed(
         "few-across",
         "gradient = 'quadratic', which needs 3",
         f"""
@@ -562,6 +687,94 @@ acceleration = {{y = -9.81}}
 ]
 
 SOUND = [
+    """
+title = "Cook's membrane at rest, of no unit: sharp corners, and 16 at its narrow end"
+duration = 1.0
+statics = {}
+material = {type = "neo-hookean", youngs_modulus = 1.0, poissons_ratio = 0.3, density = 1.0}
+[body.membrane]
+shape = {type = "polygon", vertices = [[0, 0], [48, 44], [48, 60], [0, 44]]}
+spacing = 2.0
+[[boundary]]
+type = "clamp"
+where = "edge-3"
+[[boundary]]
+type = "traction"
+where = "edge-1"
+traction = {y = 1e-3}
+""",
+    f"""
+title = "a sheet with corners of 20 degrees, 0.34 wide"
+duration = 0.01
+formulation = {{type = "total-lagrangian", gradient = "quadratic"}}
+material = {RUBBER}
+[body.sheet]
+shape = {{type = "polygon", vertices = [[0, 0], [2, 0], [3, 0.364], [1, 0.364]]}}
+spacing = 0.05
+[[boundary]]
+type = "clamp"
+where = "edge-3"
+[[boundary]]
+type = "traction"
+where = "edge-1"
+traction = {{x = "1e3*min(t/0.008, 1)"}}
+""",
+    f"""
+title = "two blocks made one, whose seam is no surface"
+duration = 0.05
+material = {RUBBER}
+[body.block]
+spacing = 0.02
+shape = {{type = "union", of = [{{type = "box", lengths = [0.4, 0.08]}},
+  {{type = "box", lengths = [0.4, 0.08], origin = [0.0, 0.08]}}]}}
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[boundary]]
+type = "traction"
+where = "top"
+traction = {{x = "5e3*min(t/0.02, 1)"}}
+""",
+    f"""
+title = "a quarter of a sheet, pulled: planes of symmetry with ghosts hold it"
+duration = 1.0
+statics = {{}}
+material = {RUBBER}
+[body.quarter]
+shape = {{type = "box", lengths = [0.2, 0.2]}}
+spacing = 0.02
+discretisation = {{type = "lattice", ghosts = 4, ghost_faces = ["left", "bottom"]}}
+[[boundary]]
+type = "symmetry"
+axis = "x"
+[[boundary]]
+type = "symmetry"
+axis = "y"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {{x = 1e4}}
+""",
+    f"""
+title = "a load on part of one face of two bodies that are joined"
+duration = 0.05
+material = {RUBBER}
+[body.foot]
+shape = {{type = "box", lengths = [0.1, 0.1]}}
+spacing = 0.01
+[body.head-1]
+shape = {{type = "box", lengths = [0.1, 0.1], origin = [0.1, 0.0]}}
+spacing = 0.01
+[[effect]]
+type = "joint"
+[[boundary]]
+type = "clamp"
+where = "foot.left"
+[[boundary]]
+type = "traction"
+where = "head-1.right and Y > 0.05"
+traction = {{y = "5e3*min(t/0.02, 1)"}}
+""",
     f"""
 title = "a beam that sags and swings, fine enough"
 duration = 2.0

@@ -208,7 +208,7 @@ def test_reaction_balances_the_load(d: int) -> None:
     # gradients read about half of the load, while one spacing further in it is 4 % off.
     face = simulation.particles.faces["right"].particles
     own = observation.stresses[face, 0, 0].mean()
-    assert report["pull achieved x [Pa]"] == pytest.approx(own, rel=1e-12)
+    assert report["pull particle stress x [Pa]"] == pytest.approx(own, rel=1e-12)
     assert 0.5e4 < own < 1e4
 
 

@@ -46,7 +46,7 @@ from solidsph.simulation import Simulation
 from solidsph.smoothing import smoothing_kernel
 from solidsph.step_size import largest_step
 from solidsph.visibility import hidden_pairs
-from solidsph.where import EVERYWHERE, select
+from solidsph.where import EVERYWHERE, Where, select
 
 # No run of more steps ends; a scene that asks for them has its units wrong.
 _MOST_STEPS = 1e10
@@ -267,19 +267,23 @@ class Assembly:
     def _tagged(self, particles: Particles) -> Particles:
         """Particles with the tags that the scene adds to its bodies."""
         tags = dict(particles.tags)
+        conditions: dict[str, list[tuple[slice, Where]]] = {}
+        taken = compatibility.Names(particles.tags)
         for name, body in self._scene.bodies.items():
             extent = particles.bodies[name]
             for tag, where in body.tags.items():
-                wrong = compatibility.name_problem(tag, particles.tags)
+                wrong = "" if tag in conditions else taken.problem(tag)
                 if wrong:
                     self._problems.add([f"body {name!r}: tag {tag!r} {wrong}"])
                     continue
+                taken.add(tag)
                 chosen = self._problems.attempt(select, particles, where)
                 if chosen is not None:
                     mask = tags.get(tag, np.zeros(particles.count, dtype=np.bool_)).copy()
                     mask[chosen[(chosen >= extent.start) & (chosen < extent.stop)]] = True
                     tags[tag] = mask
-        return attrs.evolve(particles, tags=tags)
+                    conditions.setdefault(tag, []).append((extent, where))
+        return attrs.evolve(particles, tags=tags, conditions=conditions)
 
     def _bound(
         self,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from keyword import iskeyword
 from math import ceil, isfinite, sqrt
 
 import attrs
@@ -25,7 +26,7 @@ from solidsph.interfaces.shape import Shape
 from solidsph.overlap import overlap
 from solidsph.particles import Particles
 from solidsph.scene import Scene
-from solidsph.where import AXES, EVERYWHERE
+from solidsph.where import AXES, EVERYWHERE, variable
 
 # Bodies that overlap by less, in spacings, merely touch: their shapes are drawn no more exactly.
 _TOUCHING = 0.05
@@ -123,23 +124,50 @@ def effects(named: Mapping[str, Effect]) -> Iterator[str]:
 
 
 def names(bodies: Mapping[str, Particles]) -> Iterator[str]:
-    """No body is called like a tag of its or another's particles, or like a variable."""
-    taken = {tag for particles in bodies.values() for tag in particles.tags}
+    """No two names of bodies, tags and faces that a condition could not tell apart."""
+    taken = Names(())
+    for tag in dict.fromkeys(tag for one in bodies.values() for tag in (*one.tags, *one.faces)):
+        if taken.like(tag):
+            yield f"the face or tag {tag!r} {taken.problem(tag)}"
+        taken.add(tag)
     for name in bodies:
-        wrong = name_problem(name, taken)
+        wrong = taken.problem(name)
         if wrong:
             yield f"body {name!r}: its name {wrong}"
+        taken.add(name)
 
 
-def name_problem(name: str, taken: Collection[str]) -> str:
-    """What is wrong with `name` for a body or a tag, with the remedy; nothing if it is right."""
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
-        return "must begin with a letter and go on in letters, digits, '-' and '_'; change it"
-    if name in taken or name == EVERYWHERE:
-        return "names a set of particles already; choose another"
-    if name in (*AXES, "t", "pi", "e"):
-        return "is a variable or constant of formulas; choose another"
-    return ""
+class Names:
+    """Names of sets of particles, as conditions write them."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._by_variable = {variable(name): name for name in (EVERYWHERE, *names)}
+
+    def add(self, name: str) -> None:
+        """Take `name`, if it is free."""
+        self._by_variable.setdefault(variable(name), name)
+
+    def like(self, name: str) -> str:
+        """The name taken that a condition writes like this one; empty if there is none."""
+        return self._by_variable.get(variable(name), "")
+
+    def problem(self, name: str) -> str:
+        """What is wrong with `name` for a body or a tag, with the remedy; empty if it is right."""
+        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
+            return "must begin with a letter and go on in letters, digits, '-' and '_'; change it"
+        if variable(name) in (*AXES, "t", "pi", "e"):
+            return "is a variable or constant of formulas; choose another"
+        if iskeyword(variable(name)):
+            return "is a word of Python, so no condition could name it; choose another"
+        like = self.like(name)
+        if like == name:
+            return "names a set of particles already; choose another"
+        if like:
+            return (
+                f"cannot be told from {like!r} in a condition, where both are written "
+                f"{variable(name)!r}; choose another"
+            )
+        return ""
 
 
 def dimensions(shapes: Mapping[str, Shape], cover: float) -> Iterator[str]:

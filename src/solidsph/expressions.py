@@ -130,6 +130,8 @@ def _check(node: ast.AST, text: str, variables: tuple[str, ...]) -> None:
                 near = difflib.get_close_matches(name, known, 1)
                 hint = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(known)}"
                 raise SceneError(f"formula {text!r}: unknown name {name!r}{hint}")
+        case ast.Attribute() if ast.unparse(node) in variables:  # a tag of one body: "two.left"
+            return
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
             _check(left, text, variables)
             _check(right, text, variables)
@@ -162,6 +164,8 @@ def _evaluate(node: ast.AST, values: Mapping[str, Any]) -> Any:
             return np.float64(number)  # type: ignore[arg-type]
         case ast.Name(id=name):
             return values[name]
+        case ast.Attribute():
+            return values[ast.unparse(node)]
         case ast.BinOp(left=left, op=op, right=right):
             return _OPERATORS[type(op)](_evaluate(left, values), _evaluate(right, values))
         case ast.UnaryOp(op=op, operand=operand):

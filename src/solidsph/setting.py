@@ -9,8 +9,10 @@ from scipy.sparse import block_diag, csr_array
 
 from solidsph.arrays import Array, Indices
 from solidsph.body import Body
-from solidsph.particles import Particles
-from solidsph.where import Where, select
+from solidsph.errors import SceneError
+from solidsph.particles import Face, Particles
+from solidsph.surface import Pieces
+from solidsph.where import Where, described, select
 
 
 @attrs.frozen(eq=False)
@@ -29,6 +31,23 @@ class Setting:
             SceneError: no particle is there, or `where` cannot be understood.
         """
         return select(self.particles, where)
+
+    def surface(self, where: Where) -> Face:
+        """The surface at `where`: of the faces that it names, or all that its particles own.
+
+        Raises:
+            SceneError: no surface is there, or `where` cannot be understood.
+        """
+        pieces = Pieces.of(self.particles)
+        chosen = pieces.at(where) & (pieces.areas > 0.0)
+        if not chosen.any():
+            self.select(where)  # which says so where there is no particle either
+            raise SceneError(
+                f"no particle at {described(where)} lies on the surface; name a face: "
+                f"{', '.join(pieces.names) or 'there is none'} ('or' joins two of them; no surface "
+                "is on both)"
+            )
+        return pieces.owned(chosen)
 
     def smoothing_matrix(self) -> csr_array:
         """W of the paper's eq. 8, sparse: its product with values gives their approximation."""

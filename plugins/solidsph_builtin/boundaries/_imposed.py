@@ -14,6 +14,8 @@ from solidsph.interfaces.declared import ScheduledMotion
 from solidsph.motion import VectorField
 from solidsph.particles import Face
 from solidsph.setting import Setting
+from solidsph.surface import Pieces
+from solidsph.where import Where
 from solidsph_builtin.boundaries._reports import reaction, stress_reaction
 
 
@@ -54,9 +56,9 @@ class ImposedMotion(ScheduledMotion):
 
 
 def imposed_motion(
-    setting: Setting, label: str, indices: Indices, field: VectorField
+    setting: Setting, label: str, indices: Indices, field: VectorField, where: Where | None = None
 ) -> ImposedMotion:
-    """Impose `field` on the particles `indices` of a setting."""
+    """Impose `field` on the particles `indices` of a setting, which are those at `where`."""
     particles = setting.particles
     by_stress = any(
         body.formulation.divergence.uses_ghost_stress and body.particles.ghosts.any()
@@ -68,5 +70,13 @@ def imposed_motion(
         positions=particles.positions,
         field=field,
         step_size=setting.step_size,
-        stressed_face=Face(indices, particles.area_vectors[indices]) if by_stress else None,
+        stressed_face=_surface(setting, indices, where) if by_stress else None,
     )
+
+
+def _surface(setting: Setting, indices: Indices, where: Where | None) -> Face:
+    """The surface at `where`, or all that the particles `indices` own."""
+    if where is None:
+        return Face(indices, setting.particles.area_vectors[indices])
+    pieces = Pieces.of(setting.particles)
+    return pieces.owned(pieces.at(where))

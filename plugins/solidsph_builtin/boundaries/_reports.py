@@ -1,9 +1,10 @@
-"""What boundary conditions report: total forces, component by component."""
+"""What boundary conditions report: total forces and moments, component by component."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from solidsph.arrays import Array
 from solidsph.interfaces.condition import Observation
 from solidsph.particles import Face
 
@@ -11,22 +12,46 @@ COMPONENTS = ("x", "y", "z")
 
 
 def stress_reaction(observation: Observation, label: str, face: Face) -> dict[str, float]:
-    """Total force through `face` by the stress of its particles [N].
+    """Resultant through `face` by the stress of its particles.
 
     Where ghosts carry the stress on beyond a held surface, as in the paper's form, no force is
     missing at its particles, and what holds them shows in the stress alone.
     """
-    through = np.einsum("pij,pj->i", observation.stresses[face.particles], face.area_vectors)
-    return {
-        f"{label} reaction {name} [N]": float(value)
-        for name, value in zip(COMPONENTS, through, strict=False)
-    }
+    through = np.einsum("pij,pj->pi", observation.stresses[face.particles], face.area_vectors)
+    return resultant(
+        f"{label} reaction",
+        f"{label} reaction moment",
+        observation.state.positions[face.particles],
+        through,
+    )
 
 
 def reaction(observation: Observation, label: str) -> dict[str, float]:
-    """Total force that the account `label` exerts on the body [N]."""
-    applied = observation.state.applied[label].sum(axis=0)
-    return {
-        f"{label} reaction {name} [N]": float(value)
-        for name, value in zip(COMPONENTS, applied, strict=False)
+    """Resultant of what the account `label` exerts on the body."""
+    state = observation.state
+    return resultant(
+        f"{label} reaction", f"{label} reaction moment", state.positions, state.applied[label]
+    )
+
+
+def asked_resultant(label: str, positions: Array, forces: Array) -> dict[str, float]:
+    """Resultant of a load, beside the traction that it asks for."""
+    return resultant(f"{label} asked resultant", f"{label} asked moment", positions, forces)
+
+
+def resultant(force: str, moment: str, positions: Array, forces: Array) -> dict[str, float]:
+    """Total of `forces` (k, d) [N], and their moment about the origin x = y = z = 0 [N m].
+
+    The moment is that of the forces where they act now, at `positions` (k, d) [m]. About a point c
+    it is less by c x R, with R the total force. In two dimensions there is the one about z, in one
+    dimension none.
+    """
+    d = forces.shape[1]
+    columns = {
+        f"{force} {COMPONENTS[k]} [N]": float(total) for k, total in enumerate(forces.sum(axis=0))
     }
+    for axis in {1: (), 2: (2,), 3: (0, 1, 2)}[d]:
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        about = positions[:, i] @ forces[:, j] - positions[:, j] @ forces[:, i]
+        columns[f"{moment} {COMPONENTS[axis]} [N m]"] = float(about)
+    return columns

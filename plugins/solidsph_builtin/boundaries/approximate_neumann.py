@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import ClassVar, final
 
 import attrs
 import numpy as np
@@ -18,9 +18,8 @@ from solidsph.setting import Setting
 from solidsph.where import Where
 from solidsph_builtin.boundaries._dirichlet import factorised
 from solidsph_builtin.boundaries._images import interpolation
-from solidsph_builtin.boundaries._reports import COMPONENTS
+from solidsph_builtin.boundaries._reports import COMPONENTS, asked_resultant
 from solidsph_builtin.boundaries.ghost_extension import chosen_ghosts
-from solidsph_builtin.boundaries.traction import surface_at
 
 
 @final
@@ -35,7 +34,9 @@ class ApproximateNeumann(BoundaryHandler):
     must move by another handler, such as `ghost-extension`.
     """
 
-    where: Where  # a face such as "left", or any condition that matches surface particles
+    loads_surface: ClassVar[bool] = True
+
+    where: Where  # a face such as "left", or a condition on the surface
     traction: Mapping[str, Component]  # such as {x = 0, y = "-1e5"} [Pa]
     ghosts: Where = "ghosts"  # those whose stress may change with it
 
@@ -43,7 +44,7 @@ class ApproximateNeumann(BoundaryHandler):
         particles = setting.particles
         field = VectorField.of(self.traction, "approximate-neumann: traction")
         field.check_dimension(particles.dimension, "approximate-neumann")
-        face = surface_at(setting, self.where, "approximate-neumann")
+        face = setting.surface(self.where)
         boundary, area_vectors = face.particles, face.area_vectors
         ghosts = chosen_ghosts(setting, self.ghosts, "approximate-neumann")
         normals = area_vectors / np.linalg.norm(area_vectors, axis=1)[:, None]
@@ -58,6 +59,7 @@ class ApproximateNeumann(BoundaryHandler):
                 boundary=boundary,
                 ghosts=ghosts,
                 normals=normals,
+                areas=face.areas,
                 field=field,
                 smoothing=smoothing,
                 rows=rows,
@@ -77,6 +79,7 @@ class SmoothedTraction(StressCondition):
     boundary: Indices  # (b,)
     ghosts: Indices  # (g,)
     normals: Array  # (b, d)
+    areas: Array  # (b,) [m^(d-1)]
     field: VectorField
     smoothing: csr_array  # (b, n) rows of W
     rows: csr_array  # (b, b + g) its columns of boundary and ghosts
@@ -118,4 +121,8 @@ class SmoothedTraction(StressCondition):
                 np.mean(self._traction(stress, axis))
             )
             columns[f"{self.label} unset {name} [Pa]"] = float(np.mean(unset))
-        return columns
+        asked = np.zeros(X.shape)
+        for axis in self.field.components:
+            asked[:, axis] = self.field.values(axis, X, time) * self.areas
+        positions = observation.state.positions[self.boundary]
+        return columns | asked_resultant(self.label, positions, asked)

@@ -37,4 +37,5 @@ class Clamp(BoundaryHandler):
             if name not in names:
                 raise SceneError(f"clamp: unknown axis {name!r}; this scene has {', '.join(names)}")
         field = VectorField({names.index(name): 0.0 for name in axes})
-        return [imposed_motion(setting, label, setting.select(self.where), field)]
+        indices = setting.select(self.where)
+        return [imposed_motion(setting, label, indices, field, self.where)]

@@ -33,4 +33,4 @@ class PrescribedMotion(BoundaryHandler):
         indices = setting.select(self.where)
         for axis in field.components:  # a formula out of its domain shows now, not in mid-run
             field.values(axis, setting.particles.positions[indices], 0.0)
-        return [imposed_motion(setting, label, indices, field)]
+        return [imposed_motion(setting, label, indices, field, self.where)]

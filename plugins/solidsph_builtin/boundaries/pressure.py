@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import final
+from typing import ClassVar, final
 
 import attrs
 import numpy as np
@@ -18,7 +18,7 @@ from solidsph.particles import Face
 from solidsph.setting import Setting
 from solidsph.tensors import cofactor, components_first, particles_first
 from solidsph.where import Where
-from solidsph_builtin.boundaries.traction import surface_at
+from solidsph_builtin.boundaries._reports import asked_resultant
 from solidsph_builtin.effects._gradients import body_gradient, in_the_reference
 
 
@@ -32,14 +32,16 @@ class Pressure(BoundaryHandler):
     pressure has no dead direction, and in general no energy.
     """
 
-    where: Where  # a face such as "inner", or any condition that matches surface particles
+    loads_surface: ClassVar[bool] = True
+
+    where: Where  # a face such as "inner", or a condition on the surface
     pressure: Component  # p such as "5e6*min(t/1e-3, 1)", positive when it pushes [Pa]
 
     def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
         particles = setting.particles
         in_the_reference(setting, "pressure")
         field = VectorField.of({"x": self.pressure}, "pressure: pressure")
-        face = surface_at(setting, self.where, "pressure")
+        face = setting.surface(self.where)
         field.values(0, particles.positions[face.particles], 0.0)
         return [
             FollowerLoad(
@@ -127,5 +129,5 @@ class FollowerLoad(SurfaceLoad):
         against = -float(np.sum(traction * areas / size[:, None]))
         return {
             f"{self.label} asked [Pa]": float(p @ size / size.sum()),
-            f"{self.label} achieved [Pa]": against / float(size.sum()),
-        }
+            f"{self.label} particle stress [Pa]": against / float(size.sum()),
+        } | asked_resultant(self.label, state.positions[self.particles], -p[:, None] * areas)

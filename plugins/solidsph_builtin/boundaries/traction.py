@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import ClassVar, final
 
 import attrs
 import numpy as np
 
 from solidsph.arrays import Array, Indices
-from solidsph.errors import SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.condition import Condition, Observation, SurfaceLoad
 from solidsph.interfaces.declared import ScheduledForce
@@ -17,7 +16,7 @@ from solidsph.motion import Component, VectorField, scheduled_forces
 from solidsph.particles import Face
 from solidsph.setting import Setting
 from solidsph.where import Where
-from solidsph_builtin.boundaries._reports import COMPONENTS
+from solidsph_builtin.boundaries._reports import COMPONENTS, asked_resultant
 
 
 @final
@@ -26,20 +25,23 @@ class Traction(BoundaryHandler):
     """Force per reference area on a face, fixed in direction (a dead load).
 
     The weak form's own natural condition: each particle receives traction times the area of the
-    surface that it owns, so the total force is that of the sampled area. Reported beside it is the
-    traction that the stress at those particles balances. That is a harder test: linear gradients
-    are one-sided there, and a dead load on a discrete surface leaves the outermost particles with
-    up to twice, or half, the stress that it asks for, though the mean strain is right.
+    surface that it owns, so the total force is that of the sampled area, and nothing of it is lost.
+    It is reported as the mean traction asked, as its resultant and as its moment about the origin.
+    The particle stress beside them is the mean of P N at the loaded particles. These stand up to
+    half a spacing inside, where the stress is another one, and linear gradients are one-sided
+    there: it may be twice, or half, the traction asked, though the mean strain is right.
     """
 
-    where: Where  # a face such as "right", or any condition that matches surface particles
+    loads_surface: ClassVar[bool] = True
+
+    where: Where  # a face such as "right", or a condition on the surface
     traction: Mapping[str, Component]  # such as {x = "5e6*min(t/1e-3, 1)"} [Pa]
 
     def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
         particles = setting.particles
         field = VectorField.of(self.traction, "traction: traction")
         field.check_dimension(particles.dimension, "traction")
-        face = surface_at(setting, self.where, "traction")
+        face = setting.surface(self.where)
         indices = face.particles
         for axis in field.components:
             field.values(axis, particles.positions[indices], 0.0)
@@ -52,24 +54,6 @@ class Traction(BoundaryHandler):
                 field=field,
             )
         ]
-
-
-def surface_at(setting: Setting, where: Where, handler: str) -> Face:
-    """The surface that particles at `where` own: of the face of that name, or of all faces."""
-    particles = setting.particles
-    if isinstance(where, str) and where in particles.faces:
-        return particles.faces[where]
-    areas = np.zeros(particles.count)
-    for face in particles.faces.values():
-        np.add.at(areas, face.particles, face.areas)
-    chosen = setting.select(where)
-    chosen = chosen[areas[chosen] > 0.0]
-    if not len(chosen):
-        raise SceneError(
-            f"{handler}: no particle at where = {where!r} lies on the surface; name a face: "
-            f"{', '.join(particles.faces)}"
-        )
-    return Face(chosen, particles.area_vectors[chosen], areas[chosen])
 
 
 @final
@@ -87,12 +71,14 @@ class DeadLoad(SurfaceLoad, ScheduledForce):
         return scheduled_forces(self.field, self.positions, self.face.areas, times)
 
     def report(self, observation: Observation) -> Mapping[str, float]:
-        total_area = self.face.areas.sum()
-        asked = observation.state.applied[self.label].sum(axis=0) / total_area
+        state, total_area = observation.state, self.face.areas.sum()
         P = observation.stresses[self.particles]
-        achieved = np.einsum("pij,pj->i", P, self.face.area_vectors) / total_area
+        forces = state.applied[self.label][self.particles]
+        asked = forces.sum(axis=0) / total_area
+        inside = np.einsum("pij,pj->i", P, self.face.area_vectors) / total_area
         columns: dict[str, float] = {}
         for k, name in enumerate(COMPONENTS[: len(asked)]):
             columns[f"{self.label} asked {name} [Pa]"] = float(asked[k])
-            columns[f"{self.label} achieved {name} [Pa]"] = float(achieved[k])
-        return columns
+            columns[f"{self.label} particle stress {name} [Pa]"] = float(inside[k])
+        x = state.positions[self.particles]
+        return columns | asked_resultant(self.label, x, forces)

@@ -24,6 +24,7 @@ from solidsph.motion import Component, VectorField
 from solidsph.parameters import check_positive, number
 from solidsph.setting import Setting
 from solidsph.where import Where
+from solidsph_builtin.boundaries._reports import resultant
 from solidsph_builtin.effects._slip import slid
 
 # Stiffness of the spring of friction over that against penetration (Mindlin 1949, as for contact).
@@ -201,13 +202,9 @@ class _Wall(StoringCondition, FieldCondition, ForceCondition):
     def report(self, observation: Observation) -> Mapping[str, float]:
         state, label = observation.state, self.label
         gaps = self.gaps(state.time, state.positions)
-        total = state.applied[label].sum(axis=0)
         return {
             f"{label} energy [J]": float(self.energies(observation).sum()),
-            **{
-                f"{label} force {name} [N]": float(value)
-                for name, value in zip(_NAMES, total, strict=False)
-            },
+            **resultant(f"{label} force", f"{label} moment", state.positions, state.applied[label]),
             f"{label} least gap [m]": float(gaps.min()),
             f"{label} touching particles [-]": float(np.sum(gaps < 0.0)),
         }

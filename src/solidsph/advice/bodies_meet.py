@@ -40,10 +40,8 @@ def bodies_meet(seen: Seen) -> Iterator[Advice]:
 
 
 def _way(seen: Seen, one: SeenBody, times: Array) -> Array:
-    """Displacement of a body's middle, (t, d) [m]; none of a supported one."""
+    """Displacement of a body's middle, (t, d) [m]; none along axes that hold it."""
     d = seen.dimension
-    if one.supported:
-        return np.zeros((len(times), d))
     extent = one.body.extent
     masses = seen.simulation.setting.masses[extent]
     mean = masses @ seen.velocities[extent] / masses.sum()
@@ -53,7 +51,7 @@ def _way(seen: Seen, one: SeenBody, times: Array) -> Array:
         own = (load.particles >= extent.start) & (load.particles < extent.stop)
         pull += forces[own].sum(axis=0) / masses.sum()
     way: Array = times[:, None] * mean + 0.5 * times[:, None] ** 2 * pull
-    return way
+    return np.where(one.held_axes, 0.0, way)
 
 
 def _gap(a: SeenBody, b: SeenBody, ways: Array) -> Array:

@@ -23,6 +23,7 @@ from solidsph.advice.overdamped import overdamped
 from solidsph.advice.overloaded import overloaded
 from solidsph.advice.pressed_at_start import pressed_at_start
 from solidsph.advice.seen import Seen
+from solidsph.advice.several_faces import several_faces
 from solidsph.advice.slow_load import slow_load
 from solidsph.advice.small_cover import small_cover
 from solidsph.advice.sudden_load import sudden_load
@@ -40,6 +41,7 @@ _LOOKS: tuple[Look, ...] = (
     units,
     overloaded,
     unheld,
+    several_faces,
     few_across,
     small_cover,
     large_cover,

@@ -12,15 +12,17 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.advice import signals
+from solidsph.advice.thickness import through
 from solidsph.arrays import Array, Mask
 from solidsph.body import Body
+from solidsph.interfaces.condition import ExtensionCondition
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.shape import Shape
 from solidsph.parts import construct
 from solidsph.simulation import Simulation
 
-# Samples of a surface at most, and steps of a ray through a body.
-_SAMPLES, _MARCHES = 400, 60
+# Particles of a body that are asked whether they are in its shape.
+_SAMPLES = 400
 
 # Particles looked at where neighbours are compared.
 _LOOKED_AT = 4000
@@ -36,7 +38,7 @@ class SeenBody:
 
     body: Body
     shape: Shape
-    held: Mask  # (n,) own particles with a freedom that some motion determines; no ghosts
+    held_axes: Mask  # (d,) along which some motion keeps it from moving away
 
     @property
     def name(self) -> str:
@@ -78,7 +80,7 @@ class SeenBody:
 
     @property
     def supported(self) -> bool:
-        return bool(self.held.any())
+        return bool(self.held_axes.any())
 
     @cached_property
     def real(self) -> Array:
@@ -95,36 +97,12 @@ class SeenBody:
         """Smallest and usual way through it, normal to its surface [m]."""
         if self.dimension == 1:
             return self.length, self.length
-        rays, weights = self._rays
-        order = np.argsort(rays)
-        shares = np.cumsum(weights[order]) / weights.sum()
-        # A few rays at corners and rims find less than there is.
-        least, usual = (float(rays[order][np.searchsorted(shares, q)]) for q in (0.03, 0.5))
-        return least, usual
-
-    @cached_property
-    def _rays(self) -> tuple[Array, Array]:
-        """Lengths of rays inward from the surface, and the area of each, (k,)."""
-        surface = self.shape.surface(self.spacing)
-        points, areas = surface.points, surface.area_vectors
-        chosen = np.linspace(0, len(points) - 1, min(len(points), _SAMPLES)).astype(np.intp)
-        sizes = np.linalg.norm(areas[chosen], axis=1)
-        chosen, sizes = chosen[sizes > 0.0], sizes[sizes > 0.0]
-        inward = -areas[chosen] / sizes[:, None]
         if self._moved:
             raise ValueError("particles do not stand where the shape is")
-        # No ray begins at an edge, along which it would run: a third of a spacing to the middle.
-        begin = 0.05 * self.spacing
-        gone = np.full(len(chosen), begin)
-        alive = np.ones(len(chosen), dtype=np.bool_)
-        for _ in range(_MARCHES):
-            depth = -self.shape.signed_distance(points[chosen] + gone[:, None] * inward)
-            alive &= depth > 0.02 * self.spacing
-            if not alive.any():
-                break
-            gone[alive] += np.maximum(depth[alive], 0.1 * self.spacing)
-        ended = gone > 2.0 * begin  # others stand at an edge, on which the normal is not inward
-        return gone[ended], sizes[ended]
+        rays = through(self.shape, self.spacing)
+        some = self.real[:: max(1, len(self.real) // _LOOKED_AT)]
+        widest = 2.0 * float(-self.shape.signed_distance(some).min())
+        return rays.least(widest), rays.usual(widest)
 
     @property
     def _moved(self) -> bool:
@@ -191,12 +169,12 @@ class Seen:
     @cached_property
     def bodies(self) -> Sequence[SeenBody]:
         particles = self.simulation.particles
-        held = self.held & ~particles.ghosts
+        held = self._stays_behind | (self.freedoms & ~particles.ghosts[:, None])
         return [
             SeenBody(
                 body,
                 construct("shapes", self.simulation.scene.bodies[body.name].shape),
-                held[body.extent],
+                np.asarray(held[body.extent].any(axis=0)),
             )
             for body in self.simulation.setting.bodies
         ]
@@ -210,9 +188,21 @@ class Seen:
         return held
 
     @cached_property
-    def held(self) -> Mask:
-        """(n,) particles with such a freedom."""
-        return np.asarray(self.freedoms.any(axis=1))
+    def _stays_behind(self) -> Mask:
+        """(n, d) ghosts that do not go along where all else is moved: those of a symmetry plane."""
+        behind = np.zeros(self.freedoms.shape, dtype=np.bool_)
+        followers = [
+            motion
+            for motion in self.simulation.dynamics.motions
+            if isinstance(motion, ExtensionCondition)
+        ]
+        for axis in range(self.dimension if followers else 0):
+            moved = np.zeros(self.freedoms.shape)
+            moved[:, axis] = 1.0
+            for motion in followers:
+                motion.impose(0.0, 0, moved)
+            behind[:, axis] = np.abs(moved[:, axis] - 1.0) > 0.5
+        return behind
 
     @cached_property
     def loads(self) -> Sequence[signals.Load]:

@@ -19,8 +19,7 @@ def unheld(seen: Seen) -> Iterator[Advice]:
     if not seen.lacks(Need.MEETING):
         return
     for one in seen.bodies:
-        free = ~seen.freedoms[one.body.extent][~one.body.particles.ghosts].any(axis=0)
-        pull = np.where(free, _pull(seen, one), 0.0)
+        pull = np.where(one.held_axes, 0.0, _pull(seen, one))
         size = float(np.linalg.norm(pull))
         way = 0.5 * size * seen.scene.duration**2
         if size == 0.0 or (seen.moves and way <= _FAR * one.length):

@@ -13,7 +13,11 @@ _SPEEDS = (0.3, 2e4)  # [m/s]
 
 
 def units(seen: Seen) -> Iterator[Advice]:
-    """Density and wave speed of every body."""
+    """Density and wave speed of every body, where its mass is of any effect."""
+    if not seen.moves and not any(
+        load.accelerations.any() and not load.on_surface for load in seen.loads
+    ):
+        return
     for one in seen.bodies:
         for what, value, (least, most), unit, remedy in (
             ("density", one.density, _DENSITIES, "kg/m^3", "density is in kg/m^3: steel has 7850"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import ClassVar
 
 from solidsph.interfaces.condition import Condition
 from solidsph.setting import Setting
@@ -12,8 +13,11 @@ from solidsph.setting import Setting
 class BoundaryHandler(ABC):
     """Parameters of what is imposed; `bind` makes it act on particles.
 
-    An implementation is a frozen attrs class whose fields are the TOML keys of the handler.
+    An implementation is a frozen attrs class whose fields are the TOML keys of the handler. One
+    that loads a surface says so, and takes what `Setting.surface` finds at its `where`.
     """
+
+    loads_surface: ClassVar[bool] = False
 
     @abstractmethod
     def bind(self, setting: Setting, label: str) -> Sequence[Condition]:

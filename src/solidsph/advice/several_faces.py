@@ -1,0 +1,128 @@
+"""A load on several faces, of which its condition names none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solidsph.advice.advice import Advice
+from solidsph.advice.seen import Seen
+from solidsph.arrays import Mask
+from solidsph.interfaces.boundary import BoundaryHandler
+from solidsph.particles import Particles
+from solidsph.parts import construct
+from solidsph.surface import Pieces
+from solidsph.where import AXES, Where, names_used
+
+_SHOWN = 6  # faces of one load
+
+# Cosine from the normal, and distance over that of particles of two bodies that touch, within which
+# a particle of another body covers a piece of surface.
+_AHEAD, _TOUCHING = 0.75, 1.5
+
+
+def several_faces(seen: Seen) -> Iterator[Advice]:
+    """By the area that a load takes of each face.
+
+    A corner that is picked by coordinates owns some of every face that meets there. Where the
+    condition says "surface", or consists of names alone, such as "not left", all of it is meant. So
+    are the faces of one name on several bodies, unless one of them lies against another body.
+    """
+    pieces = Pieces.of(seen.simulation.particles)
+    for entry in seen.scene.boundaries:
+        handler: BoundaryHandler = construct("boundaries", entry.part)
+        where: Where | None = getattr(handler, "where", None)
+        if not handler.loads_surface or where is None:
+            continue
+        names = _names(pieces.particles, where)
+        chosen = pieces.at(where) & (pieces.areas > 0.0)
+        loose = pieces.unnamed(where) & chosen
+        shares = _shares(pieces, chosen)
+        picked = names & {*AXES} and "surface" not in {name.split(".")[-1] for name in names}
+        if loose.any() and len(shares) > 1 and picked:
+            why = (
+                "names no face" if loose.sum() == chosen.sum() else "names one face, and meets more"
+            )
+        elif _in_several_bodies(pieces, chosen, names) and _covered(pieces, chosen):
+            why = "names a face that several bodies have, one of which lies against another"
+        else:
+            continue
+        largest = sorted(shares, key=lambda face: -shares[face])
+        total = sum(shares.values())
+        listed = [f"{face} {shares[face] / total:.0%}" for face in largest[:_SHOWN]]
+        if len(largest) > _SHOWN:
+            listed.append(f"{len(largest) - _SHOWN} more")
+        unit = {1: "", 2: " m", 3: " m^2"}[seen.dimension]
+        shown = f"where = {where!r}" if isinstance(where, str) else "its function"
+        yield Advice(
+            found=f"{entry.label or type(handler).__name__}: {shown} {why}, and what it loads, "
+            f"{total:.4g}{unit}, is on {', '.join(listed)}",
+            expected="a load on the faces that its condition names",
+            remedy=_remedy(where, largest, names),
+        )
+
+
+def _names(particles: Particles, where: Where) -> frozenset[str]:
+    """What a condition names, and the conditions of the scene's own tags in it."""
+    if not isinstance(where, str):
+        return frozenset(AXES)  # a function of positions
+    names = names_used(particles, where)
+    own = [name.split(".")[-1] for name in names]
+    for tag in own:
+        for _, condition in particles.conditions.get(tag, ()):
+            names |= _names(particles, condition)
+    return names
+
+
+def _shares(pieces: Pieces, chosen: Mask) -> dict[str, float]:
+    """Area by face [m^(d-1)], of each body where there are several."""
+    bodies = list(pieces.particles.bodies)
+    areas: dict[str, float] = {}
+    each = np.stack([pieces.bodies[chosen], pieces.faces[chosen]], axis=1)
+    for body, face in np.unique(each, axis=0):
+        own = chosen & (pieces.bodies == body) & (pieces.faces == face)
+        prefix = f"{bodies[body]}." if len(bodies) > 1 else ""
+        areas[prefix + pieces.names[face]] = float(pieces.areas[own].sum())
+    return areas
+
+
+def _in_several_bodies(pieces: Pieces, chosen: Mask, names: frozenset[str]) -> bool:
+    """Whether a face was named by a condition that names no body."""
+    particles = pieces.particles
+    if len(particles.bodies) < 2 or names & {*particles.bodies, *particles.conditions}:
+        return False
+    named = np.isin(pieces.faces, [pieces.names.index(f) for f in names if f in pieces.names])
+    return bool(np.unique(pieces.bodies[chosen & named]).size > 1)
+
+
+def _covered(pieces: Pieces, chosen: Mask) -> bool:
+    """Whether some of the chosen surface faces a particle of another body that touches it."""
+    particles = pieces.particles
+    X, spacings = particles.positions, particles.spacings
+    numbers = np.flatnonzero(chosen)
+    for k, extent in enumerate(particles.bodies.values()):
+        own = numbers[pieces.bodies[numbers] == k]
+        others = ~particles.ghosts
+        others[extent] = False
+        if not len(own) or not others.any():
+            continue
+        owners, normals = pieces.owners[own], pieces.area_vectors[own]
+        gaps, near = cKDTree(X[others]).query(X[owners])
+        ahead = np.einsum("ki,ki->k", X[others][near] - X[owners], normals)
+        facing = ahead > _AHEAD * gaps * np.linalg.norm(normals, axis=1)
+        touching = gaps < _TOUCHING * 0.5 * (spacings[owners] + spacings[others][near])
+        if np.any(facing & touching):
+            return True
+    return False
+
+
+def _remedy(where: Where, faces: list[str], names: frozenset[str]) -> str:
+    if not isinstance(where, str):
+        return f"name the face: where = {faces[0]!r} and tags"
+    if not names & {*AXES}:
+        every = " or ".join(faces[:_SHOWN])
+        return f"name the body: where = {faces[0]!r}, or {every!r} if all are meant"
+    every = " or ".join(faces[:_SHOWN])
+    return f"where = '{faces[0]} and ({where})', or '({every}) and ({where})' if all are meant"
