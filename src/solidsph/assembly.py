@@ -47,6 +47,9 @@ from solidsph.smoothing import smoothing_kernel
 from solidsph.step_size import largest_step
 from solidsph.where import EVERYWHERE, select
 
+# Of a step: an end that is missed by less is met.
+NEAR = 1e-6
+
 # No run of more steps ends; a scene that asks for them has its units wrong.
 _MOST_STEPS = 1e10
 
@@ -54,8 +57,11 @@ _MOST_STEPS = 1e10
 class Assembly:
     """One build of one scene."""
 
-    def __init__(self, scene: Scene, manager: pluggy.PluginManager) -> None:
+    def __init__(
+        self, scene: Scene, manager: pluggy.PluginManager, until: float | None = None
+    ) -> None:
         self._scene = scene
+        self._until = until  # a later end than the scene's duration [s]
         self._manager = manager
         self._problems = Problems()
         self._labels: set[str] = set()  # of the accounts of boundaries and effects
@@ -102,11 +108,14 @@ class Assembly:
         step = problems.attempt(self._step_size, scheme, effects, made)
         problems.stop_if_any()
         steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
+        step_size = scene.duration / steps
+        steps, end = self._extended(steps, step_size)
         setting = Setting(
             particles=particles,
             masses=np.concatenate([body.masses for body in made]),
             bodies=made,
-            step_size=scene.duration / steps,
+            step_size=step_size,
+            end=end,
         )
         conditions = self._bound(handlers, effects, setting)
         motions = _in_order([c for c in conditions if isinstance(c, MotionCondition)], particles)
@@ -152,6 +161,14 @@ class Assembly:
             problems.attempt(check_sleep, made_ready)
             problems.stop_if_any()
         return made_ready
+
+    def _extended(self, steps: int, step_size: float) -> tuple[int, float]:
+        """Steps up to the end of the run, and that end [s]."""
+        further = ceil((self._until or 0.0) / step_size - NEAR)
+        if further <= steps:
+            return steps, self._scene.duration
+        # A hair less, so that rounding asks no formula beyond the end that was asked for.
+        return further, further * step_size * (1.0 - 1e-12)
 
     def _make(self, kind: str, wanted: PartLike) -> Any:
         part = self._problems.attempt(construct, kind, wanted)
@@ -298,6 +315,7 @@ class Assembly:
                     continue
                 field = VectorField.of(table, what)
                 field.check_dimension(particles.dimension, what)
+                field.check_without("t", "it is the state at t = 0: use numbers, X, Y and Z")
                 X = particles.positions[chosen]
                 for axis in field.components:
                     values[chosen, axis] = field.values(axis, X, 0.0)

@@ -10,7 +10,7 @@ import numpy as np
 
 from solidsph.arrays import Array, Indices, Mask
 from solidsph.errors import SceneError
-from solidsph.expressions import Expression
+from solidsph.expressions import Expression, names_in
 from solidsph.particles import Particles
 
 Where: TypeAlias = str | Callable[[Array], Mask]
@@ -63,7 +63,13 @@ def _mask(particles: Particles, where: Where) -> Mask:
     values |= {
         name: particles.positions[:, k] for k, name in enumerate(AXES[: particles.dimension])
     }
-    result = np.asarray(Expression.parse(where, values)(values))
+    expression = Expression.parse(where, [*values, "t"])
+    if "t" in names_in(where):
+        raise SceneError(
+            f"where = {where!r} uses t, but particles are chosen once, before the "
+            "run: use X, Y, Z and tags here, and t in the formula of what is imposed"
+        )
+    result = np.asarray(expression(values))
     if result.dtype != np.bool_:
         raise SceneError(f"where = {where!r} is a number, not a condition; compare it: '... < 0.1'")
     return np.broadcast_to(result, (particles.count,))

@@ -41,7 +41,7 @@ class ApproximateNeumann(BoundaryHandler):
 
     def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
         particles = setting.particles
-        field = VectorField.of(self.traction, "approximate-neumann: traction")
+        field = VectorField.of(self.traction, "approximate-neumann: traction", end=setting.end)
         field.check_dimension(particles.dimension, "approximate-neumann")
         face = surface_at(setting, self.where, "approximate-neumann")
         boundary, area_vectors = face.particles, face.area_vectors

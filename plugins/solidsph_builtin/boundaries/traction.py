@@ -37,7 +37,7 @@ class Traction(BoundaryHandler):
 
     def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
         particles = setting.particles
-        field = VectorField.of(self.traction, "traction: traction")
+        field = VectorField.of(self.traction, "traction: traction", end=setting.end)
         field.check_dimension(particles.dimension, "traction")
         face = surface_at(setting, self.where, "traction")
         indices = face.particles
