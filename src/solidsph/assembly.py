@@ -6,6 +6,7 @@ problems are reported together, and what comes out holds objects only.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from math import ceil
 from typing import Any
@@ -14,12 +15,10 @@ import attrs
 import numpy as np
 import pluggy
 
-from solidsph import compatibility, registry
+from solidsph import compatibility
 from solidsph.body import Body
 from solidsph.dynamics import Dynamics
-from solidsph.engines.engine import Engine
 from solidsph.engines.history import HistoryFields, remembering
-from solidsph.engines.select import engine_named
 from solidsph.errors import SceneError
 from solidsph.interfaces.condition import (
     Condition,
@@ -27,7 +26,6 @@ from solidsph.interfaces.condition import (
     MotionCondition,
     StressCondition,
 )
-from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Configuration, Formulation
 from solidsph.interfaces.gradient import Gradient
@@ -35,32 +33,46 @@ from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.material import Material
-from solidsph.interfaces.shape import Shape
+from solidsph.making import Making, Parts
 from solidsph.motion import VectorField
 from solidsph.particles import Particles, State
-from solidsph.parts import construct
 from solidsph.problems import Problems
-from solidsph.scene import DEFAULT_INTEGRATOR, BodyScene, ImposedScene, PartLike, Scene
+from solidsph.scene import Scene
 from solidsph.setting import Setting
 from solidsph.simulation import Simulation
 from solidsph.smoothing import smoothing_kernel
 from solidsph.step_size import largest_step
 from solidsph.visibility import hidden_pairs
-from solidsph.where import EVERYWHERE, Where, select
+from solidsph.where import Where, select
+
+# Of a step: an end that is missed by less is met.
+NEAR = 1e-6
 
 # No run of more steps ends; a scene that asks for them has its units wrong.
 _MOST_STEPS = 1e10
 
 
+def wrong_besides(scene: Scene, *, complete: bool) -> Sequence[str]:
+    """Problems of a scene of which something could not be read and was left out.
+
+    Args:
+        scene: what could be read.
+        complete: whether all of its bodies are there, so that tags can be looked for.
+    """
+    return Assembly(scene, pluggy.PluginManager("solidsph")).problems(places=complete)
+
+
 class Assembly:
     """One build of one scene."""
 
-    def __init__(self, scene: Scene, manager: pluggy.PluginManager) -> None:
+    def __init__(
+        self, scene: Scene, manager: pluggy.PluginManager, until: float | None = None
+    ) -> None:
         self._scene = scene
+        self._until = until  # a later end than the scene's duration [s]
         self._manager = manager
         self._problems = Problems()
-        self._labels: set[str] = set()  # of the accounts of boundaries and effects
-        self._used: dict[registry.Entry, None] = {}  # plugins in the order of their use, each once
+        self._making = Making(scene, self._problems)
 
     def simulation(self) -> Simulation:
         """Build it.
@@ -69,61 +81,56 @@ class Assembly:
             BuildError: with every problem found, each with its remedy.
         """
         scene, problems = self._scene, self._problems
-        problems.add(compatibility.numbers(scene))
-        problems.add(compatibility.statics(scene))
-        problems.add(compatibility.sleep(scene))
-        if scene.silence:
-            from solidsph import advice  # only where its names are asked for
+        parts = self._making.parts()
+        placed = self._placed(parts)
+        self._stop_if_any(placed)
 
-            problems.add(advice.unknown(scene.silence))
-        kernel: Kernel | None = self._make("kernels", scene.kernel)
-        formulation: Formulation | None = self._make("formulations", scene.formulation)
-        integrator = self._integrator()
-        engine: Engine | None = problems.attempt(engine_named, _engine_name(scene))
-        handlers = self._labelled("boundaries", scene.boundaries)
-        effects: dict[str, Effect] = self._labelled("effects", scene.effects)
-        shapes, sets, materials = self._body_parts()
-        problems.add(compatibility.effects(effects))
-        problems.stop_if_any()
-
-        problems.add(compatibility.dimensions(shapes, scene.cover))
-        problems.stop_if_any()
-        problems.add(compatibility.names(sets))
-        problems.stop_if_any()
-        particles = self._tagged(Particles.joined(sets))
-        problems.add(compatibility.apart(shapes, sets))
+        particles, effects = problems.settled(placed), parts.effects
+        kernel = problems.settled(parts.kernel)
+        formulation = problems.settled(parts.formulation)
+        problems.add(compatibility.apart(parts.shapes, parts.sets))
         bodies = [
             problems.attempt(
-                self._body, name, shapes[name], particles, own, material, kernel, formulation
+                self._body,
+                name,
+                parts.shapes[name],
+                particles,
+                own,
+                parts.materials[name],
+                kernel,
+                formulation,
             )
-            for (name, own), material in zip(sets.items(), materials.values(), strict=True)
+            for name, own in parts.sets.items()
         ]
-        problems.stop_if_any()
+        self._stop_if_any(particles)
 
         made = [problems.settled(body) for body in bodies]
-        scheme = problems.settled(integrator)
+        scheme = problems.settled(parts.integrator)
         step = problems.attempt(self._step_size, scheme, effects, made)
-        problems.stop_if_any()
+        self._stop_if_any(particles)
         steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
+        step_size = scene.duration / steps
+        steps, end = self._extended(steps, step_size)
         setting = Setting(
             particles=particles,
             masses=np.concatenate([body.masses for body in made]),
             bodies=made,
-            step_size=scene.duration / steps,
+            step_size=step_size,
+            end=end,
         )
-        conditions = self._bound(handlers, effects, setting)
+        conditions = self._bound(parts.handlers, effects, setting)
         motions = _in_order([c for c in conditions if isinstance(c, MotionCondition)], particles)
         stresses = [c for c in conditions if isinstance(c, StressCondition)]
         problems.add(compatibility.motions(motions, particles))
         forces = [c for c in conditions if isinstance(c, ForceCondition)]
-        problems.add(compatibility.loads(forces, particles, problems.settled(formulation)))
-        problems.add(compatibility.stresses(stresses, problems.settled(formulation)))
+        problems.add(compatibility.loads(forces, particles, formulation))
+        problems.add(compatibility.stresses(stresses, formulation))
         initial = problems.attempt(self._initial_state, particles)
-        chosen_engine = problems.settled(engine)
+        chosen_engine = problems.settled(parts.engine)
         internal = problems.attempt(chosen_engine.prepare, setting.bodies, stresses, steps)
         for effect in effects.values() if internal is not None else ():
             internal = problems.attempt(effect.within, internal, setting, stresses) or internal
-        problems.add(compatibility.history(made, scene, self._labels))
+        problems.add(compatibility.history(made, scene, self._making.labels))
         problems.stop_if_any()
         remembered = [body for body in made if isinstance(body.material, HistoryMaterial)]
         if remembered:
@@ -146,7 +153,7 @@ class Assembly:
             initial=problems.settled(initial),
             step_size=setting.step_size,
             steps=steps,
-            parts=tuple(self._used),
+            parts=tuple(self._making.used),
             manager=self._manager,
         )
         if scene.sleep is not None:
@@ -156,82 +163,53 @@ class Assembly:
             problems.stop_if_any()
         return made_ready
 
-    def _make(self, kind: str, wanted: PartLike) -> Any:
-        part = self._problems.attempt(construct, kind, wanted)
-        if part is not None:
-            self._note(kind, part)
-        return part
+    def problems(self, *, places: bool) -> Sequence[str]:
+        """What is wrong with the scene's words, their values and, if asked for, its places."""
+        placed = self._placed(self._making.parts())
+        if places and placed is not None:
+            self._look_for(placed)
+        return self._problems.found
 
-    def _integrator(self) -> Integrator | None:
-        """The scene's, or the default, which is not noted where nothing will move by it."""
-        made: Integrator | None = (
-            self._make("integrators", self._scene.integrator or DEFAULT_INTEGRATOR)
-            if self._scene.statics is None
-            else self._problems.attempt(construct, "integrators", DEFAULT_INTEGRATOR)
-        )
-        return made
-
-    def _note(self, kind: str, part: Any) -> None:
-        """Remember which plugins a part, and the parts inside it, came from."""
-        self._used[registry.entry_of(kind, part)] = None
-        if not attrs.has(type(part)):
-            return
-        for field in attrs.fields(type(part)):
-            nested = field.metadata.get("part")
-            if nested is not None:
-                value = getattr(part, field.name)
-                for one in value if isinstance(value, (list, tuple)) else [value]:
-                    self._note(nested, one)
-
-    def _labelled(self, kind: str, entries: Sequence[ImposedScene]) -> dict[str, Any]:
-        """Parts by the label of their account: the one given, or one made of name and place."""
-        made: dict[str, Any] = {}
-        for entry in entries:
-            part = self._make(kind, entry.part)
-            if part is None:
-                continue
-            label = entry.label or _label(kind, part)
-            if not label.isprintable():
-                self._problems.add([f"label {label!r} has signs that cannot be shown; use others"])
-            if label in self._labels and entry.label:
-                self._problems.add(
-                    [f"two accounts are labelled {label!r}; give each a label of its own"]
-                )
-            while label in self._labels:
-                label = f"{label}'"
-            self._labels.add(label)
-            made[label] = part
-        return made
-
-    def _body_parts(
-        self,
-    ) -> tuple[dict[str, Shape], dict[str, Particles], dict[str, Material]]:
-        """Shape, particles and material of every body, by its name."""
-        shapes: dict[str, Shape] = {}
-        sets: dict[str, Particles] = {}
-        materials: dict[str, Material] = {}
-        for name, body in self._scene.bodies.items():
-            shape: Shape | None = self._make("shapes", body.shape)
-            discretisation: Discretisation | None = self._make(
-                "discretisations", body.discretisation
-            )
-            material = self._material(name, body)
-            if shape is None or discretisation is None or material is None:
-                continue
-            particles = self._problems.attempt(discretisation.particles, shape, body.spacing)
-            if particles is not None:
-                shapes[name], sets[name], materials[name] = shape, particles, material
-        return shapes, sets, materials
-
-    def _material(self, name: str, body: BodyScene) -> Material | None:
-        wanted = body.material if body.material is not None else self._scene.material
-        if wanted is None:
-            self._problems.add(
-                [f"body {name!r} has no material; give it one, or one to the whole scene"]
-            )
+    def _placed(self, parts: Parts) -> Particles | None:
+        """The particles of all bodies with their tags, if there are any."""
+        problems, shapes, sets = self._problems, parts.shapes, parts.sets
+        fitting = [
+            *compatibility.dimensions(shapes, self._scene.cover),
+            *compatibility.names(sets),
+        ]
+        problems.add(fitting)
+        one_dimension = len({shape.dimension for shape in shapes.values()}) == 1
+        if not one_dimension or len(sets) < len(self._scene.bodies):
             return None
-        material: Material | None = self._make("materials", wanted)
-        return material
+        return self._tagged(Particles.joined(sets))
+
+    def _stop_if_any(self, placed: Particles | None) -> None:
+        """Stop if there are problems; those of places, which are found later, are told too."""
+        if self._problems.found and placed is not None:
+            self._look_for(placed)
+        self._problems.stop_if_any()
+
+    def _look_for(self, particles: Particles) -> None:
+        """Note places of boundaries, effects and initial values that match no particle."""
+        scene = self._scene
+        tags = {tag for body in scene.bodies.values() for tag in body.tags}
+        wrong = {tag.replace("-", "_") for tag in tags - set(particles.tags)}  # told already
+        places: list[object] = [initial.where for initial in scene.initial]
+        for entry in (*scene.boundaries, *scene.effects):
+            part = entry.part
+            where = part.get("where") if isinstance(part, Mapping) else getattr(part, "where", None)
+            places.append(where)
+        for where in dict.fromkeys(one for one in places if isinstance(one, str)):
+            if not wrong.intersection(re.findall(r"\w+", where.replace("-", "_"))):
+                self._problems.attempt(select, particles, where)
+
+    def _extended(self, steps: int, step_size: float) -> tuple[int, float]:
+        """Steps up to the end of the run, and that end [s]."""
+        further = ceil((self._until or 0.0) / step_size - NEAR)
+        if further <= steps:
+            return steps, self._scene.duration
+        # A hair less, so that rounding asks no formula beyond the end that was asked for.
+        return further, further * step_size * (1.0 - 1e-12)
 
     def _body(
         self,
@@ -313,6 +291,7 @@ class Assembly:
                     continue
                 field = VectorField.of(table, what)
                 field.check_dimension(particles.dimension, what)
+                field.check_without("t", "it is the state at t = 0: use numbers, X, Y and Z")
                 X = particles.positions[chosen]
                 for axis in field.components:
                     values[chosen, axis] = field.values(axis, X, 0.0)
@@ -347,11 +326,6 @@ class Assembly:
         return step
 
 
-def _engine_name(scene: Scene) -> str:
-    """Equilibria are found with assembled matrices: there is nothing to compile."""
-    return "matrix" if scene.statics is not None and scene.engine == "auto" else scene.engine
-
-
 def _in_order(
     motions: Sequence[MotionCondition], particles: Particles
 ) -> tuple[MotionCondition, ...]:
@@ -363,11 +337,3 @@ def _with_gradient(formulation: Formulation, gradient: Gradient) -> Formulation:
     """The same formulation with another gradient, which is a field of every attrs class."""
     changed: Formulation = attrs.evolve(formulation, gradient=gradient)  # type: ignore[misc]
     return changed
-
-
-def _label(kind: str, part: object) -> str:
-    name = registry.entry_of(kind, part).name or type(part).__name__
-    where = getattr(part, "where", None)
-    if isinstance(where, str) and where not in (EVERYWHERE, "ghosts"):
-        return f"{name} {where}"
-    return name

@@ -7,8 +7,10 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from importlib import import_module
 from importlib.metadata import version
+from typing import TextIO
 
 import click
 
@@ -47,8 +49,39 @@ def cli() -> None:
     """
 
 
+def _open_closed_streams() -> None:
+    """Standard streams that the shell has closed lead nowhere.
+
+    Else the next file that is opened, a record perhaps, would take the number of one of them.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            nowhere = os.open(os.devnull, os.O_RDWR)
+            if nowhere != number:
+                os.dup2(nowhere, number)
+                os.close(nowhere)
+            setattr(sys, name, open(number, "r" if number == 0 else "w", closefd=False))  # noqa: SIM115 -- open as long as the process
+
+
+def _tell(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """A warning as a user is told it; where it is not about the input, with path and source."""
+    told = isinstance(message, UserWarning)
+    text = f"warning: {message}\n"
+    text = text if told else warnings.formatwarning(message, category, filename, lineno, line)
+    print(text, end="", file=file or sys.stderr)
+
+
 def main() -> None:
     """Run the command line; every error of the user's is one message, never a traceback."""
+    _open_closed_streams()
+    warnings.showwarning = _tell
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that cannot show a sign shows another

@@ -173,13 +173,15 @@ class Names:
 def dimensions(shapes: Mapping[str, Shape], cover: float) -> Iterator[str]:
     """One dimension for all bodies, and a cover that reaches far enough in it."""
     each = {name: shape.dimension for name, shape in shapes.items()}
+    if not each:
+        return
     if len(set(each.values())) > 1:
         listed = ", ".join(f"{name!r} {d}D" for name, d in each.items())
         yield f"bodies of different dimension in one scene: {listed}; use shapes of one dimension"
         return
     d = next(iter(each.values()))
     least = sqrt(d)
-    if cover <= least:
+    if 0.0 < cover <= least:
         yield (
             f"cover = {cover:.6g} is too small in {d}D: a particle must reach its diagonal "
             f"neighbours, {least:.4g} spacings away; take at least {ceil(10 * least + 5) / 10:g}"

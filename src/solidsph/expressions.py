@@ -2,6 +2,9 @@
 
 A formula is parsed by Python's own parser and then evaluated node by node from a short list of
 permitted ones, so a scene file can never run code.
+
+A comparison is true or false where a condition is wanted: by `and`, `or`, `not` and `where`. In
+arithmetic and in other functions it is the number 1.0 or 0.0, so that "(t > 1) + (t > 2)" counts.
 """
 
 from __future__ import annotations
@@ -9,8 +12,11 @@ from __future__ import annotations
 import ast
 import difflib
 import operator
+import warnings
 from collections.abc import Callable, Collection, Mapping
 from functools import cache
+from math import isfinite
+from reprlib import repr as short
 from typing import Any
 
 import attrs
@@ -44,7 +50,7 @@ _FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
     "where": (3, np.where),
 }
 
-_OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
+_ARITHMETIC: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
@@ -53,9 +59,6 @@ _OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Pow: operator.pow,
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
-    ast.Not: np.logical_not,
-    ast.And: np.logical_and,
-    ast.Or: np.logical_or,
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
     ast.Gt: operator.gt,
@@ -63,6 +66,12 @@ _OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
 }
+_LOGIC: dict[type[ast.AST], Callable[..., Any]] = {
+    ast.Not: np.logical_not,
+    ast.And: np.logical_and,
+    ast.Or: np.logical_or,
+}
+_OPERATORS = _ARITHMETIC | _LOGIC
 
 
 @attrs.frozen
@@ -83,13 +92,14 @@ class Expression:
         if len(text) > MAX_LENGTH:
             raise SceneError(f"formula of {len(text)} characters; at most {MAX_LENGTH} are allowed")
         try:
-            tree = ast.parse(text.strip(), mode="eval").body
+            tree = _read(text)
             _check(tree, text, tuple(variables))
             if _depth(tree) > MAX_DEPTH:
                 raise ValueError(f"nested more than {MAX_DEPTH} deep")
-        except (SyntaxError, ValueError, RecursionError, MemoryError) as cause:
+        except (SyntaxError, ValueError, RecursionError, MemoryError, Warning) as cause:
+            why = cause.msg if isinstance(cause, SyntaxError) else cause
             raise SceneError(
-                f"formula {text!r} cannot be read ({cause}); write arithmetic such as "
+                f"formula {text!r} cannot be read ({why}); write arithmetic such as "
                 "'0.2*X' or 'X < 0.1 and Y > 0'"
             ) from None
         return cls(text, tuple(variables), tree)
@@ -104,8 +114,14 @@ class Expression:
 @cache
 def names_in(text: str) -> frozenset[str]:
     """Names that a formula, which can be parsed, uses."""
-    tree = ast.parse(text.strip(), mode="eval")
-    return frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
+    return frozenset(node.id for node in ast.walk(_read(text)) if isinstance(node, ast.Name))
+
+
+def _read(text: str) -> ast.expr:
+    with warnings.catch_warnings():
+        # Python only warns of what it will refuse one day, such as "1or X".
+        warnings.simplefilter("error")
+        return ast.parse(text.strip(), mode="eval").body
 
 
 def _depth(node: ast.AST) -> int:
@@ -122,8 +138,13 @@ def _check(node: ast.AST, text: str, variables: tuple[str, ...]) -> None:
     match node:
         case ast.Constant(value=bool()):
             raise refuse(repr(node.value))
-        case ast.Constant(value=int() | float()):
-            return
+        case ast.Constant(value=int() | float() as number):
+            if not _is_double(number):
+                written = ast.get_source_segment(text.strip(), node)
+                raise SceneError(
+                    f"formula {short(text)}: the number {short(written)} is too large; at most "
+                    "about 1.8e308 can be computed with"
+                )
         case ast.Name(id=name):
             known = (*variables, *_CONSTANTS)
             if name not in known:
@@ -157,30 +178,45 @@ def _check(node: ast.AST, text: str, variables: tuple[str, ...]) -> None:
             raise refuse(repr(ast.unparse(node)))
 
 
+def _is_double(number: float) -> bool:
+    try:
+        return isfinite(float(number))
+    except OverflowError:  # a whole number of hundreds of digits
+        return False
+
+
 def _evaluate(node: ast.AST, values: Mapping[str, Any]) -> Any:
+    def number(part: ast.AST) -> Any:
+        """Its value as a double, or an array of them: true is 1, false is 0."""
+        return np.asarray(_evaluate(part, values), dtype=np.float64)
+
     match node:
-        case ast.Constant(value=number):
+        case ast.Constant(value=constant):
             # Floats overflow to infinity where integers would grow without end.
-            return np.float64(number)  # type: ignore[arg-type]
+            return np.float64(constant)  # type: ignore[arg-type]
         case ast.Name(id=name):
             return values[name]
         case ast.Attribute():
             return values[ast.unparse(node)]
         case ast.BinOp(left=left, op=op, right=right):
-            return _OPERATORS[type(op)](_evaluate(left, values), _evaluate(right, values))
+            return _ARITHMETIC[type(op)](number(left), number(right))
+        case ast.UnaryOp(op=ast.Not(), operand=operand):
+            return np.logical_not(_evaluate(operand, values))
         case ast.UnaryOp(op=op, operand=operand):
-            return _OPERATORS[type(op)](_evaluate(operand, values))
+            return _ARITHMETIC[type(op)](number(operand))
         case ast.BoolOp(op=op, values=parts):
             result = _evaluate(parts[0], values)
             for part in parts[1:]:
-                result = _OPERATORS[type(op)](result, _evaluate(part, values))
+                result = _LOGIC[type(op)](result, _evaluate(part, values))
             return result
         case ast.Compare(left=left, ops=ops, comparators=others):
-            terms = [_evaluate(part, values) for part in (left, *others)]
-            result = True
+            terms = [number(part) for part in (left, *others)]
+            result = np.True_
             for comparison, a, b in zip(ops, terms[:-1], terms[1:], strict=True):
-                result = np.logical_and(result, _OPERATORS[type(comparison)](a, b))
+                result = np.logical_and(result, _ARITHMETIC[type(comparison)](a, b))
             return result
+        case ast.Call(func=ast.Name(id="where"), args=args):
+            return np.where(*(_evaluate(part, values) for part in args))
         case ast.Call(func=ast.Name(id=name), args=args):
-            return _FUNCTIONS[name][1](*(_evaluate(part, values) for part in args))
+            return _FUNCTIONS[name][1](*(number(part) for part in args))
     raise AssertionError(f"unchecked node {ast.dump(node)}")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import cache
-from math import isfinite
+from math import inf, isfinite
 from typing import TypeAlias
 
 import attrs
@@ -23,17 +23,27 @@ _COMPONENT_NAMES = ("x", "y", "z")
 # Weights of the values at t + k step, by k, for first and second derivatives.
 _CENTRED = {1: {-1: -0.5, 1: 0.5}, 2: {-1: 1.0, 0: -2.0, 1: 1.0}}
 _AT_START = {1: {0: -1.5, 1: 2.0, 2: -0.5}, 2: {0: 2.0, 1: -5.0, 2: 4.0, 3: -1.0}}
+_AT_END = {n: {-k: (-1) ** n * w for k, w in _AT_START[n].items()} for n in _AT_START}
+
+# Of a step: times are sums of steps, and so much of one is rounding.
+_ROUNDING = 1e-3
 
 
 @attrs.frozen
 class VectorField:
-    """Some components of a vector as functions of position and time; the others are left alone."""
+    """Some components of a vector as functions of position and time; the others are left alone.
+
+    No component is asked at a time before 0, or after the `end` of the run: it may have no value
+    there.
+    """
 
     components: Mapping[int, Component]
+    end: float = inf  # of the run [s]
+    what: str = ""  # the field, as a message about it begins
 
     @classmethod
-    def of(cls, table: Mapping[str, Component], what: str) -> VectorField:
-        """From a scene's table such as {x = "0.1*t", y = 0}.
+    def of(cls, table: Mapping[str, Component], what: str, *, end: float = inf) -> VectorField:
+        """From a scene's table such as {x = "0.1*t", y = 0}, in a run up to `end` [s].
 
         Raises:
             SceneError: an unknown component, or a formula that cannot be read.
@@ -47,7 +57,16 @@ class VectorField:
             if name not in _COMPONENT_NAMES:
                 raise SceneError(f"{what}: unknown component {name!r}; expected x, y or z")
             components[_COMPONENT_NAMES.index(name)] = _checked(value, f"{what}.{name}")
-        return cls(components)
+        return cls(components, end, what)
+
+    def check_without(self, names: Collection[str], why: str) -> None:
+        """Raise SceneError if a formula uses one of the variables `names`, and say `why` not."""
+        for axis, component in self.components.items():
+            used = names_in(component) & set(names) if isinstance(component, str) else ()
+            for name in sorted(used):
+                raise SceneError(
+                    f"{self.what}: {_COMPONENT_NAMES[axis]} = {component!r} uses {name}, but {why}"
+                )
 
     def check_dimension(self, dimension: int, what: str) -> None:
         """Raise SceneError if a component or a variable does not exist in this dimension."""
@@ -76,6 +95,7 @@ class VectorField:
         component, count = self.components[axis], len(positions)
         if not self.varies(axis):
             times = times[:1]
+        times = np.clip(times, 0.0, self.end)
         if callable(component):
             found = np.stack([_spread(component(positions, float(t)), count) for t in times])
         elif isinstance(component, str):
@@ -87,8 +107,9 @@ class VectorField:
             found = np.full((1, count), float(component))
         if not np.all(np.isfinite(found)):
             row, bad = (int(k) for k in np.argwhere(~np.isfinite(found))[0])
+            whose = f"{self.what}: " if self.what else ""
             raise SceneError(
-                f"{component!r} is {found[row, bad]} at X = {positions[bad].tolist()}, "
+                f"{whose}{component!r} is {found[row, bad]} at X = {positions[bad].tolist()}, "
                 f"t = {times[row]:.6g} s; it must be finite everywhere it is used"
             )
         return found
@@ -105,20 +126,28 @@ class VectorField:
 
         (t, k), or (1, k) if it does not vary. Differences over the time `step` [s] of the run are
         what the integrators see: a kink in the motion, such as the end of a ramp, becomes the
-        impulse that the step delivers, and the work of the reaction stays right. Before t = 0 the
-        formula is never asked.
+        impulse that the step delivers, and the work of the reaction stays right. At the start and
+        at the end of the run they are one-sided.
         """
         if order == 0:
             return self.schedule(axis, positions, times)
         if not self.varies(axis):
             return np.zeros((1, len(positions)))
-        centred = times >= step * (1.0 - 1e-9)
+        step = min(step, self.end / 3.0)  # a run of fewer steps has no room for their differences
+        times = np.clip(times, 0.0, self.end)
+        at_start = times < step * (1.0 - _ROUNDING)
+        at_end = times > self.end - step * (1.0 - _ROUNDING)
+        # What is a step from the end but for rounding is not to look beyond it.
+        inside = np.clip(times, step, self.end - step)
         derivative = np.empty((len(times), len(positions)))
-        for chosen, weights in ((centred, _CENTRED[order]), (~centred, _AT_START[order])):
+        for chosen, near, weights in (
+            (~at_start & ~at_end, inside, _CENTRED[order]),
+            (at_start, times, _AT_START[order]),
+            (at_end, times, _AT_END[order]),
+        ):
             if chosen.any():
                 terms = [
-                    weight
-                    * self.schedule(axis, positions, np.maximum(0.0, times[chosen] + k * step))
+                    weight * self.schedule(axis, positions, near[chosen] + k * step)
                     for k, weight in weights.items()
                 ]
                 derivative[chosen] = np.sum(terms, axis=0) / step**order

@@ -11,7 +11,8 @@ import attrs
 from solidsph.errors import SceneError
 
 
-def _as_number(value: Any, field: attrs.Attribute[Any]) -> float:
+def as_number(value: Any, field: attrs.Attribute[Any]) -> float:
+    """`value` as a float; ValueError if it is no number."""
     if isinstance(value, bool) or not isinstance(value, Real):
         raise ValueError(f"{field.name} must be a number, got {value!r}")
     try:
@@ -22,7 +23,7 @@ def _as_number(value: Any, field: attrs.Attribute[Any]) -> float:
 
 def number(**options: Any) -> Any:
     """An attrs field that holds a float, and takes no text and no true or false for one."""
-    return attrs.field(converter=attrs.Converter(_as_number, takes_field=True), **options)
+    return attrs.field(converter=attrs.Converter(as_number, takes_field=True), **options)
 
 
 def check_positive(part: str, name: str, value: float, unit: str) -> None:

@@ -11,6 +11,7 @@ import attrs
 
 from solidsph import registry
 from solidsph.errors import PluginError, SceneError, SolidsphError
+from solidsph.parameters import as_number
 
 
 def construct(kind: str, wanted: object) -> Any:
@@ -40,24 +41,32 @@ def construct(kind: str, wanted: object) -> Any:
     cls = registry.load(kind, name)
     label = f"{registry.singular(kind)} {name!r}"
     fields = _fields(cls, label)
-    for key in parameters:
-        if key not in fields:
-            near = difflib.get_close_matches(key, fields, 1)
-            hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(fields) or 'none'}"
-            raise SceneError(f"{label}: unknown parameter {key!r}; {hint}")
+    wrong: list[str] = []
+    meant: set[str] = set()  # what a mistyped key was meant for is not missing too
+    for key in [key for key in parameters if key not in fields]:
+        near = difflib.get_close_matches(key, fields, 1)
+        meant.update(near)
+        hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(fields) or 'none'}"
+        wrong.append(f"unknown parameter {key!r}; {hint}")
+        del parameters[key]
     missing = [
         key
         for key, field in fields.items()
-        if field.default is attrs.NOTHING and key not in parameters
+        if field.default is attrs.NOTHING and key not in parameters and key not in meant
     ]
     if missing:
-        raise SceneError(
-            f"{label}: missing parameter {', '.join(map(repr, missing))}; give a value"
-        )
+        wrong.append(f"missing parameter {', '.join(map(repr, missing))}; give a value")
     for key, value in parameters.items():
-        nested = fields[key].metadata.get("part")
-        if nested is not None:
-            parameters[key] = _nested(nested, value, fields[key].type, f"{label}: {key}")
+        try:
+            nested = fields[key].metadata.get("part")
+            if nested is not None:
+                parameters[key] = _nested(nested, value, fields[key].type, f"{label}: {key}")
+            elif wrong:  # the part cannot be made, but what it was given can be looked at
+                _check_value(fields[key], value)
+        except SolidsphError as cause:
+            wrong.append(str(cause))
+    if wrong:
+        raise SceneError(f"{label}: {'; '.join(wrong)}")
     try:
         return cls(**parameters)
     except SolidsphError:
@@ -68,6 +77,19 @@ def construct(kind: str, wanted: object) -> Any:
         raise PluginError(
             f"{label}: its constructor failed: {type(cause).__name__}: {cause}"
         ) from cause
+
+
+def _check_value(field: attrs.Attribute[Any], value: object) -> None:
+    """What the field itself asks of a value; what the whole part asks must wait until it is made.
+
+    Raises:
+        SceneError: it is of the wrong type.
+    """
+    if getattr(field.converter, "converter", None) is as_number:
+        try:
+            as_number(value, field)
+        except (TypeError, ValueError, OverflowError) as cause:
+            raise SceneError(str(cause)) from None
 
 
 def describe(kind: str, part: object) -> dict[str, Any]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 from solidsph.errors import BuildError, PluginError, SolidsphError
@@ -13,11 +15,56 @@ T = TypeVar("T")
 _MEMORY = "there is not enough memory for so many particles or pairs; use a larger spacing"
 
 
+# A scene of a thousand bodies can be wrong in one way a thousand times.
+MOST_OF_A_KIND = 10
+_MOST_CHARACTERS = 1500
+
+# What differs between problems of one kind: names and numbers.
+_PARTICULAR = re.compile(r"'[^']*'|[-+]?\d[\d.]*(?:e[-+]?\d+)?")
+
+
+def summarised(problems: Iterable[str]) -> list[str]:
+    """Each problem once and at a length that can be read; of a kind the first ten and a count."""
+    seen: Counter[str] = Counter()
+    shown: dict[str, str] = {}
+    for problem in dict.fromkeys(problems):
+        kind = _PARTICULAR.sub("", problem)
+        seen[kind] += 1
+        if seen[kind] <= MOST_OF_A_KIND:
+            shown[problem] = kind
+    lines: list[str] = []
+    last = {kind: problem for problem, kind in shown.items()}
+    for problem, kind in shown.items():
+        lines.append(_shortened(problem))
+        if problem == last[kind] and seen[kind] > MOST_OF_A_KIND:
+            lines.append(f"and {seen[kind] - MOST_OF_A_KIND} more of this kind")
+    return lines
+
+
+def listed(origin: str, problems: Sequence[str]) -> str:
+    """One message of several problems of what `origin` names."""
+    if len(problems) == 1:
+        return f"{origin}: {problems[0]}"
+    return "\n  - ".join([f"{origin}: {len(problems)} problems:", *problems])
+
+
+def _shortened(problem: str) -> str:
+    if len(problem) <= _MOST_CHARACTERS:
+        return problem
+    half = _MOST_CHARACTERS // 2
+    return f"{problem[:half]} ... {problem[-half:]}"
+
+
 class Problems:
     """Collects problems, each with its remedy, until it makes no sense to look further."""
 
     def __init__(self) -> None:
         self._found: list[str] = []
+
+    @property
+    def found(self) -> Sequence[str]:
+        """All that were noted so far; each once, and of many of one kind the first."""
+        return summarised(self._found)
 
     def add(self, problems: Iterable[str]) -> None:
         """Note some problems."""
@@ -46,7 +93,7 @@ class Problems:
     def stop_if_any(self) -> None:
         """Raise BuildError with all problems noted so far, if there are any."""
         if self._found:
-            raise BuildError(self._found)
+            raise BuildError(self.found)
 
     def settled(self, value: T | None) -> T:
         """A value that an attempt has made; raises BuildError with its problems if it has not."""

@@ -77,10 +77,9 @@ def find(kind: str, name: str) -> Entry:
     if not claims:
         known = names(kind)
         near = difflib.get_close_matches(name, known, 1)
-        hint = f"did you mean {near[0]!r}?" if near else "install the plugin that provides it"
-        raise SceneError(
-            f"unknown {singular(kind)} {name!r}; {hint} (installed: {', '.join(known) or 'none'})"
-        )
+        install = f"install the plugin that provides it (installed: {', '.join(known) or 'none'})"
+        hint = f"did you mean {near[0]!r}?" if near else install
+        raise SceneError(f"unknown {singular(kind)} {name!r}; {hint}")
     if len({claim.target for claim in claims}) > 1:
         rivals = " and ".join(f"{c.distribution} {c.version} ({c.target})" for c in claims)
         raise PluginError(

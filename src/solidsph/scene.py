@@ -6,10 +6,7 @@ a scene runs, and can be written to a file if its parts are registered.
 
 from __future__ import annotations
 
-import difflib
-import tomllib
 from collections.abc import Mapping, Sequence
-from math import isfinite
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -102,23 +99,21 @@ class Scene:
         Raises:
             SceneError: the file is missing, is not TOML, or says something unknown.
         """
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as cause:
-            raise SceneError(f"scene {str(path)!r} cannot be read: {cause}") from None
-        return cls.from_toml(text, str(path))
+        from solidsph.reading import text_of  # reading imports this module
+
+        return cls.from_toml(text_of(path), str(path))
 
     @classmethod
     def from_toml(cls, text: str, origin: str = "scene") -> Scene:
-        """From TOML text; `origin` is named in errors."""
-        try:
-            table = tomllib.loads(text)
-        except (tomllib.TOMLDecodeError, RecursionError) as cause:
-            raise SceneError(f"{origin} is not valid TOML: {cause}") from None
-        try:
-            return _scene(table)
-        except SceneError as cause:
-            raise SceneError(f"{origin}: {cause}") from None
+        """From TOML text; `origin` is named in errors.
+
+        Raises:
+            SceneError: it is not TOML, or says something unknown. Then the scene is also looked
+                through for whatever else is wrong with it, and all of it is told together.
+        """
+        from solidsph.reading import scene_of  # reading imports this module
+
+        return scene_of(text, origin)
 
     def to_toml(self) -> str:
         """TOML text from which an equal scene is read.
@@ -127,167 +122,6 @@ class Scene:
             SceneError: the scene holds objects or functions that a file cannot.
         """
         return tomli_w.dumps(_table(self))
-
-
-_SECTIONS = {
-    "body": "[body.NAME]",
-    "kernel": "[kernel]",
-    "material": "[material]",
-    "formulation": "[formulation]",
-    "boundary": "[[boundary]]",
-    "effect": "[[effect]]",
-    "initial": "[[initial]]",
-    "integrator": "[integrator]",
-    "sleep": "[sleep]",
-    "statics": "[statics]",
-}
-_SCALARS = ("title", "duration", "outputs", "engine", "silence")
-
-
-def _scene(table: Mapping[str, Any]) -> Scene:
-    _check_keys(table, (*_SCALARS, *_SECTIONS), "scene")
-    bodies = _mapping(table.get("body", {}), "body")
-    if not bodies:
-        raise SceneError("no body; add a table [body.NAME] with a shape and a spacing")
-    if "duration" not in table:
-        raise SceneError("no duration; add duration = ... in seconds")
-    values: dict[str, Any] = {
-        "bodies": {name: _body(name, body) for name, body in bodies.items()},
-        "duration": number(table["duration"], "duration"),
-        "boundaries": [_imposed(one, "boundary") for one in _list(table, "boundary")],
-        "effects": [_imposed(one, "effect") for one in _list(table, "effect")],
-        "initial": [_initial(one) for one in _list(table, "initial")],
-    }
-    for key in ("title", "engine"):
-        if key in table:
-            values[key] = _text(table[key], key)
-    if "outputs" in table:
-        values["outputs"] = _count(table["outputs"], "outputs")
-    if "silence" in table:
-        values["silence"] = _names(table["silence"], "silence")
-    for key in ("material", "formulation"):
-        if key in table:
-            values[key] = table[key]
-    if "sleep" in table:
-        values["sleep"] = _sleep(table["sleep"])
-    if "statics" in table:
-        values["statics"] = _statics(table["statics"])
-    for key, extra in (("kernel", ("cover",)), ("integrator", ("time_step_factor", "time_step"))):
-        if key in table:
-            part = table[key]
-            if isinstance(part, Mapping):
-                part = dict(part)
-                for name in extra:
-                    if name in part:
-                        values[name] = number(part.pop(name), f"{key}.{name}")
-                if not part:
-                    continue
-            values[key] = part
-    return Scene(**values)
-
-
-def _body(name: str, body: Any) -> BodyScene:
-    body = _mapping(body, f"body.{name}")
-    _check_keys(body, [field.name for field in attrs.fields(BodyScene)], f"body.{name}")
-    for key, unit in (("shape", "a shape"), ("spacing", "metres")):
-        if key not in body:
-            raise SceneError(f"body.{name}: no {key}; add {key} = ... ({unit})")
-    tags = _mapping(body.get("tags", {}), f"body.{name}.tags")
-    return BodyScene(
-        **{
-            **body,
-            "spacing": number(body["spacing"], f"body.{name}.spacing"),
-            "tags": {tag: _text(where, f"body.{name}.tags.{tag}") for tag, where in tags.items()},
-        }
-    )
-
-
-def _imposed(entry: Any, what: str) -> ImposedScene:
-    if isinstance(entry, str):
-        return ImposedScene(entry)
-    part = dict(_mapping(entry, what))
-    label = part.pop("label", None)
-    return ImposedScene(part, None if label is None else _text(label, f"{what}.label"))
-
-
-def _initial(entry: Any) -> InitialScene:
-    entry = _mapping(entry, "initial")
-    _check_keys(entry, [field.name for field in attrs.fields(InitialScene)], "initial")
-    return InitialScene(**entry)
-
-
-def _sleep(entry: Any) -> SleepScene:
-    entry = dict(_mapping(entry, "sleep"))
-    _check_keys(entry, [field.name for field in attrs.fields(SleepScene)], "sleep")
-    if "slabs" in entry:
-        _count(entry["slabs"], "sleep.slabs")
-    if "tolerance" in entry:
-        entry["tolerance"] = number(entry["tolerance"], "sleep.tolerance")
-    return SleepScene(**entry)
-
-
-def _statics(entry: Any) -> StaticsScene:
-    entry = dict(_mapping(entry, "statics"))
-    _check_keys(entry, [field.name for field in attrs.fields(StaticsScene)], "statics")
-    for key in ("load_steps", "max_iterations"):
-        if key in entry:
-            _count(entry[key], f"statics.{key}")
-    if "tolerance" in entry:
-        entry["tolerance"] = number(entry["tolerance"], "statics.tolerance")
-    return StaticsScene(**entry)
-
-
-def number(value: Any, what: str) -> float:
-    """`value` as a finite float; SceneError otherwise."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise SceneError(f"{what} must be a number, got {value!r}")
-    try:
-        result = float(value)
-    except OverflowError:
-        result = float("inf")
-    if not isfinite(result):
-        raise SceneError(f"{what} must be finite, got {value!r}")
-    return result
-
-
-def _count(value: Any, what: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise SceneError(f"{what} must be a whole number, got {value!r}")
-    return value
-
-
-def _names(value: Any, what: str) -> tuple[str, ...]:
-    if not isinstance(value, list):
-        raise SceneError(f'{what} must be a list of names such as ["few-across"], got {value!r}')
-    return tuple(_text(one, what) for one in value)
-
-
-def _text(value: Any, what: str) -> str:
-    if not isinstance(value, str):
-        raise SceneError(f"{what} must be text, got {value!r}")
-    return value
-
-
-def _mapping(value: Any, what: str) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        shown = _SECTIONS.get(what, f"a table {what}")
-        raise SceneError(f"{what} must be a table, got {value!r}; write {shown}")
-    return value
-
-
-def _list(table: Mapping[str, Any], key: str) -> list[Any]:
-    value = table.get(key, [])
-    if not isinstance(value, list):
-        raise SceneError(f"{key} must be a list of tables; write {_SECTIONS[key]}")
-    return value
-
-
-def _check_keys(table: Mapping[str, Any], known: Sequence[str], what: str) -> None:
-    for key in table:
-        if key not in known:
-            near = difflib.get_close_matches(key, known, 1)
-            hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(known)}"
-            raise SceneError(f"{what}: unknown key {key!r}; {hint}")
 
 
 def _table(scene: Scene) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 
 import attrs
 from scipy.sparse import block_diag, csr_array
@@ -23,6 +24,7 @@ class Setting:
     masses: Array  # (n,) [kg], 0 for ghosts
     bodies: Sequence[Body]
     step_size: float  # time step of the run [s]
+    end: float = inf  # of the run [s]; no formula of time need have a value beyond it
 
     def select(self, where: Where) -> Indices:
         """Indices of the particles at `where`.

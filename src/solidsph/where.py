@@ -93,11 +93,16 @@ def holds(
         _check_names(particles, where)
     axes = AXES[: particles.dimension]
     try:
-        formula = Expression.parse(text, [*tags, *axes, *values])
+        formula = Expression.parse(text, [*tags, *axes, *values, "t"])
     except SceneError:
         _check_names(particles, where)
         raise
     used = names_in(text)
+    if "t" in used:
+        raise SceneError(
+            f"where = {where!r} uses t, but particles are chosen once, before the run: use X, Y, "
+            "Z and tags here, and t in the formula of what is imposed"
+        )
     values |= {name: tagged(tag) for name, tag in tags.items() if name in used}
     values |= {name: particles.positions[owners, k] for k, name in enumerate(axes)}
     result = np.asarray(formula(values))

@@ -189,7 +189,7 @@ def smoothed_value(
     Raises:
         SceneError: nothing matches, or the equations of this solve have no unique solution.
     """
-    field = VectorField.of(displacement, f"{handler}: displacement")
+    field = VectorField.of(displacement, f"{handler}: displacement", end=setting.end)
     field.check_dimension(setting.particles.dimension, handler)
     boundary = setting.select(where)
     if setting.particles.ghosts[boundary].any():
@@ -220,7 +220,7 @@ def _extension(
 ) -> Extension:
     if known is None:
         return ReflectedExtension(reflected(setting.particles, ghosts))
-    beyond = VectorField.of(known, f"{handler}: extension")
+    beyond = VectorField.of(known, f"{handler}: extension", end=setting.end)
     missing = set(field.components) - set(beyond.components)
     if missing:
         raise SceneError(

@@ -42,7 +42,7 @@ class ApproximateNeumann(BoundaryHandler):
 
     def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
         particles = setting.particles
-        field = VectorField.of(self.traction, "approximate-neumann: traction")
+        field = VectorField.of(self.traction, "approximate-neumann: traction", end=setting.end)
         field.check_dimension(particles.dimension, "approximate-neumann")
         face = setting.surface(self.where)
         boundary, area_vectors = face.particles, face.area_vectors

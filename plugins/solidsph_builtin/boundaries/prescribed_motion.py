@@ -28,7 +28,9 @@ class PrescribedMotion(BoundaryHandler):
     displacement: Mapping[str, Component]  # such as {x = "0.1*t", y = 0} [m]
 
     def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
-        field = VectorField.of(self.displacement, "prescribed-motion: displacement")
+        field = VectorField.of(
+            self.displacement, "prescribed-motion: displacement", end=setting.end
+        )
         field.check_dimension(setting.particles.dimension, "prescribed-motion")
         indices = setting.select(self.where)
         for axis in field.components:  # a formula out of its domain shows now, not in mid-run

@@ -40,7 +40,7 @@ class Pressure(BoundaryHandler):
     def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
         particles = setting.particles
         in_the_reference(setting, "pressure")
-        field = VectorField.of({"x": self.pressure}, "pressure: pressure")
+        field = VectorField.of({"x": self.pressure}, "pressure: pressure", end=setting.end)
         face = setting.surface(self.where)
         field.values(0, particles.positions[face.particles], 0.0)
         return [

@@ -39,7 +39,7 @@ class Traction(BoundaryHandler):
 
     def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
         particles = setting.particles
-        field = VectorField.of(self.traction, "traction: traction")
+        field = VectorField.of(self.traction, "traction: traction", end=setting.end)
         field.check_dimension(particles.dimension, "traction")
         face = setting.surface(self.where)
         indices = face.particles

@@ -51,6 +51,7 @@ class Mapped(Discretisation):
         d = shape.dimension
         field = VectorField.of(self.to, "discretisation 'mapped': to")
         field.check_dimension(d, "discretisation 'mapped': to")
+        field.check_without("t", "particles are placed once, before the run: use X, Y and Z")
         if self.before.dimension != d:
             raise refusal(
                 self, f"the shape has {d} dimensions, but `before` has {self.before.dimension}"

@@ -28,7 +28,7 @@ class BodyForce(Effect):
     where: Where = "all"
 
     def bind(self, setting: Setting, label: str) -> ForceCondition:
-        field = VectorField.of(self.acceleration, "body-force: acceleration")
+        field = VectorField.of(self.acceleration, "body-force: acceleration", end=setting.end)
         field.check_dimension(setting.particles.dimension, "body-force")
         indices = setting.select(self.where)
         return _MassTimesField(

@@ -94,9 +94,14 @@ class Heat(Effect):
                 )
         X = setting.particles.positions
         held = [
-            (setting.select(where), VectorField.of({"x": value}, "heat: held.temperature"))
+            (
+                setting.select(where),
+                VectorField.of({"x": value}, "heat: held.temperature", end=setting.end),
+            )
             for where, value in self.held
         ]
+        start = VectorField.of({"x": self.initial}, "heat: initial")
+        start.check_without("t", "the temperature at the start is asked once, at t = 0")
         return _Conduction(
             label=label,
             reference=X,
@@ -104,8 +109,8 @@ class Heat(Effect):
             capacities=self.heat_capacity * setting.masses,
             volumes=np.where(setting.particles.ghosts, 0.0, setting.particles.volumes),
             expansion=self.expansion,
-            start=VectorField.of({"x": self.initial}, "heat: initial").values(0, X, 0.0),
-            source=VectorField.of({"x": self.source}, "heat: source"),
+            start=start.values(0, X, 0.0),
+            source=VectorField.of({"x": self.source}, "heat: source", end=setting.end),
             held=held,
             gradients=[body_gradient(b) for b in setting.bodies] if self.expansion else [],
         )

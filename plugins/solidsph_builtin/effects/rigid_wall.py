@@ -23,7 +23,7 @@ from solidsph.interfaces.effect import Effect, Need
 from solidsph.motion import Component, VectorField
 from solidsph.parameters import check_positive, number
 from solidsph.setting import Setting
-from solidsph.where import Where
+from solidsph.where import AXES, Where
 from solidsph_builtin.boundaries._reports import resultant
 from solidsph_builtin.effects._slip import slid
 
@@ -80,7 +80,8 @@ class RigidWall(Effect):
         indices = setting.select(self.where)
         field = None
         if self.displacement is not None:
-            field = VectorField.of(self.displacement, "rigid-wall: displacement")
+            field = VectorField.of(self.displacement, "rigid-wall: displacement", end=setting.end)
+            field.check_without(AXES, "a wall moves as a whole: its motion is a formula of t")
             field.check_dimension(d, "rigid-wall")
         moduli = np.concatenate(
             [

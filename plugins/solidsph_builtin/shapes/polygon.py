@@ -14,6 +14,13 @@ from solidsph_builtin.shapes._checks import as_points, check_coordinates, refusa
 from solidsph_builtin.shapes._sampling import ON_LINE, joined, midpoints
 
 
+def _as_ring(value: Any) -> Any:
+    """Points without the first one repeated at the end; anything else as it is."""
+    points = as_points(value)
+    closed = isinstance(points, tuple) and len(points) > 3 and points[0] == points[-1]
+    return points[:-1] if closed else points
+
+
 def _check_vertices(shape: Shape, field: attrs.Attribute[Any], value: object) -> None:
     if not (isinstance(value, tuple) and len(value) >= 3):
         raise refusal(shape, field.name, "a list of at least 3 points", short(value))
@@ -25,7 +32,8 @@ def _check_vertices(shape: Shape, field: attrs.Attribute[Any], value: object) ->
 class Polygon(Shape):
     """The points enclosed by straight edges from each of the `vertices` to the next.
 
-    Vertices may run either way round. Faces: edge-0 from the first vertex to the second, edge-1,
+    Vertices may run either way round, and the first may be repeated at the end, as drawings and
+    geographic formats close their rings: the last edge is there in any case. Faces: edge-0 from the first vertex to the second, edge-1,
     and so on.
 
     Raises:
@@ -34,7 +42,7 @@ class Polygon(Shape):
     """
 
     vertices: tuple[tuple[float, ...], ...] = attrs.field(  # [m]
-        converter=as_points, validator=_check_vertices
+        converter=_as_ring, validator=_check_vertices
     )
 
     def __attrs_post_init__(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import click
@@ -98,7 +99,13 @@ def _conform(name: str, kind: str | None, settings: tuple[str, ...], as_json: bo
             f"there is no conformance kit for a {registry.singular(found)}; kits exist for "
             f"{', '.join(registry.singular(one) for one in kits())}"
         )
-    part = example_part(found, name, **parameters(settings))
+    try:
+        part = example_part(found, name, **parameters(settings))
+    except SceneError as cause:
+        missing = re.search(r"missing parameter '(\w+)'", str(cause))
+        if missing is None:
+            raise
+        raise SceneError(f"{cause}, such as --set {missing[1]}=1.0") from None
     entry = registry.find(found, name)
     results = conformance(found, part)
     good = all(result.passed for result in results)

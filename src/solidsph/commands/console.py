@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -21,9 +22,26 @@ if TYPE_CHECKING:
     from solidsph.simulation import Simulation
     from solidsph.studies.sweep import Standing, Watch
 
+
+class _Console(Console):
+    """One whose reader may go away, as `head` does: the work goes on, and is no failure."""
+
+    def on_broken_pipe(self) -> None:
+        self.quiet = True
+        _stop_writing(self.file)
+
+
+def _stop_writing(stream: IO[str]) -> None:
+    """What is still written to the `stream` goes nowhere."""
+    with suppress(OSError, ValueError):  # no file, or a closed one
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+
+
 # Where no terminal gives a width, a file or a pipe has room for the widest table.
-out = Console(highlight=False, width=None if sys.stdout.isatty() else 170)
-err = Console(stderr=True, highlight=False)
+out = _Console(highlight=False, width=None if sys.stdout.isatty() else 170)
+err = _Console(stderr=True, highlight=False)
 
 
 def say(text: str) -> None:
@@ -45,7 +63,11 @@ def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]
 
 def show_json(data: Mapping[str, Any]) -> None:
     """One JSON object on the standard output."""
-    sys.stdout.write(json.dumps(_jsonable(data), indent=2, allow_nan=False) + "\n")
+    try:
+        sys.stdout.write(json.dumps(_jsonable(data), indent=2, allow_nan=False) + "\n")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _stop_writing(sys.stdout)
 
 
 @contextmanager

@@ -32,7 +32,7 @@ from solidsph.statics.freedoms import freedoms
 
 
 @click.command()
-@click.argument("target", metavar="SCENE|CASE")
+@click.argument("target", metavar="SCENE|-|CASE")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A case's parameter.")
 @click.option(
     "--cluster",

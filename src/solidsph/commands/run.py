@@ -11,7 +11,7 @@ import click
 from rich.markup import escape
 
 from solidsph.commands.console import ProgressObserver, err, progress, say, show_json, show_table
-from solidsph.commands.target import resolve
+from solidsph.commands.target import name_of, resolve
 from solidsph.errors import SceneError
 from solidsph.interfaces.case import Case, Measurement
 from solidsph.scene import Scene
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("target", metavar="SCENE|CASE")
+@click.argument("target", metavar="SCENE|-|CASE")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A case's parameter.")
 @click.option(
     "--output",
@@ -71,12 +71,12 @@ def run(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Run a scene file, or a case by its name, and record it."""
+    """Run a scene file, a scene from the standard input (-) or a case, and record it."""
     wanted = resolve(target, settings)
     if write is not None:
         _write(wanted, write)
         return
-    folder = output or Path("results") / Path(target).stem
+    folder = output or Path("results") / name_of(target)
     shown = not (as_json or quiet)
     if receipts_of and not receipts:
         raise SceneError("--receipts-of says what --receipts is to look at; add --receipts")
@@ -140,7 +140,7 @@ def _run_scene(
         say(told.announcement(prediction))
     path = folder / "record.h5"
     with progress(shown) as display:
-        observers = [ProgressObserver(display, Path(target).stem, simulation)] if display else []
+        observers = [ProgressObserver(display, name_of(target), simulation)] if display else []
         if watched is None:
             result = carry_out(simulation, record=path, observers=observers)
         else:

@@ -2,35 +2,60 @@
 
 from __future__ import annotations
 
+import sys
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from solidsph import registry
+from solidsph.encoding import decoded
 from solidsph.errors import SceneError
 from solidsph.interfaces.case import Case
 from solidsph.parts import construct
+from solidsph.reading import MOST_BYTES, near
 from solidsph.scene import Scene
+
+STANDARD_INPUT = "-"
 
 
 def resolve(target: str, settings: Sequence[str]) -> Scene | Case:
-    """A scene from a path, or a case from its name with parameters `name=value`.
+    """A scene from a path or the standard input, or a case from its name with `name=value`.
 
     Raises:
         SceneError: neither a file nor a case is called so, or a setting is wrong.
     """
     path = Path(target)
-    if target.endswith(".toml") or path.exists():
+    cases = registry.names("cases")
+    is_case = target in cases and not path.is_file()
+    if not is_case and (target == STANDARD_INPUT or target.endswith(".toml") or path.exists()):
         if settings:
             raise SceneError(
                 f"--set changes the parameters of a case; {target!r} is a scene file: edit it"
             )
-        return Scene.read(path)
-    if target not in registry.names("cases") and ("/" in target or "." in target):
-        raise SceneError(f"no file {target!r}; give a scene file, or a case: solidsph cases")
+        return _from_standard_input() if target == STANDARD_INPUT else Scene.read(path)
+    if target not in cases:
+        what = "no file" if "/" in target or "." in target else "unknown case"
+        hint = near(target, *cases) or "; give a scene file, or a case: solidsph cases"
+        raise SceneError(f"{what} {target!r}{hint}")
     case: Case = construct("cases", {"type": target, **parameters(settings)})
     return case
+
+
+def name_of(target: str) -> str:
+    """What its results are called."""
+    return "standard-input" if target == STANDARD_INPUT else Path(target).stem
+
+
+def _from_standard_input() -> Scene:
+    origin = "the standard input"
+    data = sys.stdin.buffer.read(MOST_BYTES + 1)
+    if len(data) > MOST_BYTES:
+        raise SceneError(f"{origin} goes on after {MOST_BYTES:,} bytes, which no scene has")
+    try:
+        return Scene.from_toml(decoded(data), origin)
+    except ValueError as cause:
+        raise SceneError(f"{origin} cannot be read: {cause}") from None
 
 
 def parameters(settings: Sequence[str]) -> dict[str, Any]:

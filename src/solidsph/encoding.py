@@ -1,0 +1,19 @@
+"""Text as editors and spreadsheets write it."""
+
+from __future__ import annotations
+
+import codecs
+
+
+def decoded(data: bytes) -> str:
+    """Text in UTF-8, with or without the byte order mark that some programs put first.
+
+    Raises:
+        ValueError: it is in another encoding, or no text.
+    """
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or 0 in data:
+        raise ValueError("it is in UTF-16, or no text at all; save it as text in UTF-8")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as cause:
+        raise ValueError(f"it is not in UTF-8 ({cause}); save it so") from None

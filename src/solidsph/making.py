@@ -1,0 +1,184 @@
+"""Making: the parts that the names of a scene stand for, as far as they can be understood."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from solidsph import compatibility, registry
+from solidsph.engines.engine import Engine
+from solidsph.engines.select import engine_named
+from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.formulation import Formulation
+from solidsph.interfaces.integrator import Integrator
+from solidsph.interfaces.kernel import Kernel
+from solidsph.interfaces.material import Material
+from solidsph.interfaces.shape import Shape
+from solidsph.particles import Particles
+from solidsph.parts import construct
+from solidsph.problems import Problems
+from solidsph.scene import DEFAULT_INTEGRATOR, BodyScene, ImposedScene, PartLike, Scene
+from solidsph.where import EVERYWHERE
+
+# Particles that are soon made, to see what is wrong with places in a scene that is wrong anyway.
+_SOON_MADE = 1e6
+
+
+@attrs.frozen(eq=False)
+class Parts:
+    """What the names of a scene stand for; None where a name could not be understood."""
+
+    kernel: Kernel | None
+    formulation: Formulation | None
+    integrator: Integrator | None
+    engine: Engine | None
+    handlers: Mapping[str, Any]
+    effects: Mapping[str, Effect]
+    shapes: Mapping[str, Shape]
+    materials: Mapping[str, Material]
+    sets: Mapping[str, Particles]
+
+
+class Making:
+    """Makes the parts of one scene, and notes what is wrong with them among the `problems`."""
+
+    def __init__(self, scene: Scene, problems: Problems) -> None:
+        self._scene = scene
+        self._problems = problems
+        self.labels: set[str] = set()  # of the accounts of boundaries and effects
+        self.used: dict[registry.Entry, None] = {}  # plugins in the order of their use, each once
+
+    def parts(self) -> Parts:
+        """All of them."""
+        scene, problems = self._scene, self._problems
+        problems.add(compatibility.numbers(scene))
+        problems.add(compatibility.statics(scene))
+        problems.add(compatibility.sleep(scene))
+        if scene.silence:
+            from solidsph import advice  # only where its names are asked for
+
+            problems.add(advice.unknown(scene.silence))
+        kernel: Kernel | None = self._make("kernels", scene.kernel)
+        formulation: Formulation | None = self._make("formulations", scene.formulation)
+        integrator = self._integrator()
+        engine: Engine | None = problems.attempt(engine_named, _engine_name(scene))
+        handlers = self._labelled("boundaries", scene.boundaries)
+        effects: dict[str, Effect] = self._labelled("effects", scene.effects)
+        problems.add(compatibility.effects(effects))
+        shapes, materials, sets = self._body_parts()
+        return Parts(
+            kernel, formulation, integrator, engine, handlers, effects, shapes, materials, sets
+        )
+
+    def _make(self, kind: str, wanted: PartLike) -> Any:
+        part = self._problems.attempt(construct, kind, wanted)
+        if part is not None:
+            self._note(kind, part)
+        return part
+
+    def _integrator(self) -> Integrator | None:
+        """The scene's, or the default, which is not noted where nothing will move by it."""
+        made: Integrator | None = (
+            self._make("integrators", self._scene.integrator or DEFAULT_INTEGRATOR)
+            if self._scene.statics is None
+            else self._problems.attempt(construct, "integrators", DEFAULT_INTEGRATOR)
+        )
+        return made
+
+    def _note(self, kind: str, part: Any) -> None:
+        """Remember which plugins a part, and the parts inside it, came from."""
+        self.used[registry.entry_of(kind, part)] = None
+        if not attrs.has(type(part)):
+            return
+        for field in attrs.fields(type(part)):
+            nested = field.metadata.get("part")
+            if nested is not None:
+                value = getattr(part, field.name)
+                for one in value if isinstance(value, (list, tuple)) else [value]:
+                    self._note(nested, one)
+
+    def _labelled(self, kind: str, entries: Sequence[ImposedScene]) -> dict[str, Any]:
+        """Parts by the label of their account: the one given, or one made of name and place."""
+        made: dict[str, Any] = {}
+        for entry in entries:
+            part = self._make(kind, entry.part)
+            if part is None:
+                continue
+            label = entry.label or _label(kind, part)
+            if not label.isprintable():
+                self._problems.add([f"label {label!r} has signs that cannot be shown; use others"])
+            if label in self.labels and entry.label:
+                self._problems.add(
+                    [f"two accounts are labelled {label!r}; give each a label of its own"]
+                )
+            while label in self.labels:
+                label = f"{label}'"
+            self.labels.add(label)
+            made[label] = part
+        return made
+
+    def _body_parts(
+        self,
+    ) -> tuple[dict[str, Shape], dict[str, Material], dict[str, Particles]]:
+        """Shape, material and particles of every body, by its name."""
+        shapes: dict[str, Shape] = {}
+        materials: dict[str, Material] = {}
+        made: dict[str, Discretisation] = {}
+        bodies = self._scene.bodies
+        for name, body in bodies.items():
+            shape: Shape | None = self._make("shapes", body.shape)
+            discretisation: Discretisation | None = self._make(
+                "discretisations", body.discretisation
+            )
+            material = self._material(name, body)
+            if material is not None:
+                materials[name] = material
+            if shape is not None:
+                shapes[name] = shape
+                if discretisation is not None:
+                    made[name] = discretisation
+        if self._problems.found and not all(
+            _soon_made(shape, bodies[name].spacing) for name, shape in shapes.items()
+        ):
+            return shapes, materials, {}
+        found = {
+            name: self._problems.attempt(one.particles, shapes[name], bodies[name].spacing)
+            for name, one in made.items()
+        }
+        sets = {name: own for name, own in found.items() if own is not None}
+        return shapes, materials, sets
+
+    def _material(self, name: str, body: BodyScene) -> Material | None:
+        wanted = body.material if body.material is not None else self._scene.material
+        if wanted is None:
+            self._problems.add(
+                [f"body {name!r} has no material; give it one, or one to the whole scene"]
+            )
+            return None
+        material: Material | None = self._make("materials", wanted)
+        return material
+
+
+def _engine_name(scene: Scene) -> str:
+    """Equilibria are found with assembled matrices: there is nothing to compile."""
+    return "matrix" if scene.statics is not None and scene.engine == "auto" else scene.engine
+
+
+def _soon_made(shape: Shape, spacing: object) -> bool:
+    if not isinstance(spacing, (int, float)) or not spacing > 0.0:
+        return True  # it is refused at once
+    lower, upper = shape.bounds()
+    with np.errstate(all="ignore"):
+        return bool(np.prod((upper - lower) / spacing) < _SOON_MADE)
+
+
+def _label(kind: str, part: object) -> str:
+    name = registry.entry_of(kind, part).name or type(part).__name__
+    where = getattr(part, "where", None)
+    if isinstance(where, str) and where not in (EVERYWHERE, "ghosts"):
+        return f"{name} {where}"
+    return name
