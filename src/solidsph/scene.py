@@ -17,6 +17,7 @@ import attrs
 import tomli_w
 
 from solidsph.errors import SceneError
+from solidsph.files import content
 from solidsph.parts import describe
 from solidsph.where import EVERYWHERE, Where
 
@@ -71,6 +72,9 @@ class SleepScene:
 
 DEFAULT_INTEGRATOR = "velocity-verlet"
 
+# Of a scene file: more than any list of vertices takes, less than any memory has.
+_MOST_BYTES = 2**26
+
 
 @attrs.frozen
 class Scene:
@@ -103,7 +107,7 @@ class Scene:
             SceneError: the file is missing, is not TOML, or says something unknown.
         """
         try:
-            text = path.read_text(encoding="utf-8")
+            text = content(path, _MOST_BYTES).decode("utf-8")
         except (OSError, UnicodeDecodeError) as cause:
             raise SceneError(f"scene {str(path)!r} cannot be read: {cause}") from None
         return cls.from_toml(text, str(path))

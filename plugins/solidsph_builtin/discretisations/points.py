@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import warnings
 from pathlib import Path
 from reprlib import repr as short
@@ -12,6 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.arrays import Array
+from solidsph.files import content, located
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
 from solidsph.particles import Particles
@@ -26,6 +28,8 @@ _TOLERANCE = 1e-6
 # that none lies between two points of a lattice.
 _SAMPLES = {1: 64, 2: 8, 3: 4}
 _CHUNK = 1 << 16
+# Of a file of points: some 25 characters for each coordinate of 5e7 points in space.
+_MOST_BYTES = 2**32
 
 
 def _as_array(value: Any) -> Any:
@@ -46,7 +50,8 @@ class Points(Discretisation):
 
     They are either listed as `positions`, or read from a `file` with a row for each point and a
     column for each dimension: .npy, .csv with commas, or text with blanks; comments begin
-    with #. A relative path starts from the working directory.
+    with #. It is a regular file of up to 4 GiB. A relative path starts from the working directory;
+    of a run that is gone on with, from the one that it was begun in.
 
     Volumes are given, and taken as they are, or else what part of the shape is nearest to each
     point, found by sampling and scaled to the exact total where the shape knows its own. Each
@@ -119,11 +124,12 @@ class Points(Discretisation):
             with warnings.catch_warnings():
                 # A file without any number is only warned about.
                 warnings.simplefilter("error", UserWarning)
+                data = io.BytesIO(content(located(path), _MOST_BYTES))
                 if path.suffix == ".npy":
-                    return np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
+                    return np.asarray(np.load(data, allow_pickle=False), dtype=np.float64)
                 delimiter = "," if path.suffix == ".csv" else None
-                return np.loadtxt(path, delimiter=delimiter, ndmin=2)
-        except (OSError, ValueError, TypeError, EOFError, UserWarning) as error:
+                return np.loadtxt(data, delimiter=delimiter, ndmin=2, encoding="utf-8")
+        except (OSError, ValueError, TypeError, EOFError, UserWarning, MemoryError) as error:
             raise refusal(
                 self, f"cannot read positions from {str(path)!r}: {error}; expected rows of numbers"
             ) from error
