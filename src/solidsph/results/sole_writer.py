@@ -11,6 +11,7 @@ import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
+from functools import cache
 from pathlib import Path
 
 from solidsph.errors import RecordError
@@ -90,7 +91,7 @@ def _locked(lock: Path) -> int:
             # Its last holder may have removed it after it was opened here.
             there = os.fstat(handle)
             with suppress(FileNotFoundError):
-                if os.path.samestat(there, os.stat(lock)):
+                if os.path.samestat(there, lock.stat()):
                     break
         except BaseException:
             os.close(handle)
@@ -99,8 +100,7 @@ def _locked(lock: Path) -> int:
     now = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
     os.ftruncate(handle, 0)
     os.write(handle, f"process {os.getpid()} on {socket.gethostname()}, since {now}\n".encode())
-    if not _held and hasattr(os, "register_at_fork"):
-        _forget_in_forks()
+    _forget_in_forks()
     _held[handle] = os.getpid()
     return handle
 
@@ -113,15 +113,11 @@ def _release(handle: int, lock: Path) -> None:
     os.close(handle)
 
 
+@cache
 def _forget_in_forks() -> None:
     """A fork must not keep a lock when the process that took it has ended."""
-    global _forgets
-    if not _forgets:
-        _forgets = True
+    if hasattr(os, "register_at_fork"):
         os.register_at_fork(after_in_child=_forget)
-
-
-_forgets = False
 
 
 def _forget() -> None:
