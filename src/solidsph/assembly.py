@@ -40,15 +40,19 @@ from solidsph.motion import VectorField
 from solidsph.particles import Particles, State
 from solidsph.parts import construct
 from solidsph.problems import Problems
-from solidsph.scene import DEFAULT_INTEGRATOR, BodyScene, ImposedScene, PartLike, Scene
+from solidsph.scene import (
+    DEFAULT_INTEGRATOR,
+    MOST_STEPS,
+    BodyScene,
+    ImposedScene,
+    PartLike,
+    Scene,
+)
 from solidsph.setting import Setting
 from solidsph.simulation import Simulation
 from solidsph.smoothing import smoothing_kernel
 from solidsph.step_size import largest_step
 from solidsph.where import EVERYWHERE, select
-
-# No run of more steps ends; a scene that asks for them has its units wrong.
-_MOST_STEPS = 1e10
 
 
 class Assembly:
@@ -322,11 +326,11 @@ class Assembly:
                 "instead"
             )
         step = scene.time_step or scene.time_step_factor * largest
-        if not (step > 0.0 and scene.duration / step <= _MOST_STEPS):
+        if not (step > 0.0 and scene.duration / step <= MOST_STEPS):
             raise SceneError(
                 f"a duration of {scene.duration:.6g} s in steps of {step:.6g} s takes "
                 f"{scene.duration / step if step > 0.0 else float('inf'):.3g} steps, at most "
-                f"{_MOST_STEPS:.0e} are allowed; shorten the duration, or check the units of "
+                f"{MOST_STEPS:.0e} are allowed; shorten the duration, or check the units of "
                 "modulus, density and spacing"
             )
         return step

@@ -72,6 +72,9 @@ class SleepScene:
 
 DEFAULT_INTEGRATOR = "velocity-verlet"
 
+# No run of more steps ends; a scene that asks for them has its units wrong.
+MOST_STEPS = 1e10
+
 # Of a scene file: more than any list of vertices takes, less than any memory has.
 _MOST_BYTES = 2**26
 

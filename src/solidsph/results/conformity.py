@@ -59,46 +59,46 @@ _FIRST = (
 """What tells what else there is."""
 
 
-def check_first(file: Any) -> None:
+def check_first(tree: Tree) -> None:
     """That what tells the rest is there.
 
     Raises:
         ValueError: something does not fit.
     """
     for entry in _FIRST:
-        _check(file, entry, {})
-    dimension = file["solidsph"].attrs["dimension"]
+        _check(tree, entry, {})
+    dimension = tree.item("solidsph").attrs["dimension"]
     if not 1 <= dimension <= _LARGEST_DIMENSION:
         raise ValueError(f"solidsph@dimension is {dimension}, not 1, 2 or 3")
-    steps = file["VTKHDF/Steps"].attrs["NSteps"]
+    steps = tree.item("VTKHDF/Steps").attrs["NSteps"]
     if steps < 0:
         raise ValueError(f"VTKHDF/Steps@NSteps is {steps}, below 0")
-    plugins = file["solidsph/plugins"].dtype
+    plugins = tree.item("solidsph/plugins").dtype
     if len(plugins.names or ()) != 5 or any(plugins[i].kind != _TEXT for i in range(5)):
         raise ValueError("solidsph/plugins is not a table of five texts")
 
 
-def check_rest(file: Any, steps: int, fields: Sequence[str], tags: Sequence[str]) -> None:
+def check_rest(tree: Tree, steps: int, fields: Sequence[str], tags: Sequence[str]) -> None:
     """That all else is there, for so many steps.
 
     Raises:
         ValueError: something does not fit.
     """
-    d = int(file["solidsph"].attrs["dimension"])
-    n = len(file["VTKHDF/PointData/volume"])
+    d = int(tree.item("solidsph").attrs["dimension"])
+    n = len(tree.item("VTKHDF/PointData/volume"))
     sizes = {N: n, STEPS: steps, ROWS: n * steps}
-    for entry in _rest(file, d, fields, tags):
-        _check(file, entry, sizes)
-    history = _item(file, "solidsph/history", is_optional=True)
+    for entry in _rest(tree, d, fields, tags):
+        _check(tree, entry, sizes)
+    history = tree.item("solidsph/history", is_optional=True)
     if history is not None:
         columns = history.dtype
         if any(columns[i].kind != _FLOAT for i in range(len(columns.names or ()))):
             raise ValueError("solidsph/history has a column that holds no real numbers")
         units = Entry("solidsph/history", _TEXT, (len(columns.names or ()),), "units")
-        _check(file, units, sizes)
+        _check(tree, units, sizes)
 
 
-def _rest(file: Any, d: int, fields: Sequence[str], tags: Sequence[str]) -> Iterator[Entry]:
+def _rest(tree: Tree, d: int, fields: Sequence[str], tags: Sequence[str]) -> Iterator[Entry]:
     data = "VTKHDF/PointData"
     yield Entry("VTKHDF/Steps/Values", _FLOAT, (STEPS,))
     yield Entry("solidsph/step", _WHOLE, (STEPS,))
@@ -112,11 +112,11 @@ def _rest(file: Any, d: int, fields: Sequence[str], tags: Sequence[str]) -> Iter
     for path in ("VTKHDF/Points", *(f"{data}/{name}" for name in fields)):
         yield Entry(path, _WHOLE, (ANY,), "components")
         yield Entry(path, _TEXT, (), "units")
-        components = tuple(int(one) for one in _item(file, path).attrs["components"])
+        components = tuple(int(one) for one in tree.item(path).attrs["components"])
         if components not in ((), (d,), (d, d)):
             raise ValueError(f"{path}@components is {components}, none that {d} dimensions have")
         yield Entry(path, _FLOAT, (ROWS, *_width(components)))
-    faces = _item(file, "solidsph/faces", is_optional=True)
+    faces = tree.item("solidsph/faces", is_optional=True)
     if faces is None:
         return
     if not isinstance(faces, h5py.Group):
@@ -125,7 +125,7 @@ def _rest(file: Any, d: int, fields: Sequence[str], tags: Sequence[str]) -> Iter
         face = f"solidsph/faces/{number}"
         yield Entry(face, _TEXT, (), "name")
         yield Entry(f"{face}/particles", _WHOLE, (ANY,))
-        count = len(_item(file, f"{face}/particles"))
+        count = len(tree.item(f"{face}/particles"))
         yield Entry(f"{face}/area_vectors", _FLOAT, (count, d))
         yield Entry(f"{face}/areas", _FLOAT, (count,))
 
@@ -135,8 +135,8 @@ def _width(components: tuple[int, ...]) -> tuple[int, ...]:
     return (3 ** len(components),) if components else ()
 
 
-def _check(file: Any, entry: Entry, sizes: Mapping[str, int]) -> None:
-    item = _item(file, entry.path, is_optional=entry.is_optional)
+def _check(tree: Tree, entry: Entry, sizes: Mapping[str, int]) -> None:
+    item = tree.item(entry.path, is_optional=entry.is_optional)
     if item is None:
         return
     where = f"{entry.path}@{entry.attribute}" if entry.attribute else entry.path
@@ -182,20 +182,31 @@ def _shape_text(expected: Sequence[int | str], names: Sequence[int | str]) -> st
     return f"({', '.join(words)})"
 
 
-def _item(file: Any, path: str, *, is_optional: bool = False) -> Any:
-    """What is at `path`; no link is followed, which could lead out of the file, or nowhere."""
-    item, way = file, path.split("/")
-    for place, name in enumerate(way):
-        own = "/".join(way[: place + 1])
-        link = item.get(name, getlink=True) if isinstance(item, h5py.Group) else None
-        if link is None:
-            if is_optional and own == path:
-                return None
-            raise ValueError(f"{own} is missing")
-        if not isinstance(link, h5py.HardLink):
-            raise ValueError(f"{own} is a link, which is not followed")
-        item = item[name]
-    return item
+@attrs.frozen
+class Tree:
+    """What a file holds, by path. No link is followed: it could lead out of the file."""
+
+    file: Any
+    _known: dict[str, Any] = attrs.field(factory=dict, init=False)
+
+    def item(self, path: str, *, is_optional: bool = False) -> Any:
+        """A group or a dataset; None if it is optional and missing.
+
+        Raises:
+            ValueError: it is missing, or a link to elsewhere.
+        """
+        if path not in self._known:
+            above, _, name = path.rpartition("/")
+            holder = self.item(above) if above else self.file
+            link = holder.get(name, getlink=True) if isinstance(holder, h5py.Group) else None
+            if link is None:
+                if is_optional:
+                    return None
+                raise ValueError(f"{path} is missing")
+            if not isinstance(link, h5py.HardLink):
+                raise ValueError(f"{path} is a link, which is not followed")
+            self._known[path] = holder[name]
+        return self._known[path]
 
 
 def _check_own_data(dataset: Any, where: str) -> None:

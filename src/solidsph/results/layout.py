@@ -26,6 +26,7 @@ from solidsph.arrays import Array
 
 FORMAT = 2  # a reader refuses a higher number than its own
 VTKHDF_VERSION = (2, 0)  # the first with time; higher ones add nothing that is used here
+RECORD_SUFFIXES = (".h5", ".vtkhdf")  # `.vtkhdf` is what VTK and PyVista know it by
 RUNNING = "running"  # the outcome until the writer is closed
 OUTCOME_BYTES = 1024  # of fixed length, since nothing can be allocated for it at the end
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType, TracebackType
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from solidsph.arrays import Array
 from solidsph.errors import RecordError
 from solidsph.particles import Face, Particles
-from solidsph.results.conformity import check_first, check_rest, check_values
+from solidsph.results.conformity import Tree, check_first, check_rest, check_values
 from solidsph.results.digest import Reference, step_digest
 from solidsph.results.layout import (
     FORMAT,
@@ -84,6 +85,10 @@ class TimeSeries:
         return np.asarray(self[:], dtype=dtype)
 
 
+class NotARecordError(RecordError):
+    """The file is something else."""
+
+
 class Record:
     """One run, read from its file. Small things are read at once, arrays over time when asked for.
 
@@ -136,10 +141,7 @@ class Record:
             raise
 
     def _read_all(self) -> None:
-        link = self._file.get("solidsph", getlink=True)
-        run = self._file["solidsph"] if isinstance(link, h5py.HardLink) else None
-        if run is None or "format" not in run.attrs:
-            raise RecordError(f"{self.path} is an HDF5 file, but not a record of solidsph")
+        run = _run(self._file, self.path)
         written = int(run.attrs["format"])
         if written > FORMAT:
             raise RecordError(
@@ -151,7 +153,8 @@ class Record:
                 f"the record {self.path} has the older format {written}, this solidsph reads "
                 f"{FORMAT}; run its scene again"
             )
-        check_first(self._file)
+        tree = Tree(self._file)
+        check_first(tree)
         grid = self._file["VTKHDF"]
         announced = int(grid["Steps"].attrs["NSteps"])  # first, since the run goes on meanwhile
         self.dimension = int(run.attrs["dimension"])
@@ -164,7 +167,7 @@ class Record:
         self.outcome = bytes(run["outcome"][()]).decode(errors="ignore")
         self.folder = _word(run, "folder")
         self.field_names = _lines(run, "fields")
-        check_rest(self._file, announced, self.field_names, _lines(run, "tags"))
+        check_rest(tree, announced, self.field_names, _lines(run, "tags"))
         self.particles = self._particles(run, grid["PointData"])
         sets = {name: grid["PointData"][name] for name in self.field_names}
         self.units = {name: _word(dataset, "units") for name, dataset in sets.items()}
@@ -336,8 +339,28 @@ def _head(path: Path) -> bytes:
     with path.open("rb") as file:
         head = file.read(64)
     if not head.startswith(SIGNATURE):
-        raise RecordError(f"{path} is not an HDF5 file, so no record of solidsph")
+        raise NotARecordError(f"{path} is not an HDF5 file, so no record of solidsph")
     return head
+
+
+def _run(file: Any, path: Path) -> Any:
+    """The group of what VTK does not see."""
+    link = file.get("solidsph", getlink=True)
+    run = file["solidsph"] if isinstance(link, h5py.HardLink) else None
+    if run is None or "format" not in run.attrs:
+        raise NotARecordError(f"{path} is an HDF5 file, but not a record of solidsph")
+    return run
+
+
+def check_is_record(path: Path) -> None:
+    """That the file is a record, damaged or not; little of it is read.
+
+    Raises:
+        NotARecordError: it is something else.
+    """
+    _head(path)
+    with suppress(*HDF5_ERRORS), Source(path) as opened, h5py.File(opened, "r") as file:
+        _run(file, path)
 
 
 def _may_change(path: Path) -> bool:

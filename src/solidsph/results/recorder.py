@@ -13,6 +13,7 @@ from solidsph.hooks import implementation
 from solidsph.interfaces.condition import FieldCondition, Observation
 from solidsph.results.energy import KINETIC, STRAIN, kinetic_energy, ledger, strain_energy
 from solidsph.results.layout import field_name
+from solidsph.results.left import check_no_other_file
 from solidsph.results.record import Record
 from solidsph.results.record_writer import EarlierStep, Field, PluginUsed, RecordWriter
 from solidsph.resumption import Resumption
@@ -36,20 +37,23 @@ class Recorder:
         self._path = path
         self._since = since
         self._writer: RecordWriter | None = None
+        self._folder: str | None = None  # where an earlier run's relative paths begin
         self._initial_energy = 0.0
         self._recorded: Record | None = None  # outputs that the run has to repeat
+        self.final: dict[str, float] = {}  # columns of the history at the last output so far
 
     @implementation
     def solidsph_setup(self, simulation: Simulation) -> None:
-        # A run that fails before its first output must not seem to have left an older record.
+        # What is there stays until there is something to take its place.
         if self._since is None:
-            remove(self._path)
+            check_no_other_file(self._path)
 
     @implementation
     def solidsph_resume(
         self, simulation: Simulation, observation: Observation, kept: Mapping[str, Array]
     ) -> None:
         self._writer = self._open(simulation, observation)
+        self.final.update(self._history(simulation, observation))
 
     @implementation
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
@@ -59,10 +63,11 @@ class Recorder:
         fields = _fields(observation) | {
             name: values for name, _, values in _conditions_fields(simulation, observation)
         }
+        history = self._history(simulation, observation)
+        self.final.update(history)
         if state.time <= self._writer.last_time:
             self._check_repeated(observation, fields)
             return
-        history = self._history(simulation, observation)
         self._writer.append(state.time, state.step, state.positions, fields, history)
 
     @implementation
@@ -101,6 +106,7 @@ class Recorder:
             columns={name: _parted(name)[1] for name in columns},
             earlier=() if earlier is None else _steps(earlier, self._kept_until),
             notes=() if self._since is None else self._since.notes,
+            folder=self._folder,
         )
         if earlier is not None and observation.state.time <= writer.last_time:
             self._recorded = Record(self._path)
@@ -115,6 +121,7 @@ class Recorder:
         if self._since is None or not self._path.exists():
             return None
         record = Record(self._path)
+        self._folder = record.folder
         if not record.count or record.times[0] > self._kept_until:
             record.close()
             return None
@@ -167,6 +174,7 @@ def _steps(record: Record, until: float) -> Iterator[EarlierStep]:
     with record:
         for place, time in enumerate(record.times):
             if time <= until:
+                record.check_step(place)
                 yield EarlierStep(
                     time=float(time),
                     step=int(record.steps[place]),
@@ -182,21 +190,6 @@ def _parted(name: str) -> tuple[str, str]:
     return quantity, unit.rstrip("]")
 
 
-def remove(path: Path) -> None:
-    """Remove what an older run left at `path`, if it left anything.
-
-    Raises:
-        RecordError: there can be no file of that name, or it may not be removed.
-    """
-    try:
-        path.unlink(missing_ok=True)
-    except OSError as cause:
-        raise RecordError(
-            f"cannot create {path}: {cause.strerror or cause}; choose a path in a folder that you "
-            "may write to"
-        ) from None
-
-
 def scene_text(simulation: Simulation) -> str:
     """The scene as TOML, or why it has no such form."""
     try:
@@ -206,12 +199,16 @@ def scene_text(simulation: Simulation) -> str:
         return f"{COMPOSED} and has no file form: {cause}\n"
 
 
-def _fields(observation: Observation) -> dict[str, Array]:
+def stress(observation: Observation) -> Array:
+    """Cauchy stress P F^T / J of every particle, (n, d, d) [Pa]."""
     F, P = observation.deformation_gradients, observation.stresses
-    J = observation.volume_ratios
-    sigma = np.einsum("pik,pjk->pij", P, F) / J[:, None, None]
+    sigma: Array = np.einsum("pik,pjk->pij", P, F) / observation.volume_ratios[:, None, None]
+    return sigma
+
+
+def _fields(observation: Observation) -> dict[str, Array]:
     return {
         "velocity": observation.state.velocities,
-        "cauchy_stress": sigma,
-        "volume_ratio": J,
+        "cauchy_stress": stress(observation),
+        "volume_ratio": observation.volume_ratios,
     }
