@@ -25,6 +25,7 @@ from solidsph.interfaces.condition import (
     Condition,
     ForceCondition,
     MotionCondition,
+    Observation,
     StressCondition,
 )
 from solidsph.interfaces.discretisation import Discretisation
@@ -40,6 +41,7 @@ from solidsph.motion import VectorField
 from solidsph.particles import Particles, State
 from solidsph.parts import construct
 from solidsph.problems import Problems
+from solidsph.results.shown import clashes
 from solidsph.scene import (
     DEFAULT_INTEGRATOR,
     MOST_STEPS,
@@ -53,6 +55,9 @@ from solidsph.simulation import Simulation
 from solidsph.smoothing import smoothing_kernel
 from solidsph.step_size import largest_step
 from solidsph.where import EVERYWHERE, select
+
+# Names of columns begin with labels, and HDF5 keeps all of them in one header of 64 kB.
+_LONGEST_LABEL = 200
 
 
 class Assembly:
@@ -129,6 +134,8 @@ class Assembly:
         remembered = [body for body in made if isinstance(body.material, HistoryMaterial)]
         if remembered:
             conditions.append(HistoryFields(remembered, particles.count))
+        problems.add(clashes(_at_rest(problems.settled(initial), setting, conditions), conditions))
+        problems.stop_if_any()
 
         made_ready = Simulation(
             scene=scene,
@@ -191,7 +198,13 @@ class Assembly:
             part = self._make(kind, entry.part)
             if part is None:
                 continue
-            label = entry.label or _label(kind, part)
+            if entry.label is not None and not entry.label.strip():
+                self._problems.add(["a label is empty; leave it out, or say what it is of"])
+            if len(entry.label or "") > _LONGEST_LABEL:
+                self._problems.add(
+                    [f"a label has {len(entry.label or '')} signs, at most {_LONGEST_LABEL} fit"]
+                )
+            label = entry.label or _label(kind, part)[:_LONGEST_LABEL]
             if not label.isprintable():
                 self._problems.add([f"label {label!r} has signs that cannot be shown; use others"])
             if label in self._labels and entry.label:
@@ -334,6 +347,31 @@ class Assembly:
                 "modulus, density and spacing"
             )
         return step
+
+
+def _at_rest(initial: State, setting: Setting, conditions: Sequence[Condition]) -> Observation:
+    """The particles where they are in the reference, before anything has happened."""
+    particles, (n, d) = setting.particles, initial.positions.shape
+    # Views of one number: they take no memory.
+    none, nothing = np.broadcast_to(0.0, n), np.broadcast_to(0.0, (n, d))
+    remembers = any(isinstance(body.material, HistoryMaterial) for body in setting.bodies)
+    labels = [c.label for c in conditions if isinstance(c, (ForceCondition, MotionCondition))]
+    return Observation(
+        state=attrs.evolve(
+            initial,
+            positions=particles.positions,
+            velocities=nothing,
+            accelerations=nothing,
+            applied=dict.fromkeys(labels, nothing),
+            work=dict.fromkeys(labels, 0.0),
+        ),
+        particles=particles,
+        masses=setting.masses,
+        deformation_gradients=np.broadcast_to(np.eye(d), (n, d, d)),
+        stresses=np.broadcast_to(0.0, (n, d, d)),
+        energy_densities=none,
+        dissipated_densities=none if remembers else None,
+    )
 
 
 def _engine_name(scene: Scene) -> str:

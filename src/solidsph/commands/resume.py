@@ -38,9 +38,7 @@ def resume(result: Path, until: float | None, force: bool, as_json: bool, quiet:
         facts.append(_carried_out(found, shown=not (as_json or quiet)))
         if not as_json:
             since = facts[-1]["from [s]"]
-            anew = (
-                "" if found.since.state is not None else ", since there is no checkpoint beside it"
-            )
+            anew = "" if found.since.state is not None else ", without a checkpoint"
             say(f"{path} is finished now; it went on from t = {since:.6g} s{anew}")
     if as_json:
         show_json({"runs": facts})

@@ -10,12 +10,13 @@ import numpy as np
 
 from solidsph.errors import RecordError, SceneError
 from solidsph.hooks import implementation
-from solidsph.interfaces.condition import FieldCondition, Observation
-from solidsph.results.energy import KINETIC, STRAIN, kinetic_energy, ledger, strain_energy
-from solidsph.results.layout import field_name
+from solidsph.interfaces.condition import Observation
+from solidsph.results.energy import KINETIC, STRAIN, kinetic_energy, strain_energy
 from solidsph.results.left import check_no_other_file
 from solidsph.results.record import Record
 from solidsph.results.record_writer import EarlierStep, Field, PluginUsed, RecordWriter
+from solidsph.results.shown import OWN, history, parted
+from solidsph.results.shown import fields as shown_fields
 from solidsph.resumption import Resumption
 
 if TYPE_CHECKING:
@@ -61,14 +62,14 @@ class Recorder:
             self._writer = self._open(simulation, observation)
         state = observation.state
         fields = _fields(observation) | {
-            name: values for name, _, values in _conditions_fields(simulation, observation)
+            name: values for name, _, values in shown_fields(observation, simulation.conditions)
         }
-        history = self._history(simulation, observation)
-        self.final.update(history)
+        columns = self._history(simulation, observation)
+        self.final.update(columns)
         if state.time <= self._writer.last_time:
             self._check_repeated(observation, fields)
             return
-        self._writer.append(state.time, state.step, state.positions, fields, history)
+        self._writer.append(state.time, state.step, state.positions, fields, columns)
 
     @implementation
     def solidsph_finish(self, simulation: Simulation, outcome: str) -> None:
@@ -95,15 +96,18 @@ class Recorder:
                 for e in simulation.parts
             ],
             fields=[
-                Field("velocity", (d,), "m/s"),
-                Field("cauchy_stress", (d, d), "Pa"),
-                Field("volume_ratio", (), "-"),
+                *(
+                    Field(name, components, unit)
+                    for (name, unit), components in zip(
+                        OWN.items(), ((d,), (d, d), ()), strict=True
+                    )
+                ),
                 *(
                     Field(name, values.shape[1:], unit)
-                    for name, unit, values in _conditions_fields(simulation, observation)
+                    for name, unit, values in shown_fields(observation, simulation.conditions)
                 ),
             ],
-            columns={name: _parted(name)[1] for name in columns},
+            columns={name: parted(name)[1] for name in columns},
             earlier=() if earlier is None else _steps(earlier, self._kept_until),
             notes=() if self._since is None else self._since.notes,
             folder=self._folder,
@@ -152,21 +156,7 @@ class Recorder:
             )
 
     def _history(self, simulation: Simulation, observation: Observation) -> dict[str, float]:
-        columns = dict(ledger(observation, self._initial_energy, simulation.conditions))
-        for condition in simulation.conditions:
-            columns |= condition.report(observation)
-        return columns
-
-
-def _conditions_fields(
-    simulation: Simulation, observation: Observation
-) -> Iterator[tuple[str, str, Array]]:
-    """Name, unit and values of every field that conditions have to show."""
-    for condition in simulation.conditions:
-        if isinstance(condition, FieldCondition):
-            for name, values in condition.fields(observation).items():
-                quantity, unit = _parted(name)
-                yield field_name(quantity), unit, values
+        return history(observation, self._initial_energy, simulation.conditions)
 
 
 def _steps(record: Record, until: float) -> Iterator[EarlierStep]:
@@ -182,12 +172,6 @@ def _steps(record: Record, until: float) -> Iterator[EarlierStep]:
                     fields={name: record.field(name)[place] for name in record.field_names},
                     history={name: float(one[place]) for name, one in record.history.items()},
                 )
-
-
-def _parted(name: str) -> tuple[str, str]:
-    """Quantity and unit of "quantity [unit]"."""
-    quantity, _, unit = name.rpartition(" [")
-    return quantity, unit.rstrip("]")
 
 
 def scene_text(simulation: Simulation) -> str:

@@ -1,4 +1,4 @@
-"""Whether what was built now is what a record was made with, which holds no files that parts read."""
+"""Whether what is built now is what a record was made with, which holds no files."""
 
 from __future__ import annotations
 
