@@ -33,7 +33,7 @@ def temperature(builder: Builder, path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Places and temperatures at the end."""
     builder.build().run(record=path)
     with Record(path) as record:
-        return record.particles.positions[:, 0], record.field("temperature")[-1]
+        return record.particles.positions[:, 0], record.field("heat temperature")[-1]
 
 
 @pytest.mark.parametrize("particles", [20, 40])

@@ -3,8 +3,10 @@
 from solidsph.carry_out import carry_out
 from solidsph.errors import (
     BuildError,
+    BusyError,
     ConvergenceError,
     DivergedError,
+    ForkError,
     PluginError,
     RecordError,
     SceneError,
@@ -30,12 +32,14 @@ from solidsph.simulation import Result, Simulation
 __all__ = [
     "BoundaryHandler",
     "BuildError",
+    "BusyError",
     "Case",
     "ConvergenceError",
     "Discretisation",
     "DivergedError",
     "Divergence",
     "Effect",
+    "ForkError",
     "Formulation",
     "Gradient",
     "Integrator",

@@ -24,6 +24,7 @@ from solidsph.interfaces.condition import (
     Condition,
     ForceCondition,
     MotionCondition,
+    Observation,
     StressCondition,
 )
 from solidsph.interfaces.effect import Effect
@@ -33,11 +34,13 @@ from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.material import Material
+from solidsph.interfaces.shape import Shape
 from solidsph.making import Making, Parts
 from solidsph.motion import VectorField
 from solidsph.particles import Particles, State
 from solidsph.problems import Problems
-from solidsph.scene import Scene
+from solidsph.results.shown import clashes
+from solidsph.scene import MOST_STEPS, Scene
 from solidsph.setting import Setting
 from solidsph.simulation import Simulation
 from solidsph.smoothing import smoothing_kernel
@@ -47,9 +50,6 @@ from solidsph.where import Where, select
 
 # Of a step: an end that is missed by less is met.
 NEAR = 1e-6
-
-# No run of more steps ends; a scene that asks for them has its units wrong.
-_MOST_STEPS = 1e10
 
 
 def wrong_besides(scene: Scene, *, complete: bool) -> Sequence[str]:
@@ -135,6 +135,8 @@ class Assembly:
         remembered = [body for body in made if isinstance(body.material, HistoryMaterial)]
         if remembered:
             conditions.append(HistoryFields(remembered, particles.count))
+        problems.add(clashes(_at_rest(problems.settled(initial), setting, conditions), conditions))
+        problems.stop_if_any()
 
         made_ready = Simulation(
             scene=scene,
@@ -316,14 +318,39 @@ class Assembly:
                 "instead"
             )
         step = scene.time_step or scene.time_step_factor * largest
-        if not (step > 0.0 and scene.duration / step <= _MOST_STEPS):
+        if not (step > 0.0 and scene.duration / step <= MOST_STEPS):
             raise SceneError(
                 f"a duration of {scene.duration:.6g} s in steps of {step:.6g} s takes "
                 f"{scene.duration / step if step > 0.0 else float('inf'):.3g} steps, at most "
-                f"{_MOST_STEPS:.0e} are allowed; shorten the duration, or check the units of "
+                f"{MOST_STEPS:.0e} are allowed; shorten the duration, or check the units of "
                 "modulus, density and spacing"
             )
         return step
+
+
+def _at_rest(initial: State, setting: Setting, conditions: Sequence[Condition]) -> Observation:
+    """The particles where they are in the reference, before anything has happened."""
+    particles, (n, d) = setting.particles, initial.positions.shape
+    # Views of one number: they take no memory.
+    none, nothing = np.broadcast_to(0.0, n), np.broadcast_to(0.0, (n, d))
+    remembers = any(isinstance(body.material, HistoryMaterial) for body in setting.bodies)
+    labels = [c.label for c in conditions if isinstance(c, (ForceCondition, MotionCondition))]
+    return Observation(
+        state=attrs.evolve(
+            initial,
+            positions=particles.positions,
+            velocities=nothing,
+            accelerations=nothing,
+            applied=dict.fromkeys(labels, nothing),
+            work=dict.fromkeys(labels, 0.0),
+        ),
+        particles=particles,
+        masses=setting.masses,
+        deformation_gradients=np.broadcast_to(np.eye(d), (n, d, d)),
+        stresses=np.broadcast_to(0.0, (n, d, d)),
+        energy_densities=none,
+        dissipated_densities=none if remembers else None,
+    )
 
 
 def _in_order(

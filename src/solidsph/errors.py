@@ -5,10 +5,54 @@ A message says what was wrong, the value, what was expected and what to do.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import pickle
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 
-class SolidsphError(Exception):
+class PortableError(Exception):
+    """Survives pickling, as between processes, with its message, attributes, notes and cause."""
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Not by a call of the class with `args`, as exceptions do by default: what a class takes
+        # is often not what it hands on to them.
+        context = None if self.__suppress_context__ else self.__context__
+        return _restored, (
+            type(self),
+            self.args,
+            dict(self.__dict__),
+            _portable(self.__cause__),
+            _portable(context),
+            self.__suppress_context__,
+        )
+
+
+def _restored(
+    kind: type[PortableError],
+    args: tuple[object, ...],
+    attributes: Mapping[str, Any],
+    cause: BaseException | None,
+    context: BaseException | None,
+    is_context_hidden: bool,
+) -> PortableError:
+    error = kind.__new__(kind, *args)
+    error.args = args
+    error.__dict__.update(attributes)
+    error.__cause__, error.__context__ = cause, context
+    error.__suppress_context__ = is_context_hidden
+    return error
+
+
+def _portable(error: BaseException | None) -> BaseException | None:
+    """The error, or what it says if it cannot be pickled or not be read again."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:  # whatever the error of another library does when it is made anew
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error
+
+
+class SolidsphError(PortableError):
     """Base of every error that solidsph raises on purpose."""
 
 
@@ -22,6 +66,14 @@ class PluginError(SolidsphError):
 
 class RecordError(SolidsphError):
     """A result file is missing, is not ours, or cannot be read or written."""
+
+
+class BusyError(SolidsphError):
+    """What was asked for is in use: a simulation that is being run already."""
+
+
+class ForkError(SolidsphError):
+    """This process is the fork of one that had started threads, which do not live on in it."""
 
 
 class BuildError(SolidsphError):
@@ -65,30 +117,6 @@ class DivergedError(SolidsphError):
             f"everything up to there. Try {self.remedy}"
         )
 
-    def __reduce__(self) -> tuple[object, ...]:
-        # Keyword-only arguments do not survive the default pickling between processes.
-        return _rebuild_diverged, (
-            self.step,
-            self.time,
-            self.particle,
-            self.volume_ratio,
-            self.cause,
-            self.remedy,
-        )
-
-
-def _rebuild_diverged(
-    step: int, time: float, particle: int, volume_ratio: float, cause: str, remedy: str
-) -> DivergedError:
-    return DivergedError(
-        step=step,
-        time=time,
-        particle=particle,
-        volume_ratio=volume_ratio,
-        cause=cause,
-        remedy=remedy,
-    )
-
 
 class ConvergenceError(SolidsphError):
     """No equilibrium was found: at which load, how far from balance, and where."""
@@ -116,35 +144,3 @@ class ConvergenceError(SolidsphError):
             f"forces miss balance by {residual:.3g} of what is applied, most at particle "
             f"{particle}, where J = {volume_ratio:.6g}. Remedy: {remedy}"
         )
-
-    def __reduce__(self) -> tuple[object, ...]:
-        # Keyword-only arguments do not survive the default pickling between processes.
-        return _rebuild_unbalanced, (
-            self.load_factor,
-            self.tried,
-            self.residual,
-            self.particle,
-            self.volume_ratio,
-            self.cause,
-            self.remedy,
-        )
-
-
-def _rebuild_unbalanced(
-    load_factor: float,
-    tried: float,
-    residual: float,
-    particle: int,
-    volume_ratio: float,
-    cause: str,
-    remedy: str,
-) -> ConvergenceError:
-    return ConvergenceError(
-        load_factor=load_factor,
-        tried=tried,
-        residual=residual,
-        particle=particle,
-        volume_ratio=volume_ratio,
-        cause=cause,
-        remedy=remedy,
-    )

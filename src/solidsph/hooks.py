@@ -81,13 +81,20 @@ def listeners() -> pluggy.PluginManager:
     """
     manager = pluggy.PluginManager("solidsph")
     manager.add_hookspecs(Moments)
+    heard: dict[str, str] = {}
     for point in hook_points():
         distribution = f"{point.dist.name} {point.dist.version}" if point.dist else "unknown"
+        plugin = None
         try:
-            manager.register(point.load(), name=point.name)
+            if point.name in heard:
+                raise PluginError(f"{heard[point.name]} has that name already")
+            plugin = point.load()
+            manager.register(plugin, name=point.name)
             manager.check_pending()
         except Exception as cause:
-            manager.unregister(name=point.name)
+            # Only this one: of two with one name, the first is heard.
+            if plugin is not None and manager.get_plugin(point.name) is plugin:
+                manager.unregister(plugin)
             message = (
                 f"hook plugin {point.name!r} ({point.value}, from {distribution}) is left out: "
                 f"{type(cause).__name__}: {cause}; repair or uninstall it"
@@ -95,4 +102,6 @@ def listeners() -> pluggy.PluginManager:
             if os.environ.get(STRICT) == "1":
                 raise PluginError(message) from cause
             warnings.warn(message, stacklevel=2)
+        else:
+            heard[point.name] = f"{point.value}, from {distribution}"
     return manager

@@ -27,6 +27,9 @@ from solidsph.where import EVERYWHERE
 # Particles that are soon made, to see what is wrong with places in a scene that is wrong anyway.
 _SOON_MADE = 1e6
 
+# Names of columns begin with labels, and HDF5 keeps all of them in one header of 64 kB.
+_LONGEST_LABEL = 200
+
 
 @attrs.frozen(eq=False)
 class Parts:
@@ -108,7 +111,13 @@ class Making:
             part = self._make(kind, entry.part)
             if part is None:
                 continue
-            label = entry.label or _label(kind, part)
+            if entry.label is not None and not entry.label.strip():
+                self._problems.add(["a label is empty; leave it out, or say what it is of"])
+            if len(entry.label or "") > _LONGEST_LABEL:
+                self._problems.add(
+                    [f"a label has {len(entry.label or '')} signs, at most {_LONGEST_LABEL} fit"]
+                )
+            label = entry.label or _label(kind, part)[:_LONGEST_LABEL]
             if not label.isprintable():
                 self._problems.add([f"label {label!r} has signs that cannot be shown; use others"])
             if label in self.labels and entry.label:

@@ -68,6 +68,9 @@ class SleepScene:
 
 DEFAULT_INTEGRATOR = "velocity-verlet"
 
+# No run of more steps ends; a scene that asks for them has its units wrong.
+MOST_STEPS = 1e10
+
 
 @attrs.frozen
 class Scene:

@@ -38,6 +38,8 @@ class Result:
     record: Path | None  # the file written, if one was asked for
     seconds: float  # wall time of the run, compiling and recording included [s]
     effort: Mapping[str, Any]  # what it took besides: "quantity [unit]" -> a number, or yes or no
+    final: Mapping[str, float] = attrs.field(factory=dict)  # the last row of a record's history
+    notes: Sequence[str] = ()  # what happened to the run, as in the record
 
 
 @attrs.frozen(eq=False)
@@ -118,18 +120,21 @@ class Simulation:
         This is the motion, also of a scene with [statics]: `solidsph.carry_out` heeds those.
 
         Args:
-            record: HDF5 file to write; the folder is made if it is missing.
+            record: HDF5 file to write; the folder is made if it is missing. A record that is there
+                is replaced when the first output is complete; anything else is left alone.
             observers: objects with methods of `solidsph.hooks.Moments`, heard in this run only.
             since: what is taken over from an earlier run that `record` holds; `solidsph.resume`
                 finds it.
 
         Raises:
             DivergedError: the run went wrong; what was recorded before stays readable.
+            BusyError: this simulation is being run already, in another thread.
+            RecordError: the record cannot be written, or another run writes it.
         """
         path = None if record is None else Path(record)
         hook = self.manager.hook
         begun = clock.perf_counter()
-        with session(self, path, observers, since):
+        with session(self, path, observers, since) as final:
             loop = self.time_loop()
             if since is None or since.state is None:
                 state = self.start()
@@ -151,6 +156,8 @@ class Simulation:
             record=path,
             seconds=clock.perf_counter() - begun,
             effort={"steps": self.steps, "step size [s]": self.step_size, **loop.effort},
+            final=final,
+            notes=() if since is None else since.notes,
         )
 
     def output_steps(self) -> tuple[int, ...]:

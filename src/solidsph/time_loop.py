@@ -10,12 +10,12 @@ import attrs
 import numpy as np
 
 from solidsph.dynamics import Dynamics
-from solidsph.errors import BuildError
+from solidsph.errors import BuildError, PortableError
 from solidsph.interfaces.integrator import Integrator
 from solidsph.particles import State
 
 
-class StepError(Exception):
+class StepError(PortableError):
     """A step that cannot be gone on from; for whoever runs the loop, who knows what to say."""
 
     def __init__(self, state: State, cause: str) -> None:

@@ -242,7 +242,7 @@ class _Conduction(FieldCondition, ForceCondition):
         return forces
 
     def fields(self, observation: Observation) -> Mapping[str, Array]:
-        return {"temperature [K]": self.temperature(observation.state.memory)}
+        return {f"{self.label} temperature [K]": self.temperature(observation.state.memory)}
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         T = self.temperature(observation.state.memory)

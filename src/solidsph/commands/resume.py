@@ -9,6 +9,7 @@ import click
 
 from solidsph.commands.console import ProgressObserver, progress, say, show_json
 from solidsph.errors import RecordError
+from solidsph.results.layout import RECORD_SUFFIXES
 
 if TYPE_CHECKING:
     from solidsph.results.resume import Pending
@@ -36,7 +37,9 @@ def resume(result: Path, until: float | None, force: bool, as_json: bool, quiet:
             continue
         facts.append(_carried_out(found, shown=not (as_json or quiet)))
         if not as_json:
-            say(f"{path} is finished now; it went on from t = {facts[-1]['from [s]']:.6g} s")
+            since = facts[-1]["from [s]"]
+            anew = "" if found.since.state is not None else ", without a checkpoint"
+            say(f"{path} is finished now; it went on from t = {since:.6g} s{anew}")
     if as_json:
         show_json({"runs": facts})
 
@@ -44,7 +47,7 @@ def resume(result: Path, until: float | None, force: bool, as_json: bool, quiet:
 def _records(result: Path) -> list[Path]:
     if not result.is_dir():
         return [result]
-    found = sorted(result.glob("*.h5"))
+    found = sorted(path for suffix in RECORD_SUFFIXES for path in result.glob(f"*{suffix}"))
     if not found:
         raise RecordError(f"there is no record (*.h5) in the folder {result}; check the path")
     return found

@@ -14,6 +14,7 @@ from solidsph.commands.console import ProgressObserver, err, progress, say, show
 from solidsph.commands.target import name_of, resolve
 from solidsph.errors import SceneError
 from solidsph.interfaces.case import Case, Measurement
+from solidsph.results.layout import RECORD_SUFFIXES
 from solidsph.scene import Scene
 
 if TYPE_CHECKING:
@@ -28,7 +29,13 @@ if TYPE_CHECKING:
 @click.option(
     "--output",
     type=click.Path(path_type=Path),
-    help="Folder for records and pictures.  [default: results/NAME]",
+    help="Folder for records and pictures.  [default: results/NAME]  Of a scene also the file for "
+    "its record, if it ends in .h5 or .vtkhdf.",
+)
+@click.option(
+    "--overwrite",
+    is_flag=True,
+    help="Replace the record of a run that was interrupted, and that resume would go on with.",
 )
 @click.option(
     "--write",
@@ -63,6 +70,7 @@ def run(
     target: str,
     settings: tuple[str, ...],
     output: Path | None,
+    overwrite: bool,
     write: Path | None,
     watch: bool,
     roll_backs: int,
@@ -92,6 +100,8 @@ def run(
                 "--watch is for one scene, and a case is several, some of which diverge on "
                 "purpose; write them to files (--write) and run one"
             )
+        for name in wanted.scenes():
+            _make_way(folder / f"{name}.h5", overwrite=overwrite)
         _run_case(target, wanted, folder, wanted_receipts, shown=shown, as_json=as_json)
         return
     if roll_backs and not watch:
@@ -99,9 +109,20 @@ def run(
     if watch and wanted.statics is not None:
         raise SceneError("--watch is for motions; an equilibrium is tested by itself")
     watched = roll_backs if watch else None
-    _run_scene(
-        target, wanted, folder, wanted_receipts, watched=watched, shown=shown, as_json=as_json
-    )
+    path = folder if folder.suffix in RECORD_SUFFIXES else folder / "record.h5"
+    _make_way(path, overwrite=overwrite)
+    _run_scene(target, wanted, path, wanted_receipts, watched=watched, shown=shown, as_json=as_json)
+
+
+def _make_way(path: Path, *, overwrite: bool) -> None:
+    """Say what a new record takes the place of, if it may."""
+    from solidsph.results.left import check_replaceable
+    from solidsph.results.sole_writer import check_no_writer
+
+    check_no_writer(path)
+    left = check_replaceable(path, overwrite=overwrite)
+    if left is not None and left.count:
+        err.print(escape(f"{path} holds {left.told()}; it is replaced"), soft_wrap=True)
 
 
 def _write(wanted: Scene | Case, path: Path) -> None:
@@ -116,7 +137,7 @@ def _write(wanted: Scene | Case, path: Path) -> None:
 def _run_scene(
     target: str,
     scene: Scene,
-    folder: Path,
+    path: Path,
     receipts_of: Sequence[str] | None,
     *,
     watched: int | None,
@@ -129,7 +150,6 @@ def _run_scene(
     from solidsph.commands.receipted import of_scene, show_receipts
     from solidsph.commands.warned import warn
     from solidsph.costs.process import peak_memory
-    from solidsph.results.record import Record
 
     simulation, build = told.built(scene)
     advice = advised(simulation)
@@ -138,7 +158,6 @@ def _run_scene(
     prediction = told.of_run(simulation, build)
     if shown and prediction is not None and prediction.seconds > told.LONG:
         say(told.announcement(prediction))
-    path = folder / "record.h5"
     with progress(shown) as display:
         observers = [ProgressObserver(display, name_of(target), simulation)] if display else []
         if watched is None:
@@ -149,9 +168,7 @@ def _run_scene(
             result = run_watched(
                 simulation, record=path, roll_backs=watched, observers=observers, told=_Once()
             )
-    with Record(path) as record:
-        history = {name: float(values[-1]) for name, values in record.history.items()}
-        notes = record.notes
+    history, notes = result.final, result.notes  # not from the file, which others may replace
     memory = peak_memory()
     facts: dict[str, Any] = {
         "particles": simulation.particles.count,

@@ -11,6 +11,7 @@ import hashlib
 import io
 import json
 import os
+import sys
 import zipfile
 from collections.abc import Mapping
 from contextlib import suppress
@@ -22,7 +23,9 @@ import numpy as np
 
 from solidsph.arrays import Array
 from solidsph.errors import RecordError
+from solidsph.files import content
 from solidsph.particles import State
+from solidsph.scene import MOST_STEPS
 from solidsph.uninterrupted import uninterrupted
 
 FORMAT = 1
@@ -32,7 +35,12 @@ _ARRAYS = ("positions", "velocities", "accelerations")
 _NAMED = ("memory", "applied")
 
 # What reading an npz may raise; after the digest only a fault of ours can.
-_NPZ_ERRORS = (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile, MemoryError)
+_NPZ_ERRORS = (
+    *(OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError),
+    *(zipfile.BadZipFile, MemoryError, RecursionError, NotImplementedError),
+)
+
+_MOST_HALVINGS = 60  # of a step: then a double no longer tells one from the next
 
 
 @attrs.frozen(eq=False)
@@ -89,7 +97,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         RecordError: there is none, it is damaged, or a newer solidsph wrote it.
     """
     try:
-        data = path.read_bytes()
+        data = content(path, sys.maxsize)
     except OSError as cause:
         raise RecordError(
             f"the checkpoint {path} cannot be read: {cause.strerror or cause}; check the path"
@@ -152,6 +160,9 @@ def _packed(checkpoint: Checkpoint) -> bytes:
 
 
 def _unpacked(body: bytes) -> Checkpoint:
+    with zipfile.ZipFile(io.BytesIO(body)) as parts:
+        if sum(one.file_size for one in parts.infolist()) > len(body):
+            raise ValueError("it claims more bytes than it has")
     with np.load(io.BytesIO(body), allow_pickle=False) as data:
         arrays: dict[str, Any] = {name: data[name] for name in data.files}
     facts = json.loads(bytes(arrays.pop("facts")))
@@ -159,7 +170,7 @@ def _unpacked(body: bytes) -> Checkpoint:
         group: {name: arrays[f"{group} {number}"] for number, name in enumerate(names)}
         for group, names in facts["names"].items()
     }
-    return Checkpoint(
+    found = Checkpoint(
         state=State(
             time=facts["time"],
             step=facts["step"],
@@ -177,3 +188,40 @@ def _unpacked(body: bytes) -> Checkpoint:
         circumstances=facts["circumstances"],
         kept=named["kept"],
     )
+    _check(found)
+    return found
+
+
+def _check(found: Checkpoint) -> None:
+    """That all is of the types and sizes that a run leaves; a digest tells only that it is whole.
+
+    Raises:
+        ValueError: something is not.
+    """
+    state = found.state
+    shape = state.positions.shape
+    moving = {name: getattr(state, name) for name in _ARRAYS}
+    for name, array in (*moving.items(), *state.applied.items()):
+        if array.dtype != np.float64 or array.ndim != 2 or array.shape != shape:
+            raise ValueError(f"{name} is {array.dtype} of shape {array.shape}, not of {shape}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} is not finite")
+    for name, array in (*state.memory.items(), *found.kept.items()):
+        if array.dtype.kind not in "fiub":
+            raise ValueError(f"{name} holds {array.dtype}, which are no numbers")
+    for name, value, least in (
+        *(("time", state.time, 0.0), ("step size", found.step_size, 5e-324)),
+        *((name, value, -np.inf) for name, value in state.work.items()),
+    ):
+        if not isinstance(value, float) or not np.isfinite(value) or value < least:
+            raise ValueError(f"{name} is {value!r}")
+    for name, count, most in (
+        ("steps", found.steps, MOST_STEPS),
+        ("step", state.step, found.steps),
+        ("halvings", found.halvings, _MOST_HALVINGS),
+    ):
+        if type(count) is not int or not 0 <= count <= most:
+            raise ValueError(f"{name} is {count!r}")
+    texts = (found.scene, *found.circumstances, *found.circumstances.values())
+    if not all(isinstance(one, str) for one in texts):
+        raise ValueError("the scene or the circumstances are no texts")

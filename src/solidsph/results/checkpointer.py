@@ -11,9 +11,9 @@ from solidsph.errors import RecordError
 from solidsph.hooks import implementation
 from solidsph.interfaces.condition import Observation
 from solidsph.particles import State
-from solidsph.results.checkpoint import Checkpoint, write_checkpoint
+from solidsph.results.checkpoint import Checkpoint, checkpoint_path, write_checkpoint
 from solidsph.results.circumstances import circumstances
-from solidsph.results.recorder import remove, scene_text
+from solidsph.results.recorder import scene_text
 
 if TYPE_CHECKING:
     from solidsph.arrays import Array
@@ -29,25 +29,21 @@ _WRITING, _BYTE = 0.02, 5e-9
 class Checkpointer:
     """Writes a checkpoint at outputs, as often as a hundredth of the time that has gone by allows.
 
-    A run that does not get to its end leaves one of its last output. A run that is over before the
-    first was due leaves none, and is gone on with from its first state.
+    At its end a run leaves one of its last output, whether it got to the end that was asked for,
+    so that it can be extended, or not. One that is killed before the first was due leaves none, and
+    is gone on with from its first state.
     """
 
-    def __init__(self, path: Path, *, is_resumed: bool = False) -> None:
-        self._path = path
-        self._is_resumed = is_resumed
+    def __init__(self, record: Path, *, is_resumed: bool = False) -> None:
+        self._record = record
+        self._path = checkpoint_path(record)
+        self._is_ours = is_resumed  # not of an older run, which this one takes the place of
         self._state: State | None = None
         self._kept: Mapping[str, Array] = {}
         self._found: Mapping[str, str] = {}  # the circumstances, once they have been asked for
         self._is_written = False
         self._last = clock.perf_counter()
         self._cost: float | None = None  # of the last one [s]
-
-    @implementation
-    def solidsph_setup(self, simulation: Simulation) -> None:
-        if not self._is_resumed:
-            # Of an older run, which this one takes the place of.
-            remove(self._path)
 
     @implementation(trylast=True)
     def solidsph_resume(
@@ -60,22 +56,24 @@ class Checkpointer:
     @implementation(trylast=True)
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
         # Last of all listeners: one that stops the run keeps this state from being gone on with.
+        if not self._is_ours:
+            # The record is the new run's by now, so the older one's checkpoint is of no more use.
+            self._path.unlink(missing_ok=True)
+            self._is_ours = True
         self._hear(simulation, observation)
         if self._is_due(observation.state):
             self._write(simulation)
 
     @implementation
     def solidsph_finish(self, simulation: Simulation, outcome: str) -> None:
-        state = self._state
-        if state is None or self._is_written:
+        if self._is_written or not self._record.exists():
             return
-        if outcome != "finished":
-            try:
-                self._write(simulation)
-            except RecordError:  # what stopped the run is what is to be told
-                return
-        elif self._is_due(state):
+        try:
             self._write(simulation)
+        except RecordError:
+            if outcome == "finished":
+                raise
+            # Otherwise what stopped the run is what is to be told.
 
     def _hear(self, simulation: Simulation, observation: Observation) -> None:
         self._state, self._is_written = observation.state, False

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from importlib import metadata
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from solidsph import registry
@@ -15,6 +19,7 @@ if TYPE_CHECKING:
     from solidsph.simulation import Simulation
 
 _SOFTWARE = ("solidsph", "numpy", "scipy", "numba")
+_CODE = "code of "
 
 
 def circumstances(simulation: Simulation) -> Mapping[str, str]:
@@ -28,7 +33,22 @@ def circumstances(simulation: Simulation) -> Mapping[str, str]:
         "machine": platform.machine(),
         "threads": _threads(),
         **named_parts(used),
+        **{f"{_CODE}{name}": digest for name, digest in _codes(used)},
     }
+
+
+def is_part(name: str) -> bool:
+    """Whether it is a part, which not every run uses."""
+    return " " in name and not name.startswith(_CODE)
+
+
+def _codes(used: Sequence[PluginUsed]) -> Iterator[tuple[str, str]]:
+    """Digest of the code of every module that a part is in: its version may not tell a change."""
+    for module in dict.fromkeys(part.target.partition(":")[0] for part in used):
+        file = getattr(sys.modules.get(module), "__file__", None)
+        if file is not None:
+            with suppress(OSError):
+                yield module, hashlib.blake2b(Path(file).read_bytes(), digest_size=8).hexdigest()
 
 
 def named_parts(used: Sequence[PluginUsed]) -> Mapping[str, str]:

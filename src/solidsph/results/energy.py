@@ -12,6 +12,9 @@ KINETIC, STRAIN, RESIDUAL = "kinetic energy [J]", "strain energy [J]", "energy r
 DISSIPATED = "dissipated energy [J]"
 """Columns of every record; what is dissipated only where a material dissipates."""
 
+BY_BODY = ("kinetic", "strain")
+"""Energies that a record of several bodies also tells of each."""
+
 
 def kinetic_energy(observation: Observation) -> float:
     """Sum of m v^2 / 2 [J, per unit of the missing dimensions]."""
@@ -59,9 +62,10 @@ def _by_body(observation: Observation, conditions: Sequence[Condition]) -> Mappi
     particles = observation.particles
     if len(particles.bodies) < 2:
         return {}
+    kinetic = 0.5 * observation.masses * observation.squared_speeds
+    strain = np.where(particles.ghosts, 0.0, particles.volumes * observation.energy_densities)
     energies = {
-        "kinetic": 0.5 * observation.masses * observation.squared_speeds,
-        "strain": np.where(particles.ghosts, 0.0, particles.volumes * observation.energy_densities),
+        **dict(zip(BY_BODY, (kinetic, strain), strict=True)),
         **{c.label: c.energies(observation) for c in conditions if isinstance(c, StoringCondition)},
     }
     return {

@@ -11,7 +11,8 @@ dimensions only, so a vector is padded with zeros to 3 components and a tensor t
 | `/VTKHDF/Steps` | 1 every step | times, and the first row of each step in the above |
 | `/VTKHDF/Steps`, attribute `NSteps` | | how many steps are complete: written last |
 | `/solidsph/step`, `/solidsph/history` | 1 every step | step numbers; named columns |
-| the rest of `/solidsph` | | scene, plugins, versions, bodies, tags, faces, outcome |
+| `/solidsph/digests` | 1 every step | digest of all that the step holds |
+| the rest of `/solidsph` | | scene, plugins, versions, bodies, tags, faces, outcome; a digest |
 """
 
 from __future__ import annotations
@@ -23,13 +24,17 @@ import numpy as np
 
 from solidsph.arrays import Array
 
-FORMAT = 1  # a reader refuses a higher number than its own
+FORMAT = 2  # a reader refuses a higher number than its own
 VTKHDF_VERSION = (2, 0)  # the first with time; higher ones add nothing that is used here
+RECORD_SUFFIXES = (".h5", ".vtkhdf")  # `.vtkhdf` is what VTK and PyVista know it by
 RUNNING = "running"  # the outcome until the writer is closed
 OUTCOME_BYTES = 1024  # of fixed length, since nothing can be allocated for it at the end
 
 # What h5py raises for a file that is damaged, not ours, or on a device that fails.
-HDF5_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError)
+HDF5_ERRORS = (
+    *(OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError),
+    *(ArithmeticError, MemoryError),
+)
 
 
 @attrs.frozen

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType, TracebackType
@@ -17,16 +18,19 @@ from numpy.typing import NDArray
 from solidsph.arrays import Array
 from solidsph.errors import RecordError
 from solidsph.particles import Face, Particles
+from solidsph.results.conformity import Tree, check_first, check_rest, check_values
+from solidsph.results.digest import Reference, step_digest
 from solidsph.results.layout import (
     FORMAT,
     HDF5_ERRORS,
+    Field,
     PluginUsed,
     reason,
     static_fields,
     tag_name,
     unpadded,
 )
-from solidsph.results.unclosed import SIGNATURE, Unclosed, is_unclosed
+from solidsph.results.unclosed import SIGNATURE, Source, is_unclosed
 
 T = TypeVar("T")
 
@@ -81,6 +85,10 @@ class TimeSeries:
         return np.asarray(self[:], dtype=dtype)
 
 
+class NotARecordError(RecordError):
+    """The file is something else."""
+
+
 class Record:
     """One run, read from its file. Small things are read at once, arrays over time when asked for.
 
@@ -102,6 +110,7 @@ class Record:
         plugins: every part used.
         versions: of the software that produced the run, by its name.
         notes: what happened to the run: that it was extended, or rolled back.
+        folder: where relative paths in the scene begin.
         outcome: "finished", "diverged: ...", "stopped: ..."; "running" if it runs or was killed.
 
         is_closed_by_writer: False while the run goes on, and for ever if it was killed.
@@ -113,7 +122,7 @@ class Record:
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
         self._file: Any = None
-        self._source: Unclosed | None = None
+        self._source: Source | None = None
         self._is_complete = False
         self._patiently(self._open)
         self._is_complete = True
@@ -121,20 +130,18 @@ class Record:
     def _open(self) -> None:
         self.close()
         self.is_closed_by_writer = not is_unclosed(_head(self.path))
-        if not self.is_closed_by_writer:
-            self._source = Unclosed(self.path)
         try:
-            # A lock of ours would keep nobody out, and one of others not us.
-            self._file = h5py.File(self._source or self.path, "r", locking=False)
+            # Not by its name: HDF5 opens no file twice in one process that is not opened alike, so
+            # that this one and a user's own `h5py.File` would keep each other out.
+            self._source = Source(self.path)
+            self._file = h5py.File(self._source, "r")
             self._read_all()
         except BaseException:
             self.close()
             raise
 
     def _read_all(self) -> None:
-        run = self._file.get("solidsph")
-        if run is None or "format" not in run.attrs:
-            raise RecordError(f"{self.path} is an HDF5 file, but not a record of solidsph")
+        run = _run(self._file, self.path)
         written = int(run.attrs["format"])
         if written > FORMAT:
             raise RecordError(
@@ -146,6 +153,8 @@ class Record:
                 f"the record {self.path} has the older format {written}, this solidsph reads "
                 f"{FORMAT}; run its scene again"
             )
+        tree = Tree(self._file)
+        check_first(tree)
         grid = self._file["VTKHDF"]
         announced = int(grid["Steps"].attrs["NSteps"])  # first, since the run goes on meanwhile
         self.dimension = int(run.attrs["dimension"])
@@ -156,8 +165,10 @@ class Record:
         self.versions = dict(line.rsplit(" ", 1) for line in _lines(run, "versions"))
         self.notes = tuple(line.decode() for line in run.attrs.get("notes", ()))
         self.outcome = bytes(run["outcome"][()]).decode(errors="ignore")
-        self.particles = self._particles(run, grid["PointData"])
+        self.folder = _word(run, "folder")
         self.field_names = _lines(run, "fields")
+        check_rest(tree, announced, self.field_names, _lines(run, "tags"))
+        self.particles = self._particles(run, grid["PointData"])
         sets = {name: grid["PointData"][name] for name in self.field_names}
         self.units = {name: _word(dataset, "units") for name, dataset in sets.items()}
 
@@ -173,6 +184,44 @@ class Record:
         )
         units = table.attrs["units"] if table is not None else ()
         self.history_units = {name: unit.decode() for name, unit in zip(names, units, strict=True)}
+        check_values(self.particles, self.times, self.steps)
+        if self._reference().digest().hex() != _word(run, "digest"):
+            raise ValueError("the particles or the scene in it are not those that were written")
+
+    def _reference(self) -> Reference:
+        return Reference(
+            particles=self.particles,
+            scene=self.scene,
+            folder=self.folder,
+            plugins=self.plugins,
+            fields=[
+                Field(name, series.shape[2:], series.unit) for name, series in self._fields.items()
+            ],
+            columns=self.history_units,
+            versions=self.versions,
+            notes=self.notes,
+        )
+
+    def check_step(self, place: int) -> None:
+        """That a step is what was written, to the last bit.
+
+        Raises:
+            RecordError: it is not; the file was damaged.
+        """
+        found = step_digest(
+            float(self.times[place]),
+            int(self.steps[place]),
+            self.positions[place],
+            (self._fields[name][place] for name in self.field_names),
+            (values[place] for values in self.history.values()),
+        )
+        digests = self._file["solidsph/digests"]
+        written: NDArray[np.uint8] = self._patiently(lambda: digests[place])
+        if found != written.tobytes():
+            raise RecordError(
+                f"the record {self.path} is damaged: its output at t = {self.times[place]:.9g} s "
+                "is not what was written; run its scene again, into another record"
+            )
 
     def field(self, name: str) -> TimeSeries:
         """The named field over time: (steps, n, *components), lazily.
@@ -276,7 +325,7 @@ class Record:
         raise RecordError(
             f"the record {self.path} cannot be read: {failure}; "
             "if it is damaged, run its scene again"
-        )
+        ) from None
 
 
 def _head(path: Path) -> bytes:
@@ -285,11 +334,33 @@ def _head(path: Path) -> bytes:
         raise RecordError(f"{path} is a folder, not a record; name the file in it")
     if not path.exists():
         raise RecordError(f"there is no record {path}; check the path, or run the scene first")
+    if not path.is_file():  # a pipe would keep `open` waiting
+        raise RecordError(f"{path} is not a regular file, so no record of solidsph")
     with path.open("rb") as file:
         head = file.read(64)
     if not head.startswith(SIGNATURE):
-        raise RecordError(f"{path} is not an HDF5 file, so no record of solidsph")
+        raise NotARecordError(f"{path} is not an HDF5 file, so no record of solidsph")
     return head
+
+
+def _run(file: Any, path: Path) -> Any:
+    """The group of what VTK does not see."""
+    link = file.get("solidsph", getlink=True)
+    run = file["solidsph"] if isinstance(link, h5py.HardLink) else None
+    if run is None or "format" not in run.attrs:
+        raise NotARecordError(f"{path} is an HDF5 file, but not a record of solidsph")
+    return run
+
+
+def check_is_record(path: Path) -> None:
+    """That the file is a record, damaged or not; little of it is read.
+
+    Raises:
+        NotARecordError: it is something else.
+    """
+    _head(path)
+    with suppress(*HDF5_ERRORS), Source(path) as opened, h5py.File(opened, "r") as file:
+        _run(file, path)
 
 
 def _may_change(path: Path) -> bool:

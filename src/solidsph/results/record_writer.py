@@ -7,7 +7,7 @@ import os
 import platform
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
 from types import TracebackType
@@ -19,7 +19,9 @@ import numpy as np
 
 from solidsph.arrays import Array
 from solidsph.errors import DivergedError, RecordError
+from solidsph.files import working_folder
 from solidsph.particles import Particles
+from solidsph.results.digest import BYTES, Reference, step_digest
 from solidsph.results.layout import (
     FORMAT,
     HDF5_ERRORS,
@@ -61,7 +63,8 @@ class EarlierStep:
 class RecordWriter:
     """Writes one run into one HDF5 file, which ParaView opens as it is (see `layout`).
 
-    The file appears at `path` complete but without a step, and replaces an older one only then.
+    The file appears at `path` at once, complete but without a step. An older one is replaced when
+    the first step is complete; a run that comes to nothing before leaves it.
     When `append` returns, its step has been handed to the operating system: whatever ends the
     process later, the step stays readable with `Record` (a power failure may cost what the system
     had not yet put on the disk). `Record` also reads along while the run goes on. ParaView opens
@@ -82,6 +85,7 @@ class RecordWriter:
         versions: of the software that produced the run; by default what is installed here.
         earlier: steps that the record begins with; they are in the file when it appears.
         notes: what happened to the run, one line each.
+        folder: where relative paths in the scene begin; by default the working folder.
 
     Raises:
         RecordError: the file cannot be created, or the fields do not fit the particles.
@@ -100,6 +104,7 @@ class RecordWriter:
         versions: Mapping[str, str] | None = None,
         earlier: Iterable[EarlierStep] = (),
         notes: Sequence[str] = (),
+        folder: str | None = None,
     ) -> None:
         self.path = Path(os.path.realpath(path))  # through a link to the file itself
         self._particles = particles
@@ -109,41 +114,68 @@ class RecordWriter:
         self._last_time = -np.inf
         self._assured = 0  # bytes by which the file can grow, as far as is known
         _check_fields(fields, particles)
-        draft = self.path.with_name(f"{self.path.name}.{os.getpid()}.partial")
-        remedy = "choose a path in a folder that you may write to"
+        self._draft = self.path.with_name(f"{self.path.name}.{os.getpid()}.partial")
+        self._is_draft = True
+        self._file: Any = None
+        reference = Reference(
+            particles=particles,
+            scene=scene,
+            folder=str(working_folder()) if folder is None else folder,
+            plugins=plugins,
+            fields=fields,
+            columns=columns,
+            versions=_installed() if versions is None else versions,
+            notes=notes,
+        )
         try:
-            with _explained(f"cannot create the record {self.path}", remedy):
-                _check_free(self.path, overwrite)
+            with self._explained_creation():
+                check_free(self.path, overwrite)
                 self.path.parent.mkdir(parents=True, exist_ok=True)
-                _try_room(draft, _reference_bytes(particles) + len(scene.encode()) + _SPARE)
-                with h5py.File(draft, "w", libver=_FILE_FORMAT, locking=False) as file:
+                _try_room(self._draft, _reference_bytes(particles) + len(scene.encode()) + _SPARE)
+                with h5py.File(self._draft, "w", libver=_FILE_FORMAT, locking=False) as file:
                     _write_grid(file, particles, fields)
-                    _write_run(file, particles, scene, plugins, fields, columns, versions, notes)
-            self._take_over(draft, earlier)
-            with _explained(f"cannot create the record {self.path}", remedy):
-                draft.replace(self.path)
-                self._open(self.path)
-        finally:
-            with suppress(OSError):  # it is gone after a success
-                draft.unlink()
+                    _write_run(file, reference)
+                self._open(self._draft)
+            for one in earlier:
+                self._add(one.time, one.step, one.positions, one.fields, one.history)
+            if self._count or not self.path.exists():
+                self._publish()
+        except BaseException:
+            self._give_up()
+            raise
+
+    def _explained_creation(self) -> AbstractContextManager[None]:
+        remedy = "choose a path in a folder that you may write to"
+        return _explained(f"cannot create the record {self.path}", remedy)
+
+    def _publish(self) -> None:
+        """The file takes the place of whatever is at `path`."""
+        with self._explained_creation():
+            self._draft.replace(self.path)
+            self._is_draft = False
+
+    def _give_up(self) -> None:
+        """Nothing is left behind of a file that nobody has seen yet."""
+        if not self._is_draft:
+            return
+        if self._file is not None:
+            file, self._file = self._file, None
+            with suppress(*HDF5_ERRORS):
+                file.close()
+        with suppress(OSError):
+            self._draft.unlink()
+
+    @property
+    def _place(self) -> Path:
+        return self._draft if self._is_draft else self.path
 
     def _open(self, path: Path) -> None:
-        self._file: Any = h5py.File(path, "r+", libver=_FILE_FORMAT, locking=False)
+        self._file = h5py.File(path, "r+", libver=_FILE_FORMAT, locking=False)
+        self._identity = path.stat()
         # From here on HDF5 writes what is pointed at before what points at it.
         self._file.swmr_mode = True
         self._datasets: dict[str, Any] = {}
         self._announced: Any = h5py.h5a.open(self._file["VTKHDF/Steps"].id, b"NSteps")
-
-    def _take_over(self, draft: Path, earlier: Iterable[EarlierStep]) -> None:
-        """Write steps into a file that nobody sees yet."""
-        for one in earlier:
-            if self._count == 0:
-                with _explained(f"cannot create the record {self.path}", "choose another path"):
-                    self._open(draft)
-            self.append(one.time, one.step, one.positions, one.fields, one.history)
-        if self._count:
-            file, self._file = self._file, None
-            file.close()
 
     @property
     def count(self) -> int:
@@ -179,6 +211,23 @@ class RecordWriter:
         """
         if self._file is None:
             raise RecordError(f"the record {self.path} is closed; nothing can be added to it")
+        self._check_there()
+        self._add(time, step, positions, fields, history)
+        if self._is_draft:
+            try:
+                self._publish()
+            except RecordError:
+                self._give_up()
+                raise
+
+    def _add(
+        self,
+        time: float,
+        step: int,
+        positions: Array,
+        fields: Mapping[str, Array],
+        history: Mapping[str, float],
+    ) -> None:
         if not self._last_time < time < np.inf:
             raise RecordError(
                 f"a record's times must increase, got {time:.9g} s after {self._last_time:.9g} s; "
@@ -197,15 +246,17 @@ class RecordWriter:
             "Steps/NumberOfParts": None,
             "/solidsph/step": np.array([step]),
         }
-        if self._history.names:
-            row = tuple(float(history[name]) for name in self._history.names)
+        row = tuple(float(history[name]) for name in self._history.names or ())
+        if row:
             single["/solidsph/history"] = np.array([row], dtype=self._history)
+        digest = step_digest(time, step, positions, (fields[name] for name in self._fields), row)
+        single["/solidsph/digests"] = np.frombuffer(digest, dtype=np.uint8)[None]
 
         problem = f"cannot write step {step} to the record {self.path}"
         remedy = f"the {count} steps before it remain; free some space and run again"
         needed = sum(values.nbytes for values in rows.values()) + _SPARE
         with _explained(problem, remedy):
-            if shutil.disk_usage(self.path.parent).free < needed:
+            if shutil.disk_usage(self._place.parent).free < needed:
                 raise OSError("the disk is full")
             self._assure(needed)
         with uninterrupted(), _explained(problem, remedy), self._abandoned_on_failure():
@@ -227,6 +278,7 @@ class RecordWriter:
         """
         if self._file is None:
             return
+        self._check_there()
         remedy = f"the {self._count} steps in it remain"
         with uninterrupted(), _explained(f"cannot complete the record {self.path}", remedy):
             with self._abandoned_on_failure():
@@ -234,6 +286,30 @@ class RecordWriter:
                 self._file.flush()
             file, self._file = self._file, None
             file.close()
+        if self._is_draft:
+            # A run that came to nothing leaves what an earlier one has recorded.
+            if outcome == "finished" or not self.path.exists():
+                self._publish()
+            else:
+                self._give_up()
+
+    def _check_there(self) -> None:
+        """That the file is still where it was made: others may have removed or replaced it."""
+        try:
+            there = os.path.samestat(self._identity, self._place.stat())
+            what = "replaced by another file"
+        except OSError:
+            there, what = False, "removed"
+        if there:
+            return
+        file, self._file = self._file, None
+        with suppress(*HDF5_ERRORS):
+            file.close()
+        self._is_draft = False  # there is nothing to remove
+        raise RecordError(
+            f"the record {self._place} was {what} while the run wrote it, and its {self._count} "
+            "steps are lost; run the scene again, and leave the file alone until the run has ended"
+        )
 
     def __enter__(self) -> RecordWriter:
         return self
@@ -259,7 +335,7 @@ class RecordWriter:
         self._assured -= needed
         if self._assured >= 0:
             return
-        path = Path(self._file.filename)
+        path = self._place
         try:
             _try_room(path, max(needed, _AT_ONCE))
             self._assured = max(needed, _AT_ONCE) - needed
@@ -285,6 +361,7 @@ class RecordWriter:
                 self._end_with("stopped: a step could not be written")
             _ABANDONED.append((self._file, self._datasets, self._announced))
             self._file = None
+            self._give_up()
             raise
 
     def _extend(self, name: str, first: int, count: int, rows: Any) -> None:
@@ -347,7 +424,12 @@ def _reference_bytes(particles: Particles) -> int:
     return each * particles.count + faces
 
 
-def _check_free(path: Path, overwrite: bool) -> None:
+def check_free(path: Path, overwrite: bool) -> None:
+    """That a record may be written to `path`, maybe in place of a file that is there.
+
+    Raises:
+        RecordError: it may not.
+    """
     if path.is_dir():
         example = path / "result.vtkhdf"
         raise RecordError(f"{path} is a folder, not a file; write to {example} for example")
@@ -441,33 +523,26 @@ def _static_values(particles: Particles) -> dict[str, Any]:
     }
 
 
-def _write_run(
-    file: Any,
-    particles: Particles,
-    scene: str,
-    plugins: Sequence[PluginUsed],
-    fields: Sequence[Field],
-    columns: Mapping[str, str],
-    versions: Mapping[str, str] | None,
-    notes: Sequence[str],
-) -> None:
+def _write_run(file: Any, reference: Reference) -> None:
     """All that VTK does not see."""
+    particles, plugins, columns = reference.particles, reference.plugins, reference.columns
     n = particles.count
     run = file.create_group("solidsph")
     run.attrs["format"] = FORMAT
     run.attrs["dimension"] = particles.dimension
-    if notes:
-        run.attrs["notes"] = _text(notes)
-    run["scene"] = _text([scene]).reshape(())
+    run.attrs["folder"] = _text([reference.folder]).reshape(())
+    run.attrs["digest"] = _text([reference.digest().hex()]).reshape(())
+    if reference.notes:
+        run.attrs["notes"] = _text(reference.notes)
+    run["scene"] = _text([reference.scene]).reshape(())
     names = [column.name for column in attrs.fields(PluginUsed)]
     texts = {name: _text([getattr(plugin, name) for plugin in plugins]) for name in names}
     table = np.empty(len(plugins), dtype=[(name, text.dtype) for name, text in texts.items()])
     for name, text in texts.items():
         table[name] = text
     run["plugins"] = table
-    software = _installed() if versions is None else versions
-    run["versions"] = _text([f"{name} {version}" for name, version in software.items()])
-    run["fields"] = _text([field.name for field in fields])
+    run["versions"] = _text([f"{name} {version}" for name, version in reference.versions.items()])
+    run["fields"] = _text([field.name for field in reference.fields])
     run["tags"] = _text(list(particles.tags))
     run["bodies"] = _text(list(particles.bodies))
     ranges = [rows.indices(n)[:2] for rows in particles.bodies.values()]
@@ -481,6 +556,13 @@ def _write_run(
     room = h5py.string_dtype("utf-8", OUTCOME_BYTES)
     run.create_dataset("outcome", data=RUNNING.encode(), dtype=room)
     _extendable(run, "step", np.int64)
+    run.create_dataset(
+        "digests",
+        shape=(0, BYTES),
+        maxshape=(None, BYTES),
+        chunks=(_PAGE // BYTES, BYTES),
+        dtype=np.uint8,
+    )
     if columns:
         history = _extendable(run, "history", [(name, np.float64) for name in columns])
         history.attrs["units"] = _text(list(columns.values()))

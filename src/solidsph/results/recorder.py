@@ -10,11 +10,13 @@ import numpy as np
 
 from solidsph.errors import RecordError, SceneError
 from solidsph.hooks import implementation
-from solidsph.interfaces.condition import FieldCondition, Observation
-from solidsph.results.energy import KINETIC, STRAIN, kinetic_energy, ledger, strain_energy
-from solidsph.results.layout import field_name
+from solidsph.interfaces.condition import Observation
+from solidsph.results.energy import KINETIC, STRAIN, kinetic_energy, strain_energy
+from solidsph.results.left import check_no_other_file
 from solidsph.results.record import Record
 from solidsph.results.record_writer import EarlierStep, Field, PluginUsed, RecordWriter
+from solidsph.results.shown import OWN, history, parted
+from solidsph.results.shown import fields as shown_fields
 from solidsph.resumption import Resumption
 
 if TYPE_CHECKING:
@@ -36,20 +38,23 @@ class Recorder:
         self._path = path
         self._since = since
         self._writer: RecordWriter | None = None
+        self._folder: str | None = None  # where an earlier run's relative paths begin
         self._initial_energy = 0.0
         self._recorded: Record | None = None  # outputs that the run has to repeat
+        self.final: dict[str, float] = {}  # columns of the history at the last output so far
 
     @implementation
     def solidsph_setup(self, simulation: Simulation) -> None:
-        # A run that fails before its first output must not seem to have left an older record.
+        # What is there stays until there is something to take its place.
         if self._since is None:
-            remove(self._path)
+            check_no_other_file(self._path)
 
     @implementation
     def solidsph_resume(
         self, simulation: Simulation, observation: Observation, kept: Mapping[str, Array]
     ) -> None:
         self._writer = self._open(simulation, observation)
+        self.final.update(self._history(simulation, observation))
 
     @implementation
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
@@ -57,13 +62,14 @@ class Recorder:
             self._writer = self._open(simulation, observation)
         state = observation.state
         fields = _fields(observation) | {
-            name: values for name, _, values in _conditions_fields(simulation, observation)
+            name: values for name, _, values in shown_fields(observation, simulation.conditions)
         }
+        columns = self._history(simulation, observation)
+        self.final.update(columns)
         if state.time <= self._writer.last_time:
             self._check_repeated(observation, fields)
             return
-        history = self._history(simulation, observation)
-        self._writer.append(state.time, state.step, state.positions, fields, history)
+        self._writer.append(state.time, state.step, state.positions, fields, columns)
 
     @implementation
     def solidsph_finish(self, simulation: Simulation, outcome: str) -> None:
@@ -90,17 +96,21 @@ class Recorder:
                 for e in simulation.parts
             ],
             fields=[
-                Field("velocity", (d,), "m/s"),
-                Field("cauchy_stress", (d, d), "Pa"),
-                Field("volume_ratio", (), "-"),
+                *(
+                    Field(name, components, unit)
+                    for (name, unit), components in zip(
+                        OWN.items(), ((d,), (d, d), ()), strict=True
+                    )
+                ),
                 *(
                     Field(name, values.shape[1:], unit)
-                    for name, unit, values in _conditions_fields(simulation, observation)
+                    for name, unit, values in shown_fields(observation, simulation.conditions)
                 ),
             ],
-            columns={name: _parted(name)[1] for name in columns},
+            columns={name: parted(name)[1] for name in columns},
             earlier=() if earlier is None else _steps(earlier, self._kept_until),
             notes=() if self._since is None else self._since.notes,
+            folder=self._folder,
         )
         if earlier is not None and observation.state.time <= writer.last_time:
             self._recorded = Record(self._path)
@@ -115,6 +125,7 @@ class Recorder:
         if self._since is None or not self._path.exists():
             return None
         record = Record(self._path)
+        self._folder = record.folder
         if not record.count or record.times[0] > self._kept_until:
             record.close()
             return None
@@ -145,21 +156,7 @@ class Recorder:
             )
 
     def _history(self, simulation: Simulation, observation: Observation) -> dict[str, float]:
-        columns = dict(ledger(observation, self._initial_energy, simulation.conditions))
-        for condition in simulation.conditions:
-            columns |= condition.report(observation)
-        return columns
-
-
-def _conditions_fields(
-    simulation: Simulation, observation: Observation
-) -> Iterator[tuple[str, str, Array]]:
-    """Name, unit and values of every field that conditions have to show."""
-    for condition in simulation.conditions:
-        if isinstance(condition, FieldCondition):
-            for name, values in condition.fields(observation).items():
-                quantity, unit = _parted(name)
-                yield field_name(quantity), unit, values
+        return history(observation, self._initial_energy, simulation.conditions)
 
 
 def _steps(record: Record, until: float) -> Iterator[EarlierStep]:
@@ -167,6 +164,7 @@ def _steps(record: Record, until: float) -> Iterator[EarlierStep]:
     with record:
         for place, time in enumerate(record.times):
             if time <= until:
+                record.check_step(place)
                 yield EarlierStep(
                     time=float(time),
                     step=int(record.steps[place]),
@@ -174,27 +172,6 @@ def _steps(record: Record, until: float) -> Iterator[EarlierStep]:
                     fields={name: record.field(name)[place] for name in record.field_names},
                     history={name: float(one[place]) for name, one in record.history.items()},
                 )
-
-
-def _parted(name: str) -> tuple[str, str]:
-    """Quantity and unit of "quantity [unit]"."""
-    quantity, _, unit = name.rpartition(" [")
-    return quantity, unit.rstrip("]")
-
-
-def remove(path: Path) -> None:
-    """Remove what an older run left at `path`, if it left anything.
-
-    Raises:
-        RecordError: there can be no file of that name, or it may not be removed.
-    """
-    try:
-        path.unlink(missing_ok=True)
-    except OSError as cause:
-        raise RecordError(
-            f"cannot create {path}: {cause.strerror or cause}; choose a path in a folder that you "
-            "may write to"
-        ) from None
 
 
 def scene_text(simulation: Simulation) -> str:
@@ -206,12 +183,16 @@ def scene_text(simulation: Simulation) -> str:
         return f"{COMPOSED} and has no file form: {cause}\n"
 
 
-def _fields(observation: Observation) -> dict[str, Array]:
+def stress(observation: Observation) -> Array:
+    """Cauchy stress P F^T / J of every particle, (n, d, d) [Pa]."""
     F, P = observation.deformation_gradients, observation.stresses
-    J = observation.volume_ratios
-    sigma = np.einsum("pik,pjk->pij", P, F) / J[:, None, None]
+    sigma: Array = np.einsum("pik,pjk->pij", P, F) / observation.volume_ratios[:, None, None]
+    return sigma
+
+
+def _fields(observation: Observation) -> dict[str, Array]:
     return {
         "velocity": observation.state.velocities,
-        "cauchy_stress": sigma,
-        "volume_ratio": J,
+        "cauchy_stress": stress(observation),
+        "volume_ratio": observation.volume_ratios,
     }

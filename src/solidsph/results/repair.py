@@ -34,6 +34,7 @@ def repaired(path: Path, target: Path) -> int:
             columns=record.history_units,
             versions=record.versions,
             notes=record.notes,
+            folder=record.folder,
         )
         with writer:
             for i, time in enumerate(record.times):

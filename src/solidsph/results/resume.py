@@ -12,12 +12,15 @@ from solidsph.assembly import NEAR
 from solidsph.builder import Builder
 from solidsph.carry_out import carry_out
 from solidsph.errors import RecordError
+from solidsph.files import relative_to
 from solidsph.results.checkpoint import Checkpoint, checkpoint_path, read_checkpoint
-from solidsph.results.circumstances import circumstances, differences, named_parts
+from solidsph.results.circumstances import circumstances, differences, is_part, named_parts
 from solidsph.results.record import Record
 from solidsph.results.recorder import COMPOSED, scene_text
+from solidsph.results.same import check_same_output, check_same_particles
+from solidsph.results.sole_writer import check_no_writer
 from solidsph.resumption import Resumption
-from solidsph.scene import Scene
+from solidsph.scene import MOST_STEPS, Scene
 from solidsph.session import FINISHED
 from solidsph.simulation import Result, Simulation
 
@@ -56,7 +59,8 @@ def resume(
 
     Raises:
         RecordError: the run is finished, the record or its checkpoint cannot be read or do not
-            belong together, or something that decides the bits is not as it was.
+            belong together, another run is writing it, or something that decides the bits is not
+            as it was: a version, the particles that a file gives.
     """
     found = pending(Path(path), simulation=simulation, until=until, force=force)
     if found is None:
@@ -72,16 +76,19 @@ def pending(
     force: bool = False,
 ) -> Pending | None:
     """As `resume`, but only made ready; None if the run is finished."""
-    with Record(path) as record:
-        checkpoint = _checkpoint(record)
+    check_no_writer(path)
+    with Record(path) as record, relative_to(Path(record.folder) if record.folder else None):
         if record.outcome == FINISHED and until is None:
             return None
+        checkpoint = _checkpoint(record)
         if simulation is not None and scene_text(simulation) != record.scene:
             raise RecordError(
                 f"the record {path} is of another scene than the one given; give the same, or "
                 "record into another file"
             )
-        own = _as_before(simulation or _built(record), checkpoint)
+        own = simulation or _built(record)
+        check_same_particles(record, own.particles, exactly=not force)
+        own = _as_before(own, checkpoint)
         if not force:
             _check_circumstances(record, checkpoint, own)
         notes = list(record.notes)
@@ -89,6 +96,8 @@ def pending(
             own = _extended(own, until)
             notes.append(f"extended to t = {own.steps * own.step_size:.9g} s")
         usable = checkpoint is not None and checkpoint.state.time in record.times
+        if checkpoint is not None and usable:
+            check_same_output(record, checkpoint, own, exactly=not force)
         if checkpoint is None or not usable:
             return Pending(path, own, Resumption(notes=notes, repeats=not force))
         return Pending(
@@ -115,7 +124,8 @@ def _built(record: Record) -> Simulation:
             f"the scene of {record.path} was composed of Python objects and cannot be built from "
             "its record; build it in Python again, then solidsph.resume(path, simulation=...)"
         )
-    return Builder(Scene.from_toml(record.scene, f"the scene in {record.path}")).build()
+    scene = Scene.from_toml(record.scene, f"the scene in {record.path}")
+    return Builder(scene).build()
 
 
 def _as_before(simulation: Simulation, checkpoint: Checkpoint | None) -> Simulation:
@@ -140,7 +150,7 @@ def _check_circumstances(
         then = checkpoint.circumstances
     else:
         then = _recorded(record)
-        now = {name: value for name, value in now.items() if name in then or " " in name}
+        now = {name: value for name, value in now.items() if name in then or is_part(name)}
     found = differences(then, now)
     if found:
         raise RecordError(
@@ -162,5 +172,10 @@ def _extended(simulation: Simulation, until: float) -> Simulation:
     if not end * (1.0 - NEAR) <= until < float("inf"):
         raise RecordError(
             f"until = {until:.9g} s is before the end of the run, {end:.9g} s; give a later one"
+        )
+    if until / simulation.step_size > MOST_STEPS:
+        raise RecordError(
+            f"until = {until:.9g} s is {until / simulation.step_size:.3g} steps away, at most "
+            f"{MOST_STEPS:.0e} are allowed; give an earlier one"
         )
     return simulation.extended(max(simulation.steps, ceil(until / simulation.step_size - NEAR)))

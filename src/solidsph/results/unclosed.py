@@ -1,4 +1,4 @@
-"""Reads an HDF5 file that its writer has not closed, because it still runs or was killed.
+"""Reads an HDF5 file, also one that its writer has not closed: it still runs or was killed.
 
 HDF5 marks such a file in its first bytes, and then either refuses it or, when asked to read along
 (SWMR), waits without end wherever the file is damaged. What the writer has flushed is sound all
@@ -26,13 +26,13 @@ _END = 2**62  # beyond every address that a file can hold
 _WORD = 0xFFFFFFFF
 
 
-def is_unclosed(head: bytes) -> bool:
+def is_unclosed(head: bytes | bytearray) -> bool:
     """Whether a file that begins with these bytes is marked as open for writing."""
     return len(head) >= _SIZE and head.startswith(SIGNATURE + b"\x03\x08\x08") and head[11] != 0
 
 
-class Unclosed(io.RawIOBase):
-    """The file at `path`, to be read by `h5py.File(Unclosed(path), "r")`; it changes nothing.
+class Source(io.RawIOBase):
+    """The file at `path`, to be read by `h5py.File(Source(path), "r")`; it changes nothing.
 
     Raises:
         OSError: the file cannot be opened, or ends before what is asked for.
@@ -40,12 +40,16 @@ class Unclosed(io.RawIOBase):
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("rb", buffering=0)
-        head = bytearray(self._file.read(_SIZE))
-        head[11] = 0
-        struct.pack_into("<Q", head, 28, _END)
-        struct.pack_into("<I", head, 44, _lookup3(bytes(head[:44])))
-        self._head = bytes(head)
+        self._head = b""
         self._position = 0
+        self._end = self._file.seek(0, io.SEEK_END)
+        self._file.seek(0)
+        head = bytearray(self._file.read(_SIZE))
+        if is_unclosed(head):
+            head[11] = 0
+            struct.pack_into("<Q", head, 28, _END)
+            struct.pack_into("<I", head, 44, _lookup3(bytes(head[:44])))
+            self._head, self._end = bytes(head), _END
 
     def readable(self) -> bool:
         return True
@@ -57,7 +61,7 @@ class Unclosed(io.RawIOBase):
         return self._position
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        origin = {io.SEEK_SET: 0, io.SEEK_CUR: self._position, io.SEEK_END: _END}[whence]
+        origin = {io.SEEK_SET: 0, io.SEEK_CUR: self._position, io.SEEK_END: self._end}[whence]
         self._position = origin + offset
         return self._position
 
@@ -71,8 +75,8 @@ class Unclosed(io.RawIOBase):
             if not got:
                 raise OSError(f"the file ends {size - done} bytes too early")
             done += got
-        if start < _SIZE:
-            stop = min(_SIZE, start + size)
+        if start < len(self._head):
+            stop = min(len(self._head), start + size)
             view[: stop - start] = self._head[start:stop]
         self._position = start + size
         return size

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from solidsph.arrays import Array
-from solidsph.errors import ConvergenceError, SceneError
+from solidsph.errors import ConvergenceError, PortableError, SceneError
 from solidsph.particles import State
 from solidsph.simulation import Simulation
 from solidsph.statics.factors import Factors, SingularError, factorised
@@ -62,7 +62,7 @@ class EquilibriumResult:
     seconds: float  # wall time [s]
 
 
-class _LoadStepError(Exception):
+class _LoadStepError(PortableError):
     """A load step that must be tried again, shorter."""
 
     def __init__(self, cause: str, remedy: str, displacements: Array) -> None:

@@ -8,12 +8,13 @@ from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from solidsph.arrays import Array
+from solidsph.errors import PortableError
 
 # An eigenvalue of the matrix scaled to a unit diagonal: below this it is rounding.
 _SINGULAR = 1e-13
 
 
-class SingularError(Exception):
+class SingularError(PortableError):
     """The matrix has no inverse to working precision; for callers here, who know what it means."""
 
     def __init__(self, freedom: int | None) -> None:

@@ -40,7 +40,7 @@ def run_statics(
         observation = simulation.dynamics.observe(state)
         simulation.manager.hook.solidsph_step_end(simulation=simulation, observation=observation)
 
-    with session(simulation, path, observers, since):
+    with session(simulation, path, observers, since) as final:
         found = equilibrium(simulation, **attrs.asdict(wanted), observer=observe)
     return Result(
         state=found.state,
@@ -52,4 +52,6 @@ def run_statics(
             "residual [-]": found.residual,
             "stable": found.stable,
         },
+        final=final,
+        notes=() if since is None else since.notes,
     )

@@ -18,6 +18,7 @@ from solidsph.costs.process import peak_memory
 from solidsph.errors import ConvergenceError, DivergedError
 from solidsph.interfaces.case import Case, Curves, Measurement
 from solidsph.results.record import Record
+from solidsph.results.sole_writer import sole_writer
 from solidsph.simulation import Simulation
 
 FINISHED = "finished"
@@ -64,7 +65,17 @@ def _unobserved(name: str, simulation: Simulation) -> Sequence[object]:
 
 
 def run_case(case: Case, folder: Path, *, begin: Begin = _unobserved) -> CaseResult:
-    """Run every scene of `case`, record it in `folder`, measure and draw."""
+    """Run every scene of `case`, record it in `folder`, measure and draw.
+
+    Raises:
+        RecordError: another run of a case writes into that folder.
+    """
+    # Until what was recorded has been measured, nobody else may replace it.
+    with sole_writer(folder / "case"):
+        return _run_case(case, folder, begin)
+
+
+def _run_case(case: Case, folder: Path, begin: Begin) -> CaseResult:
     runs = run_scenes(case, folder, begin=begin)
     with opened(runs) as records:
         measurements = case.measure(records)

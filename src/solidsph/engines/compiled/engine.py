@@ -144,6 +144,7 @@ class CompiledBody:
     def forces(self, displacements: Array, out: Array) -> None:
         """Forces (n, d) of a fused body from displacements (n, d)."""
         shares = self.gradient_shares
+        shares.check()
         self.passes.forces(
             shares.table,
             self.gradient,
@@ -165,6 +166,7 @@ class CompiledBody:
         self._stress(self.gradients, displacements, out.transpose(1, 2, 0))
 
     def _stress(self, passes: Passes, displacements: Array, out: Array) -> None:
+        self.gradient_shares.check()
         passes.stress(
             self.gradient_shares.table,
             self.gradient,

@@ -74,6 +74,8 @@ def compiled_loop(
     particles = dynamics.particles
     d = particles.dimension
     threads = thread_count(_PER_PARTICLE * particles.count)  # of what is done particle by particle
+    for body in bodies:
+        body.gradient_shares.check()
     internal = internal_forces(bodies, conditions)
     loads = [load_pass(load, particles.positions, threads > 1) for load in dynamics.loads]
     words = [motion_words(motion, d) for motion in dynamics.motions]

@@ -17,6 +17,7 @@ from solidsph.engines.compiled.part import part_of_rows
 from solidsph.engines.compiled.pointwise import no_law
 from solidsph.engines.compiled.rows import Rows, compressed
 from solidsph.engines.compiled.shares import aligned, passes, shared, spread_pass, thread_count
+from solidsph.engines.compiled.threads import check_alive
 from solidsph.engines.tally import Tally, Way, vectors
 from solidsph.mismatch import Mismatch, MismatchOperator
 
@@ -108,6 +109,8 @@ class MismatchSweeps(MismatchOperator):
         return Tally(Way.MISMATCH_SWEEPS, pairs, n, touched, self.bytes, threaded=threaded)
 
     def forces(self, displacements: Array) -> Array:
+        if len(self.arrays.table) > 1:
+            check_alive()
         forces = np.empty_like(displacements)
         self.sweep(self.arrays, np.ascontiguousarray(displacements), forces)
         return forces

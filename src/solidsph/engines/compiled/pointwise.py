@@ -15,13 +15,14 @@ from numba.core.errors import NumbaError
 from numba.extending import register_jitable
 
 from solidsph.arrays import Tensor
+from solidsph.errors import PortableError
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.material import Material
 
 _DEEPEST = 20  # calls within calls; more is taken for a recursion
 
 
-class NotCompilableError(Exception):
+class NotCompilableError(PortableError):
     """A pointwise function is outside what the compiler understands."""
 
 

@@ -13,13 +13,14 @@ from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
-from numba import get_num_threads, njit, prange
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from solidsph.arrays import Indices
 from solidsph.engines.compiled.blocks import STRIDE, group
 from solidsph.engines.compiled.rows import Rows
 from solidsph.engines.compiled.sweeps import spread_sweep, sweeps
+from solidsph.engines.compiled.threads import check_alive, started
 
 # A second thread must be woken for every pass, which takes some tens of microseconds: as long as
 # one thread takes for so many operations of a nanosecond.
@@ -34,7 +35,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 def thread_count(operations: int) -> int:
     """How many threads share so many operations of about a nanosecond in several passes."""
-    return 1 if operations < WORTH_A_THREAD else int(get_num_threads())
+    return 1 if operations < WORTH_A_THREAD else started()
 
 
 @attrs.frozen(eq=False)
@@ -50,6 +51,15 @@ class Shares:
     def threaded(self) -> bool:
         """Whether there is more than one."""
         return len(self.table) > 1
+
+    def check(self) -> None:
+        """That there are the threads that share.
+
+        Raises:
+            ForkError: in a fork of the process that had started them there are none.
+        """
+        if self.threaded:
+            check_alive()
 
 
 def shared(rows: Rows, dimension: int, dtype: str, threads: int) -> Shares:
