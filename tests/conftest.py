@@ -8,7 +8,11 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-# Machines that run the tests are shared: a slow moment is not a failure.
+from solidsph.costs import calibration
+from solidsph.costs.coefficients import REFERENCE
+
+# Machines that run the tests are shared: a slow moment is not a failure. Examples stay random, so
+# that every run looks elsewhere; what fails is printed in a form that repeats it.
 settings.register_profile(
     "shared", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
 )
@@ -17,8 +21,15 @@ settings.load_profile("shared")
 
 @pytest.fixture(scope="session")
 def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where this session keeps what the user's cache would hold."""
-    return tmp_path_factory.mktemp("cache")
+    """Where this session keeps what the user's cache would hold.
+
+    The calibration in it is the reference: no test measures this machine unless it says so.
+    """
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(calibration.CACHE, str(folder))
+        calibration.cache_file().write_text(REFERENCE.to_json(), encoding="utf-8")
+    return folder
 
 
 @pytest.fixture(autouse=True)

@@ -16,9 +16,8 @@ from solidsph.results.repair import repaired
 from solidsph_builtin.discretisations import _checks
 from tests.fuzzing import campaign, tried, within
 from tests.scenes import SCENE_TOML
+from tests.waiting import HANG
 
-# A scene is built in a tenth of a second; machines that run this are shared.
-SECONDS = 20.0
 
 
 @pytest.fixture
@@ -38,7 +37,7 @@ def assert_all_answered(count: int, seed: int) -> None:
     with warnings.catch_warnings():
         # Parts may warn of what they are asked for; what NumPy warns of stays an error.
         warnings.simplefilter("ignore", UserWarning)
-        counts = campaign(count, seed, SECONDS, heard)
+        counts = campaign(count, seed, HANG, heard)
     print(counts)
     assert wrong == []
     # Of each kind enough to say something.
@@ -79,7 +78,7 @@ def test_a_formula_never_runs_code(
     monkeypatch.chdir(tmp_path)
     text = SCENE_TOML.replace("1e3*min(t/0.005, 1)", formula)
     assert text != SCENE_TOML
-    assert tried(text.encode(), SECONDS) == "refused"
+    assert tried(text.encode(), HANG) == "refused"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -133,7 +132,7 @@ def read_or_refused(path: Path) -> int | None:
 def outcome_of(path: Path, data: bytes) -> str:
     """What becomes of a spoilt record: "read", "refused"; anything else is raised."""
     path.write_bytes(data)
-    with within(SECONDS):
+    with within(HANG):
         return "refused" if read_or_refused(path) is None else "read"
 
 
@@ -240,7 +239,7 @@ def test_numbers_without_end(value: str) -> None:
     text = SCENE_TOML.replace('{x = "1e3*min(t/0.005, 1)"}', f"{{x = {value}}}")
     assert text != SCENE_TOML
     expected = "built" if value.endswith("0" * 30) and len(value) < 40 else "refused"
-    assert tried(text.encode(), SECONDS) == expected
+    assert tried(text.encode(), HANG) == expected
 
 
 def test_a_cover_beyond_all_use_is_refused() -> None:
