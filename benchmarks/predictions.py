@@ -199,8 +199,9 @@ def main() -> None:
             "predicted build + compile + steps + outputs",
         ),
         tuple(rows),
-        f"Medians of {options.repeats} runs; the calibration took {calibrating:.2g} s. Where other programs want the cores, time on the wall "
-        "is what they leave; the processor's own, with --threads 1, is that of a quiet machine.",
+        f"Medians of {options.repeats} runs; the calibration took {calibrating:.2g} s. Where other "
+        "programs want the cores, time on the wall is what they leave; the processor's own, with "
+        "--threads 1, is that of a quiet machine.",
     )
     print(table.text())
 

@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from itertools import count
-from math import pi
+from math import inf, pi
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -363,7 +363,9 @@ def test_a_machine_too_busy_to_be_calibrated_is_said_to_be(
     assert not cache.exists()
 
 
-def test_run_and_explain_tell_what_was_predicted_and_what_it_took(tmp_path: Path) -> None:
+def test_run_and_explain_tell_what_was_predicted_and_what_it_took(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "pull.toml").write_text(SCENE_TOML)
     facts = json.loads(solidsph("run", "pull.toml", "--json", cwd=tmp_path).stdout)
     for quantity in ("wall time [s]", "peak memory [MiB]"):
@@ -374,9 +376,11 @@ def test_run_and_explain_tell_what_was_predicted_and_what_it_took(tmp_path: Path
     )
     # A process of some 100 MiB of which most are imports: within a factor of two at any rate.
     assert 0.5 < facts["predicted over measured memory [-]"] < 2.0
-    shown = solidsph("run", "pull.toml", cwd=tmp_path)
-    assert "predicted over measured time" in shown.stdout
-    assert "predicted:" not in shown.stdout  # a short run is not announced
+    for long, announced in ((0.0, True), (inf, False)):  # a short run is not
+        monkeypatch.setattr(told, "LONG", long)
+        shown = solidsph("run", "pull.toml", cwd=tmp_path)
+        assert "predicted over measured time" in shown.stdout
+        assert ("predicted:" in shown.stdout) == announced
     told_before = json.loads(solidsph("explain", "pull.toml", "--json", cwd=tmp_path).stdout)
     (scene,) = told_before["scenes"].values()
     cost = {row["quantity"].strip(): row["value"] for row in scene["cost"]}

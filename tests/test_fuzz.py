@@ -19,7 +19,6 @@ from tests.scenes import SCENE_TOML
 from tests.waiting import HANG
 
 
-
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """A scene of millions of particles is in order; here there is no time for it."""

@@ -159,7 +159,7 @@ def assert_holds(record: Record, content: list[Step]) -> None:
 # What went in comes out
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     count=st.integers(0, 9),
     dimension=st.integers(1, 3),

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import inf, isnan, nan
 from pathlib import Path
@@ -595,7 +595,11 @@ def local_cluster() -> Iterator[Any]:
 
     # Dask takes who does not answer in time for dead; here nobody is, however busy the machine.
     comm = "distributed.comm.timeouts"
-    patient = {f"{comm}.connect": HANG, f"{comm}.tcp": HANG, "distributed.scheduler.worker-ttl": None}
+    patient = {
+        f"{comm}.connect": HANG,
+        f"{comm}.tcp": HANG,
+        "distributed.scheduler.worker-ttl": None,
+    }
     with (
         dask.config.set(patient),
         distributed.LocalCluster(
