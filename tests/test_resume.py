@@ -67,6 +67,12 @@ BOUNDARIES: Mapping[str, Callable[[], Builder]] = {
 }
 
 
+@pytest.fixture(autouse=True)
+def _not_by_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A checkpoint where a run is stopped, and none because it takes long."""
+    monkeypatch.setattr(checkpointer, "SHARE", NEVER)
+
+
 @pytest.fixture
 def often(monkeypatch: pytest.MonkeyPatch) -> None:
     """A checkpoint at every output, whatever it costs."""
@@ -394,6 +400,40 @@ def test_a_new_run_takes_the_place_of_the_old(tmp_path: Path) -> None:
     stopped(path)
     moving(box(1)).build().run(record=path)
     assert not checkpoint_path(path).exists()
+
+
+class Ticking:
+    """A clock by which outputs are a second apart and writing a checkpoint takes an eighth."""
+
+    def __init__(self) -> None:
+        self.now, self.outputs = 0.0, 0
+        self.written_at: list[int] = []
+
+    def perf_counter(self) -> float:
+        return self.now
+
+    @implementation
+    def solidsph_step_end(self, simulation, observation) -> None:
+        self.now += 1.0
+        self.outputs += 1
+
+    def write(self, path, checkpoint) -> None:
+        self.now += 0.125
+        self.written_at.append(self.outputs)
+
+
+def test_checkpoints_take_a_hundredth_of_the_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = Ticking()
+    monkeypatch.undo()  # the share that checkpoints have
+    monkeypatch.setattr(checkpointer, "clock", clock)
+    monkeypatch.setattr(checkpointer, "write_checkpoint", clock.write)
+    simulation = moving(box(1)).duration(0.1).outputs(40).build()
+    simulation.run(record=tmp_path / "run.h5", observers=[clock])
+    assert clock.outputs == 41
+    # Writing is thought to take 0.02 s, so the first comes after two seconds; the others after 12.5.
+    assert clock.written_at == [3, 16, 29]
 
 
 # Devices that fail
