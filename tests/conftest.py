@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 import os
+import sys
+from collections.abc import Iterator
+from importlib.metadata import EntryPoints, entry_points
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+from solidsph import registry
 from solidsph.costs import calibration
 from solidsph.costs.coefficients import REFERENCE
 
@@ -30,6 +35,19 @@ def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setenv(calibration.CACHE, str(folder))
         calibration.cache_file().write_text(REFERENCE.to_json(), encoding="utf-8")
     return folder
+
+
+@functools.cache
+def _installed(path: tuple[str, ...], group: str) -> EntryPoints:
+    return entry_points(group=group)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _listed_once() -> Iterator[None]:
+    """What is installed is read once: to read it for every part is most of a small build."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry, "entry_points", lambda group: _installed(tuple(sys.path), group))
+        yield
 
 
 @pytest.fixture(autouse=True)

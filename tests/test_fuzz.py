@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import random
 import warnings
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solidsph import BuildError, Record, RecordError, Scene, Simulation, registry, resume
+from solidsph import BuildError, Record, RecordError, Scene, Simulation, resume
 from solidsph.results import recorder
 from solidsph.results.repair import repaired
 from solidsph_builtin.discretisations import _checks
@@ -23,8 +22,6 @@ from tests.waiting import HANG
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """A scene of millions of particles is in order; here there is no time for it."""
     monkeypatch.setattr(_checks, "MOST_PARTICLES", 2e3)
-    # What is installed does not change meanwhile.
-    monkeypatch.setattr(registry, "entry_points", functools.cache(registry.entry_points))
 
 
 def assert_all_answered(count: int, seed: int) -> None:
