@@ -9,6 +9,9 @@ EXAMPLE := plugins/examples/solidsph-wendland
 BROWSER := /usr/bin/chromium /usr/bin/chromedriver
 WITHOUT := $(filter-out $(wildcard $(BROWSER)),$(BROWSER))
 
+# Two processes, each with whole files: the loops that the tests of a file share compile once.
+TWO := -n 2 --dist loadfile
+
 .PHONY: demo test validate gallery frontiers bench bench-page lint format clean
 
 demo: $(STAMP)  ## the paper's headline experiment: table, record and picture
@@ -16,10 +19,10 @@ demo: $(STAMP)  ## the paper's headline experiment: table, record and picture
 
 test: $(STAMP) lint  ## lint, types and every test but the slow physics
 	$(if $(WITHOUT),@echo "no $(WITHOUT): tests in a browser are left out; apt-get install chromium chromium-driver")
-	$(BIN)/pytest -n 2 -m "not validation$(if $(WITHOUT), and not browser)"
+	$(BIN)/pytest $(TWO) -m "not validation$(if $(WITHOUT), and not browser)"
 
 validate: $(STAMP)  ## the slow physics
-	$(BIN)/pytest -n 2 -m validation -rP
+	$(BIN)/pytest $(TWO) -m validation -rP
 
 bench: $(STAMP)  ## against a plain C loop, whole steps, memory, throughput along every axis, the updated form
 	$(BIN)/python benchmarks/bench.py

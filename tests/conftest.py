@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import functools
 import os
+import sys
+from collections.abc import Iterator
+from importlib.metadata import EntryPoints, entry_points
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-# Machines that run the tests are shared: a slow moment is not a failure.
+from solidsph import registry
+from solidsph.costs import calibration
+from solidsph.costs.coefficients import REFERENCE
+
+# Machines that run the tests are shared: a slow moment is not a failure. Examples stay random, so
+# that every run looks elsewhere; what fails is printed in a form that repeats it.
 settings.register_profile(
     "shared", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
 )
@@ -17,8 +26,28 @@ settings.load_profile("shared")
 
 @pytest.fixture(scope="session")
 def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where this session keeps what the user's cache would hold."""
-    return tmp_path_factory.mktemp("cache")
+    """Where this session keeps what the user's cache would hold.
+
+    The calibration in it is the reference: no test measures this machine unless it says so.
+    """
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(calibration.CACHE, str(folder))
+        calibration.cache_file().write_text(REFERENCE.to_json(), encoding="utf-8")
+    return folder
+
+
+@functools.cache
+def _installed(path: tuple[str, ...], group: str) -> EntryPoints:
+    return entry_points(group=group)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _listed_once() -> Iterator[None]:
+    """What is installed is read once: to read it for every part is most of a small build."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry, "entry_points", lambda group: _installed(tuple(sys.path), group))
+        yield
 
 
 @pytest.fixture(autouse=True)

@@ -13,6 +13,7 @@ import random
 import signal
 import sys
 import time
+from math import inf
 from pathlib import Path
 
 import h5py
@@ -125,7 +126,7 @@ def main(folder: Path, count: int, seed: int) -> None:
         act, had = begin, 0
         # The last one is left alone: without checkpoints a run might else never get to its end.
         left = chance.randint(1, 4)
-        while not _in_a_process(act, chance.uniform(0.0, took) if left else 300.0):
+        while not _in_a_process(act, chance.uniform(0.0, took) if left else inf):
             kills += 1
             left -= 1
             if path.exists():

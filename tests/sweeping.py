@@ -20,6 +20,7 @@ from solidsph.studies.processes import Processes
 from solidsph.studies.sweep import Standing, sweep
 from solidsph.studies.task import Task
 from solidsph_builtin.cases.csm3 import Csm3
+from tests.waiting import HANG
 
 
 def _refuse() -> None:
@@ -31,7 +32,7 @@ def _break() -> None:
 
 
 def _hold() -> None:
-    ctypes.PyDLL(None).sleep(60)  # no thread of Python runs meanwhile, as in a compiled loop
+    ctypes.PyDLL(None).sleep(int(HANG))  # no thread of Python runs meanwhile, as in a compiled loop
 
 
 DEEDS: Mapping[str, Callable[[], object]] = {
@@ -41,7 +42,7 @@ DEEDS: Mapping[str, Callable[[], object]] = {
     "leave": lambda: (sys.stderr.write("no more\n"), sys.stderr.flush(), os._exit(3)),
     "break": _break,
     "refuse": _refuse,
-    "sleep": lambda: time.sleep(60),
+    "sleep": lambda: time.sleep(HANG),
     "hold": _hold,
 }
 
@@ -88,14 +89,19 @@ def swinging() -> Sequence[Task]:
     return [Task(case, {"cover": cover}, repeat) for cover in (2.3, 2.2, 2.6) for repeat in (0, 1)]
 
 
-def tell(standing: Standing) -> None:
-    """Print how far a sweep is."""
+def tell(standing: Standing, hold: int | None = None) -> None:
+    """Print how far a sweep is; once so many are done or kept, wait to be killed."""
     print(standing.total, standing.kept, standing.done, flush=True)
+    if standing.kept + standing.done == hold:
+        print("held", flush=True)
+        sys.stdin.read()
 
 
 if __name__ == "__main__":
     from tests import sweeping  # where other processes find what is defined here
 
     place, *wanted = sys.argv[1:]
+    hold = int(wanted.pop()) if wanted and wanted[-1].isdecimal() else None
     tasks = sweeping.odd(Path(place), *wanted) if wanted else swinging()
-    sweep(tasks, Processes(2), Journal(Path(place) / "journal"), tell)
+    journal = Journal(Path(place) / "journal")
+    sweep(tasks, Processes(2), journal, lambda standing: tell(standing, hold))

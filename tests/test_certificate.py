@@ -341,7 +341,6 @@ QUICK = settings(
     max_examples=6,
     # A point that fails is told as it is: to look for a simpler one would take minutes.
     phases=(Phase.explicit, Phase.reuse, Phase.generate),
-    deadline=None,
     suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow],
 )
 THOROUGH = settings(QUICK, max_examples=40)

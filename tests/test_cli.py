@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -10,10 +13,32 @@ from pathlib import Path
 import pytest
 
 from solidsph import registry
+from solidsph.cli import main
 from tests.scenes import SCENE_TOML
 
 
 def solidsph(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """What the command says and returns, in this process: a new one takes a second to import."""
+    out, err, code = io.StringIO(), io.StringIO(), 0
+    handler = signal.getsignal(signal.SIGTERM)
+    with (
+        contextlib.chdir(cwd),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        pytest.MonkeyPatch.context() as patch,
+    ):
+        patch.setattr(sys, "argv", ["solidsph", *arguments])
+        try:
+            main()
+        except SystemExit as cause:
+            code = int(cause.code or 0)
+        finally:
+            signal.signal(signal.SIGTERM, handler)
+    return subprocess.CompletedProcess(arguments, code, out.getvalue(), err.getvalue())
+
+
+def in_a_process(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """The same from a process of its own, in which any warning is an error."""
     return subprocess.run(
         [sys.executable, "-W", "error", "-m", "solidsph", *arguments],
         capture_output=True,
@@ -31,7 +56,7 @@ def scene(tmp_path: Path) -> Path:
 
 
 def test_help_on_every_verb(tmp_path: Path) -> None:
-    done = solidsph("--help", cwd=tmp_path)
+    done = in_a_process("--help", cwd=tmp_path)
     assert done.returncode == 0
     for verb in ("run", "explain", "cases", "plugins", "check", "plot"):
         assert verb in done.stdout
@@ -42,12 +67,12 @@ def test_help_on_every_verb(tmp_path: Path) -> None:
 
 def test_run_a_scene_then_plot_it(scene: Path) -> None:
     folder = scene.parent
-    done = solidsph("run", str(scene), cwd=folder)
+    done = in_a_process("run", str(scene), cwd=folder)
     assert done.returncode == 0, done.stderr
     assert "energy residual" in done.stdout
     record = folder / "results/pull/record.h5"
     assert record.exists()
-    done = solidsph("plot", str(record), "--json", cwd=folder)
+    done = in_a_process("plot", str(record), "--json", cwd=folder)
     assert done.returncode == 0, done.stderr
     for picture in json.loads(done.stdout)["pictures"]:
         assert Path(folder / picture).read_bytes().startswith(b"\x89PNG")

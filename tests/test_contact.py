@@ -96,7 +96,7 @@ def test_momenta_stay_and_the_ledger_closes(d: int, friction: float, tmp_path: P
         assert np.abs(lost).max() <= 3e-3 * start
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     d=st.sampled_from([1, 2, 3]),
     gap=st.floats(-1.5, 0.2),

@@ -216,7 +216,7 @@ plane_shapes: st.SearchStrategy[Shape] = st.one_of(
 )
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(
     shape=plane_shapes,
     spacing=st.floats(0.04, 0.12),
@@ -233,7 +233,7 @@ def test_volume_and_closure_for_any_size_and_spacing(
         assert particles.volumes[real].sum() == pytest.approx(shape.volume(), rel=1e-12)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     outer=plane_shapes,
     inner=plane_shapes,

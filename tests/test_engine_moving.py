@@ -78,7 +78,7 @@ def assert_same_pairs(ours: Pairs, theirs: Pairs) -> None:
 on_a_grid = st.integers(-6, 6).map(lambda k: 0.25 * k)
 
 
-@settings(max_examples=60, deadline=None)  # the first call compiles
+@settings(max_examples=60)
 @given(data=st.data(), d=st.sampled_from([1, 2, 3]), n=st.integers(1, 30))
 def test_pairs_are_those_of_the_tree(data: st.DataObject, d: int, n: int) -> None:
     coordinates = data.draw(st.sampled_from([on_a_grid, st.floats(-3.0, 3.0)]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import random
 import warnings
 from pathlib import Path
@@ -10,23 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solidsph import BuildError, Record, RecordError, Scene, Simulation, registry, resume
+from solidsph import BuildError, Record, RecordError, Scene, Simulation, resume
 from solidsph.results import recorder
 from solidsph.results.repair import repaired
 from solidsph_builtin.discretisations import _checks
 from tests.fuzzing import campaign, tried, within
 from tests.scenes import SCENE_TOML
-
-# A scene is built in a tenth of a second; machines that run this are shared.
-SECONDS = 20.0
+from tests.waiting import HANG
 
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """A scene of millions of particles is in order; here there is no time for it."""
     monkeypatch.setattr(_checks, "MOST_PARTICLES", 2e3)
-    # What is installed does not change meanwhile.
-    monkeypatch.setattr(registry, "entry_points", functools.cache(registry.entry_points))
 
 
 def assert_all_answered(count: int, seed: int) -> None:
@@ -38,7 +33,7 @@ def assert_all_answered(count: int, seed: int) -> None:
     with warnings.catch_warnings():
         # Parts may warn of what they are asked for; what NumPy warns of stays an error.
         warnings.simplefilter("ignore", UserWarning)
-        counts = campaign(count, seed, SECONDS, heard)
+        counts = campaign(count, seed, HANG, heard)
     print(counts)
     assert wrong == []
     # Of each kind enough to say something.
@@ -79,7 +74,7 @@ def test_a_formula_never_runs_code(
     monkeypatch.chdir(tmp_path)
     text = SCENE_TOML.replace("1e3*min(t/0.005, 1)", formula)
     assert text != SCENE_TOML
-    assert tried(text.encode(), SECONDS) == "refused"
+    assert tried(text.encode(), HANG) == "refused"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -133,7 +128,7 @@ def read_or_refused(path: Path) -> int | None:
 def outcome_of(path: Path, data: bytes) -> str:
     """What becomes of a spoilt record: "read", "refused"; anything else is raised."""
     path.write_bytes(data)
-    with within(SECONDS):
+    with within(HANG):
         return "refused" if read_or_refused(path) is None else "read"
 
 
@@ -240,7 +235,7 @@ def test_numbers_without_end(value: str) -> None:
     text = SCENE_TOML.replace('{x = "1e3*min(t/0.005, 1)"}', f"{{x = {value}}}")
     assert text != SCENE_TOML
     expected = "built" if value.endswith("0" * 30) and len(value) < 40 else "refused"
-    assert tried(text.encode(), SECONDS) == expected
+    assert tried(text.encode(), HANG) == expected
 
 
 def test_a_cover_beyond_all_use_is_refused() -> None:

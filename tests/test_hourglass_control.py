@@ -226,7 +226,7 @@ def test_sweeps_products_and_the_matrix_are_the_same(d: int, gradient: str) -> N
     assert np.abs(total).max() < 1e-14 * np.abs(expected).sum()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     d=st.integers(1, 3),
     cells=st.integers(5, 8),

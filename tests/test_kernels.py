@@ -25,7 +25,7 @@ def test_conformance(name: str, check: Check) -> None:
 
 @every_kernel
 @given(dimension=dimensions(), support_radius=support_radii())
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_declared_mass_whatever_the_support_radius(
     name: str, dimension: int, support_radius: float
 ) -> None:
@@ -36,7 +36,7 @@ def test_declared_mass_whatever_the_support_radius(
 
 @every_kernel
 @given(dimension=dimensions(), direction=st.integers(0, 2**32 - 1), q=st.floats(0.05, 0.95))
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_gradient_is_the_derivative_by_the_first_position(
     name: str, dimension: int, direction: int, q: float
 ) -> None:

@@ -53,7 +53,7 @@ def test_conformance_for_other_ratios(name: str, poissons_ratio: float) -> None:
 
 @every_material
 @given(data=st.data(), dimension=dimensions())
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_rotation_leaves_the_energy_of_an_objective_law_alone(
     name: str, data: st.DataObject, dimension: int
 ) -> None:
@@ -70,7 +70,7 @@ def test_rotation_leaves_the_energy_of_an_objective_law_alone(
 
 @every_material
 @given(data=st.data(), dimension=dimensions())
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_work_along_a_path_is_the_energy_stored(
     name: str, data: st.DataObject, dimension: int
 ) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -131,14 +130,24 @@ def test_what_does_nothing_never_acted(of_block: Mapping[str, Receipt]) -> None:
     assert of_block["drag"].acted
 
 
+class Clock:
+    """A clock that stands still but for what an effect takes."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
 @attrs.frozen
 class Busy(Effect):
-    """Takes its time, and does nothing."""
+    """Takes its time, by the clock that it is given, and does nothing."""
 
+    clock: Clock
     seconds: float
 
     def bind(self, setting: Any, label: str) -> ForceCondition:
-        return BusyForce(label, np.arange(1), self.seconds)
+        return BusyForce(label, np.arange(1), self.clock, self.seconds)
 
     def arrays(self, setting: Any) -> Mapping[str, int]:
         return {}
@@ -154,12 +163,11 @@ class Busy(Effect):
 class BusyForce(ForceCondition):
     label: str
     particles: Any
+    clock: Clock
     seconds: float
 
-    def forces(self, time_: float, positions: Any, velocities: Any) -> Any:
-        until = time.process_time() + self.seconds
-        while time.process_time() < until:
-            pass
+    def forces(self, time: float, positions: Any, velocities: Any) -> Any:
+        self.clock.now += self.seconds
         return np.zeros((1, positions.shape[1]))
 
     def report(self, observation: Any) -> Mapping[str, float]:
@@ -167,17 +175,15 @@ class BusyForce(ForceCondition):
 
 
 def test_time_is_what_steps_take_more() -> None:
-    """An effect that takes as long as three steps has three quarters of the time."""
-    plain = built(DAMPED)
-    loop, state = plain.time_loop(), plain.start()
-    samples = []
-    for _ in range(7):
-        begun = time.process_time()
-        loop.advance(state, 100)
-        samples.append((time.process_time() - begun) / 100)
-    busy = Simulation.builder(plain.scene).effect(Busy(3.0 * min(samples)), label="busy").build()
-    # A quarter of the rest is what two measurements of a step differ by on a machine in use.
-    assert measured_shares(busy)["busy"] == pytest.approx(0.75, abs=0.0625)
+    """Of steps that take a second besides, one that takes three has three quarters of the time."""
+    clock = Clock()
+    builder = Simulation.builder(Scene.from_toml(DAMPED))
+    builder.effect(Busy(clock, 1.0), label="rest").effect(Busy(clock, 3.0), label="busy")
+    found = measured_shares(builder.build(), ticks=clock)
+    # Of rounding alone.
+    assert found["busy"] == pytest.approx(0.75, rel=1e-12)
+    assert found["rest"] == pytest.approx(0.25, rel=1e-12)
+    assert found["drag"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_what_a_run_fails_without_is_needed() -> None:

@@ -28,6 +28,7 @@ from solidsph.results.record import Record, TimeSeries
 from solidsph.results.record_writer import RecordWriter
 from solidsph.results.repair import repaired
 from solidsph.results.unclosed import _lookup3
+from tests.waiting import wait_for
 
 PLUGINS = (
     PluginUsed("solidsph.kernels", "cubic-spline", "solidsph", "0.1.0", "a.b:CubicSpline"),
@@ -158,7 +159,7 @@ def assert_holds(record: Record, content: list[Step]) -> None:
 # What went in comes out
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     count=st.integers(0, 9),
     dimension=st.integers(1, 3),
@@ -214,7 +215,8 @@ def test_a_record_without_plugins_fields_columns_tags(tmp_path: Path) -> None:
 
 def test_same_run_same_bytes(tmp_path: Path) -> None:
     written(tmp_path / "a", 5, 2, 3)
-    time.sleep(1.1)  # HDF5 counts seconds
+    begun = int(time.time())
+    wait_for(lambda: int(time.time()) > begun)  # HDF5 counts seconds
     written(tmp_path / "b", 5, 2, 3)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
@@ -367,28 +369,47 @@ CHILD = """
 import sys
 sys.path.insert(0, {folder!r})
 from pathlib import Path
-from test_record import append, opened, some_particles, some_step
+from tests.test_record import append, opened, some_particles, some_step
 particles = some_particles({count}, 2)
 writer = opened(Path({path!r}), particles)
 print("ready", flush=True)
 for number in range(10**9):
+    if number % {burst} == 3:
+        print("waits", flush=True)
+        sys.stdin.readline()
     append(writer, some_step(number, particles))
-    if number == 2:
-        print("going", flush=True)
 """
 
 
 @contextlib.contextmanager
-def running(path: Path, count: int):
-    """A process that writes a record as fast as it can, until the block ends."""
-    code = CHILD.format(folder=str(Path(__file__).parent), count=count, path=str(path))
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as child:
+def running(path: Path, count: int, burst: int):
+    """A process that writes a record as fast as it can, until the block ends.
+
+    After three steps, and after every `burst` of them, it waits for `go_on`: what it has written
+    is bounded, and known, however slow this process is.
+    """
+    code = CHILD.format(
+        folder=str(Path(__file__).parents[1]), count=count, path=str(path), burst=burst
+    )
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", code], **pipes) as child:
         try:
             assert child.stdout is not None
             assert child.stdout.readline() == b"ready\n"
             yield child
         finally:
             child.send_signal(signal.SIGKILL)
+
+
+def wait_for_burst(child: subprocess.Popen[bytes]) -> None:
+    assert child.stdout is not None
+    assert child.stdout.readline() == b"waits\n"
+
+
+def go_on(child: subprocess.Popen[bytes]) -> None:
+    assert child.stdin is not None
+    child.stdin.write(b"\n")
+    child.stdin.flush()
 
 
 def assert_is_start_of_the_run(record: Record, count: int) -> None:
@@ -402,14 +423,15 @@ def assert_is_start_of_the_run(record: Record, count: int) -> None:
 )
 def test_a_killed_run_leaves_a_readable_record(tmp_path: Path, count: int, delay: float) -> None:
     path = tmp_path / "run.vtkhdf"
-    with running(path, count) as child:
+    with running(path, count, burst=150) as child:
         if delay:
-            assert child.stdout.readline() == b"going\n"
-        time.sleep(delay)
+            wait_for_burst(child)
+            go_on(child)
+        time.sleep(delay)  # which decides nothing but where the process is
     with Record(path) as record:
         assert not record.is_closed_by_writer
         assert record.outcome == "running"
-        assert record.count >= (3 if delay else 0)
+        assert (3 if delay else 0) <= record.count <= 153
         assert_is_start_of_the_run(record, count)
         steps = record.count
 
@@ -427,10 +449,11 @@ def test_a_killed_run_leaves_a_readable_record(tmp_path: Path, count: int, delay
 def test_reading_while_the_run_goes_on(tmp_path: Path) -> None:
     path = tmp_path / "run.vtkhdf"
     lengths = []
-    with running(path, 300) as child:
-        assert child.stdout.readline() == b"going\n"
+    with running(path, 300, burst=20) as child:
+        wait_for_burst(child)
         early = Record(path)
         for _ in range(8):
+            go_on(child)
             with Record(path) as record:
                 last = record.count - 1
                 lengths.append(record.count)
@@ -438,9 +461,9 @@ def test_reading_while_the_run_goes_on(tmp_path: Path) -> None:
                 np.testing.assert_array_equal(record.positions[last], expected.positions)
                 np.testing.assert_array_equal(record.field("stress")[-1], expected.fields["stress"])
                 assert record.times[-1] == expected.time
-            time.sleep(0.02)
+            wait_for_burst(child)
         # A record opened earlier still gives the steps that it had then.
-        assert 3 <= early.count <= lengths[0]
+        assert early.count == 3
         assert_is_start_of_the_run(early, 300)
         early.close()
     assert lengths == sorted(lengths)
@@ -449,15 +472,16 @@ def test_reading_while_the_run_goes_on(tmp_path: Path) -> None:
 
 def test_others_may_read_along_by_the_rules_of_hdf5(tmp_path: Path) -> None:
     path = tmp_path / "run"
-    with running(path, 60) as child:
-        assert child.stdout.readline() == b"going\n"
+    with running(path, 60, burst=100) as child:
+        wait_for_burst(child)
         with h5py.File(path, swmr=True, locking=False) as file:
             points = file["VTKHDF/Points"]
             before = points.shape[0]
-            assert before >= 3 * 60
-            time.sleep(0.2)
+            assert before == 3 * 60
+            go_on(child)
+            wait_for_burst(child)
             points.refresh()
-            assert points.shape[0] > before
+            assert points.shape[0] == 103 * 60
             first = some_step(0, some_particles(60, 2))
             np.testing.assert_array_equal(points[:60, :2], first.positions)
 
@@ -502,7 +526,7 @@ sys.path.insert(0, {folder!r})
 from pathlib import Path
 from solidsph.errors import RecordError
 from solidsph.results import record_writer
-from test_record import append, opened, some_particles, some_step
+from tests.test_record import append, opened, some_particles, some_step
 path = Path({path!r})
 particles = some_particles(500, 3)
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -523,7 +547,7 @@ with opened(path, particles) as writer:
 @pytest.mark.parametrize("room", [0, 5_000, 50_000])
 def test_a_failing_device_keeps_the_steps_before(tmp_path: Path, room: int) -> None:
     path = tmp_path / "run"
-    code = FAILING_DEVICE.format(folder=str(Path(__file__).parent), path=str(path), room=room)
+    code = FAILING_DEVICE.format(folder=str(Path(__file__).parents[1]), path=str(path), room=room)
     child = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False
     )

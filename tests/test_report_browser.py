@@ -26,6 +26,7 @@ from solidsph.studies.point import Point
 from solidsph.studies.report import write_report
 from solidsph_builtin.cases.csm1 import Csm1
 from tests.reporting import HOSTILE, OfFunctions, hostile, known
+from tests.waiting import HANG
 
 pytestmark = pytest.mark.browser
 
@@ -35,7 +36,6 @@ OPTIONS = (
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
     "--disable-dev-shm-usage",  # which is small in containers
 )
-PATIENCE = 20.0  # for a page of 5 MB on a busy machine [s]
 MARKS = ".scatterlayer .points path.point"
 
 
@@ -56,6 +56,8 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chro
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     # With both paths given, selenium looks for no driver elsewhere.
     driver = webdriver.Chrome(options=options, service=Service(executable_path=str(DRIVER)))
+    driver.set_page_load_timeout(HANG)
+    driver.set_script_timeout(HANG)
     yield driver
     driver.quit()
 
@@ -81,7 +83,7 @@ def opened(browser: webdriver.Chrome, path: Path) -> webdriver.Chrome:
 
 
 def until(browser: webdriver.Chrome, so: Any) -> Any:
-    return WebDriverWait(browser, PATIENCE, poll_frequency=0.02).until(lambda _: so())
+    return WebDriverWait(browser, HANG, poll_frequency=0.02).until(lambda _: so())
 
 
 def one(browser: webdriver.Chrome, selector: str) -> WebElement:

@@ -9,8 +9,7 @@ import re
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +23,7 @@ from solidsph.results.checkpoint import checkpoint_path, read_checkpoint
 from solidsph.results.resume import pending
 from tests.resuming import NEVER, OFTEN, Stop, assert_same_record, content
 from tests.scenes import REFERENCE_ONLY, SCENE_TOML, box, with_effect
+from tests.waiting import HANG
 
 SOLIDSPH = str(Path(sys.executable).with_name("solidsph"))
 OUTPUTS = 4
@@ -65,6 +65,12 @@ BOUNDARIES: Mapping[str, Callable[[], Builder]] = {
         .boundary("approximate-neumann", where="left", traction={"x": "1e4*sin(500*t)"})
     ),
 }
+
+
+@pytest.fixture(autouse=True)
+def _not_by_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A checkpoint where a run is stopped, and none because it takes long."""
+    monkeypatch.setattr(checkpointer, "SHARE", NEVER)
 
 
 @pytest.fixture
@@ -399,6 +405,40 @@ def test_a_new_run_takes_the_place_of_the_old(tmp_path: Path) -> None:
     assert read_checkpoint(checkpoint_path(path)).state.step > old.state.step
 
 
+class Ticking:
+    """A clock by which outputs are a second apart and writing a checkpoint takes an eighth."""
+
+    def __init__(self) -> None:
+        self.now, self.outputs = 0.0, 0
+        self.written_at: list[int] = []
+
+    def perf_counter(self) -> float:
+        return self.now
+
+    @implementation
+    def solidsph_step_end(self, simulation, observation) -> None:
+        self.now += 1.0
+        self.outputs += 1
+
+    def write(self, path, checkpoint) -> None:
+        self.now += 0.125
+        self.written_at.append(self.outputs)
+
+
+def test_checkpoints_take_a_hundredth_of_the_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = Ticking()
+    monkeypatch.undo()  # the share that checkpoints have
+    monkeypatch.setattr(checkpointer, "clock", clock)
+    monkeypatch.setattr(checkpointer, "write_checkpoint", clock.write)
+    simulation = moving(box(1)).duration(0.1).outputs(40).build()
+    simulation.run(record=tmp_path / "run.h5", observers=[clock])
+    assert clock.outputs == 41
+    # Writing is thought to take 0.02 s, so the first comes after 2 s; the others after 12.5 s.
+    assert clock.written_at == [3, 16, 29]
+
+
 # Devices that fail
 
 FULL = """
@@ -439,7 +479,7 @@ def test_what_a_full_disk_stops_goes_on(tmp_path: Path, limit: int, share: float
     path, root = tmp_path / "run.h5", str(Path(__file__).parents[1])
     code = FULL.format(root=root, path=str(path), limit=limit, share=share)
     child = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=HANG
     )
     assert (child.returncode, child.stderr) == (0, "")
     assert re.fullmatch(r"cannot (write|create) .*File too large.*\n", child.stdout)
@@ -460,7 +500,7 @@ def test_a_full_disk_while_a_record_is_taken_over(tmp_path: Path) -> None:
     root = str(Path(__file__).parents[1])
     code = FULL_AGAIN.format(root=root, path=str(path), limit=len(before) // 2)
     child = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=HANG
     )
     assert (child.returncode, child.stderr) == (0, "")
     assert re.fullmatch(r"cannot .*File too large.*\n", child.stdout)
@@ -501,29 +541,36 @@ def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
 
 
 def command(*words: str, **others: object) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [SOLIDSPH, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **others
-    )
+    return started([SOLIDSPH, *words], **others)
 
 
-def scene_file(folder: Path, outputs: int = 2000) -> Path:
+def started(words: Sequence[str], **others: object) -> subprocess.Popen[str]:
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    return subprocess.Popen(words, text=True, **pipes, **others)
+
+
+def scene_file(folder: Path, outputs: int = 60) -> Path:
     path = folder / "scene.toml"
     text = SCENE_TOML.replace("outputs = 5", f"outputs = {outputs}")
-    path.write_text(text.replace("duration = 0.01", "duration = 3.0"))
+    path.write_text(text.replace("duration = 0.01", "duration = 0.1"))
     return path
 
 
-def wait_for_outputs(path: Path, count: int) -> None:
-    until = time.monotonic() + 60.0
-    while time.monotonic() < until:
-        try:
-            with Record(path) as record:
-                if record.count >= count:
-                    return
-        except RecordError:
-            pass
-        time.sleep(0.01)
-    raise AssertionError("no output came")
+# The command, which at an output says so and stays there until it is stopped.
+HELD = """
+import sys
+from solidsph.cli import main
+from solidsph.results.record_writer import RecordWriter
+append, left = RecordWriter.append, [{outputs}]
+def held(self, *values):
+    append(self, *values)
+    left[0] -= 1
+    if left[0] == 0:
+        print("held", flush=True)
+        sys.stdin.read()
+RecordWriter.append = held
+main()
+"""
 
 
 @pytest.mark.parametrize(
@@ -538,10 +585,12 @@ def wait_for_outputs(path: Path, count: int) -> None:
 )
 def test_a_command_that_is_stopped_can_be_resumed(tmp_path: Path, number: signal.Signals) -> None:
     folder, scene = tmp_path / "out", scene_file(tmp_path)
-    with command("run", str(scene), "--output", str(folder), "--quiet") as process:
-        wait_for_outputs(folder / "record.h5", 20)
+    held = [sys.executable, "-c", HELD.format(outputs=20), "run", str(scene), "--quiet"]
+    with started([*held, "--output", str(folder)]) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "held\n"
         process.send_signal(number)
-        _, errors = process.communicate(timeout=60)
+        _, errors = process.communicate(timeout=HANG)
     if number is signal.SIGKILL:
         assert process.returncode == -signal.SIGKILL
     else:
@@ -551,17 +600,17 @@ def test_a_command_that_is_stopped_can_be_resumed(tmp_path: Path, number: signal
         assert "Traceback" not in errors
     with Record(folder / "record.h5") as record:
         assert record.outcome == ("running" if number is signal.SIGKILL else "interrupted")
-        assert 20 <= record.count < 2000
+        assert record.count == 20
         assert (folder / "record.checkpoint").exists() or number is signal.SIGKILL
     with command("resume", str(folder), "--json") as process:
-        text, errors = process.communicate(timeout=120)
+        text, errors = process.communicate(timeout=HANG)
     assert (process.returncode, errors) == (0, "")
     (run,) = json.loads(text)["runs"]
     assert run["outcome"] == "finished"
     Simulation.builder(Scene.read(scene)).build().run(record=tmp_path / "whole.h5")
     assert_same_record(tmp_path / "whole.h5", folder / "record.h5")
     with command("resume", str(folder)) as process:
-        text, errors = process.communicate(timeout=60)
+        text, errors = process.communicate(timeout=HANG)
     assert process.returncode == 0
     assert "is finished; --until T extends it" in text
 
@@ -571,20 +620,20 @@ def test_what_cannot_be_resumed_is_one_message(tmp_path: Path, target: str) -> N
     (tmp_path / "empty").mkdir()
     scene_file(tmp_path)
     with command("resume", target, cwd=tmp_path) as process:
-        text, errors = process.communicate(timeout=60)
+        text, errors = process.communicate(timeout=HANG)
     assert (process.returncode, text) == (2, "")
     assert errors.startswith("error: ")
     assert len(errors.splitlines()) == 1
 
 
-def killing(folder: Path, count: int, seed: int, timeout: float) -> None:
+def killing(folder: Path, count: int, seed: int) -> None:
     script = Path(__file__).with_name("resuming.py")
     child = subprocess.run(
         [sys.executable, str(script), str(folder), str(count), str(seed)],
         capture_output=True,
         text=True,
         check=False,
-        timeout=timeout,
+        timeout=HANG,
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
     )
     assert (child.returncode, child.stderr) == (0, "")
@@ -596,9 +645,9 @@ def killing(folder: Path, count: int, seed: int, timeout: float) -> None:
 
 
 def test_killed_at_random_moments(tmp_path: Path) -> None:
-    killing(tmp_path, 8, seed=1, timeout=120)
+    killing(tmp_path, 8, seed=1)
 
 
 @pytest.mark.validation
 def test_killed_two_hundred_times(tmp_path: Path) -> None:
-    killing(tmp_path, 200, seed=2, timeout=600)
+    killing(tmp_path, 200, seed=2)

@@ -83,7 +83,7 @@ def least(goal: Goal, points: Sequence[Point]) -> float:
     return min((goal.loss(p.error, p.time) for p in points if goal.met(p)), default=inf)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(law=laws, error=st.floats(0.01, 0.1))
 def test_the_cheapest_for_an_accuracy_is_found_by_few_runs(law: Law, error: float) -> None:
     goal = Accuracy(error)
@@ -100,7 +100,7 @@ def test_the_cheapest_for_an_accuracy_is_found_by_few_runs(law: Law, error: floa
         assert law(found.point.settings) == found.point
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(law=laws, time=st.floats(1.0, 60.0))
 def test_the_nearest_for_a_time_is_found(law: Law, time: float) -> None:
     goal = Within(time)

@@ -229,7 +229,7 @@ def member(shape: Shape, points: Array) -> Mask:
     raise TypeError(shape)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(COMPOSITES)
 def test_sign_of_the_distance_is_membership(shape: Shape) -> None:
     points = points_around(shape)
@@ -257,7 +257,7 @@ def test_distance_is_that_to_the_nearest_sample(shape: Shape, volume: float, are
     assert (np.abs(shape.signed_distance(points)) <= gaps + 1e-12).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(COMPOSITES)
 def test_distance_never_exceeds_the_way_to_a_point_on_the_other_side(shape: Shape) -> None:
     # Discretisations rely on it: a cell nearer to its centre than that is whole or empty.
@@ -269,7 +269,7 @@ def test_distance_never_exceeds_the_way_to_a_point_on_the_other_side(shape: Shap
     assert (sums <= gaps + 1e-12).all()
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.tuples(size, size), st.tuples(coordinate, coordinate))
 def test_a_rectangle_is_the_same_as_box_and_as_polygon(
     lengths: tuple[float, float], origin: tuple[float, float]
@@ -284,7 +284,7 @@ def test_a_rectangle_is_the_same_as_box_and_as_polygon(
     assert polygon.volume() == pytest.approx(box.volume(), rel=1e-9)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(COMPOSITES)
 def test_bounds_hold_the_shape(shape: Shape) -> None:
     lower, upper = shape.bounds()

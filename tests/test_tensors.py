@@ -58,7 +58,7 @@ def at_point(result: Tensor | Scalar, point: int) -> Array:
 
 @pytest.mark.parametrize("word", UNARY)
 @given(data=st.data(), dimension=dimensions())
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_words_of_one_tensor(word: str, data: st.DataObject, dimension: int) -> None:
     ours, theirs = UNARY[word]
     A, B = (data.draw(deformation_gradients(dimension)) for _ in range(2))
@@ -70,7 +70,7 @@ def test_words_of_one_tensor(word: str, data: st.DataObject, dimension: int) -> 
 
 @pytest.mark.parametrize("word", BINARY)
 @given(data=st.data(), dimension=dimensions())
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_words_of_two_tensors(word: str, data: st.DataObject, dimension: int) -> None:
     ours, theirs = BINARY[word]
     A, B = (data.draw(deformation_gradients(dimension)) for _ in range(2))
@@ -82,7 +82,7 @@ def test_words_of_two_tensors(word: str, data: st.DataObject, dimension: int) ->
 
 
 @given(data=st.data(), dimension=dimensions())
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_push_forward(data: st.DataObject, dimension: int) -> None:
     F = data.draw(deformation_gradients(dimension))
     S = symmetric(data.draw(deformation_gradients(dimension)))

@@ -24,6 +24,7 @@ from solidsph.watch.symptom import Finding
 from solidsph.watch.volume import VanishingVolume
 from tests.resuming import OFTEN, Stop, assert_same_record
 from tests.scenes import SCENE_TOML, SOFT, box
+from tests.waiting import HANG
 
 # Confined wave speed of the soft block: sqrt((lambda + 2 mu) / rho) by its constants.
 _MU = 1e6 / 2.6
@@ -349,7 +350,7 @@ def test_the_command(tmp_path: Path) -> None:
             capture_output=True,
             text=True,
             check=False,
-            timeout=120,
+            timeout=HANG,
         )
 
     done = run(str(scene), "--watch", "--roll-back", "1")

@@ -8,8 +8,9 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Mapping
+from functools import lru_cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import Distribution, EntryPoint, entry_points
 from typing import Any
 
 import attrs
@@ -152,11 +153,18 @@ def _points(kind: str) -> list[EntryPoint]:
 
 
 def _entry(kind: str, point: EntryPoint) -> Entry:
-    dist = point.dist
+    distribution, version = ("", "") if point.dist is None else _named(point.dist)
     return Entry(
         kind=kind,
         name=point.name,
-        distribution=dist.name if dist else "",
-        version=dist.version if dist else "",
+        distribution=distribution,
+        version=version,
         target=point.value,
     )
+
+
+@lru_cache(maxsize=32)
+def _named(distribution: Distribution) -> tuple[str, str]:
+    """Name and version, for which the file of its metadata is parsed, the README in it too."""
+    metadata = distribution.metadata
+    return metadata["Name"], metadata["Version"]

@@ -81,7 +81,8 @@ def kept() -> Calibration | None:
     """What the cache file holds; nothing if it is old, broken or not there."""
     path = cache_file()
     try:
-        if not 0.0 <= clock.time() - path.stat().st_mtime < _STALE:
+        # Files may be served by a machine whose clock is ahead of this one's.
+        if abs(clock.time() - path.stat().st_mtime) > _STALE:
             return None
         return Calibration.from_json(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

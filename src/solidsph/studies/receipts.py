@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import tempfile
 import time as clock
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TypeAlias
@@ -183,11 +183,20 @@ def _measured(case: Case, paths: Mapping[str, Path]) -> Mapping[str, float]:
         return {}
 
 
-def measured_shares(simulation: Simulation, end: State | None = None) -> Mapping[str, float]:
+def measured_shares(
+    simulation: Simulation,
+    end: State | None = None,
+    ticks: Callable[[], float] = clock.process_time,
+) -> Mapping[str, float]:
     """Of every effect, its part in the time of steps of the scene as it is [-].
 
     Steps with and without it take turns, and of each the quickest sample counts: what else goes on
     only ever adds. Shares below about 0.02 are within what is left of that.
+
+    Args:
+        simulation: the scene, built.
+        end: the state from which steps are timed; the first one by default.
+        ticks: the time [s]; that of the processor, which other programs change less.
     """
     if simulation.scene.statics is not None or not simulation.effects:
         return {}
@@ -197,22 +206,21 @@ def measured_shares(simulation: Simulation, end: State | None = None) -> Mapping
     counts = dict.fromkeys(loops, 1)
     for name, loop in loops.items():
         loop.advance(begin, begin.step + 1)  # compiles, and makes what is made once
-        while _seconds(loop, begin, counts[name]) < _SAMPLE and counts[name] < 10**6:
+        while _seconds(loop, begin, counts[name], ticks) < _SAMPLE and counts[name] < 10**6:
             counts[name] *= 2
     times: dict[str, list[float]] = {name: [] for name in loops}
     for _ in range(_ROUNDS):
         for name, loop in loops.items():
-            times[name].append(_seconds(loop, begin, counts[name]) / counts[name])
+            times[name].append(_seconds(loop, begin, counts[name], ticks) / counts[name])
     whole = min(times[""])
     return {name: 1.0 - min(times[name]) / whole for name in simulation.effects}
 
 
-def _seconds(loop: TimeLoop, begin: State, count: int) -> float:
-    """Of the processor, which other programs on the machine change less than the clock's."""
-    begun = clock.process_time()
+def _seconds(loop: TimeLoop, begin: State, count: int, ticks: Callable[[], float]) -> float:
+    begun = ticks()
     with suppress(StepError):  # without it the motion may fail
         loop.advance(begin, begin.step + count)
-    return clock.process_time() - begun
+    return ticks() - begun
 
 
 def reduced(scene: Scene, coarser: float = COARSER) -> Scene:
