@@ -384,7 +384,7 @@ type = "clamp"
 where = "table and Y < 0.01"
 [[initial]]
 where = "block"
-displacement = {{y = -0.001}}
+displacement = {{y = -0.0001}}
 [[effect]]
 type = "contact"
 """,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -281,6 +282,53 @@ def test_coulombs_law_between_two_bodies() -> None:
     assert -along / normal == pytest.approx(f, rel=0.02)
     turn = x.T @ force
     assert np.abs(turn - turn.T).max() <= 1e-13 * np.abs(force).sum()
+
+
+def rubbing(friction: float, bodies: int) -> Simulation:
+    """Blocks in a row that are pressed together, each moving along the faces of the next."""
+    builder = touching(2, 5)
+    if bodies == 3:
+        third = {"type": "box", "lengths": [1.0, 1.0], "origin": [2.0, 0.3]}
+        builder.body("third", shape=third, spacing=0.125)
+        builder.initial(where="third", displacement={"x": -0.03}, velocity={"y": 3.0})
+    return (
+        builder.effect("contact", friction=friction)
+        .initial(where="other", displacement={"x": -0.02}, velocity={"y": 2.0})
+        .build()
+    )
+
+
+def told_on(told: Mapping[str, float], name: str, axis: str) -> float:
+    """Sum of the forces on a body by what the columns say, with those that it exerts [N]."""
+    total = 0.0
+    for column, value in told.items():
+        if column.endswith(f" on {name} {axis} [N]"):
+            total += value
+        elif column.startswith(f"contact force of {name} on ") and column.endswith(f"{axis} [N]"):
+            total -= value
+    return total
+
+
+@pytest.mark.parametrize("bodies", [2, 3])
+@pytest.mark.parametrize("friction", [0.0, 0.3, 2.0])
+def test_the_force_told_is_what_changes_the_momentum(friction: float, bodies: int) -> None:
+    """Nothing else acts on a body as a whole: the forces on it that are told, with friction, are
+    mass times acceleration of all its particles."""
+    simulation = rubbing(friction, bodies)
+    state, loop, m = simulation.start(), simulation.time_loop(), simulation.setting.masses
+    one, rubbed = condition(simulation), 0.0
+    for step in (0, 1, 5, 20):
+        state = loop.advance(state, step) if step else state
+        told = one.report(simulation.dynamics.observe(state))
+        for name, rows in simulation.particles.bodies.items():
+            change = m[rows] @ state.accelerations[rows]
+            for k, axis in enumerate("xy"):
+                on = told_on(told, name, axis)
+                # Inner forces are summed up as well, and are larger by far: rounding of those.
+                assert on == pytest.approx(change[k], abs=1e-9 * MODULUS)
+        rubbed = max(rubbed, abs(told["contact force of block on other y [N]"]))
+    # Without friction the faces push along x, but where they bend.
+    assert (rubbed > 1e3) == (friction > 0.0)
 
 
 def test_a_named_pair_alone() -> None:

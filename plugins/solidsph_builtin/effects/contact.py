@@ -54,18 +54,20 @@ _NAMES = ("x", "y", "z")
 class Contact(Effect):
     """Where two bodies together fill more than there is, they push each other out.
 
-    With S_B(x) = sum over b of w_b W(x - X_b) the part that body B fills around x, smoothed over
-    2.5 spacings, a particle a has the room r_a = 1 - S_A(X_a) that its own body leaves in the
-    reference configuration, and the excess o_a = max(0, S_B(x_a) - r_a). The energy
+    With S_B(x) = sum over b of V_b W(x - x_b) the part that body B fills around x, smoothed over
+    2.5 spacings, a particle a has the room r_a, which is what a plane face of B fills at a when it
+    lies on the surface of A, and the excess o_a = max(0, S_B(x_a) - r_a). The energy
 
         U = K / 2 (sum over a of V_a o_a^2 + sum over b of V_b o_b^2)
 
     has the form of the embedded atom, Daw & Baskes (1984): it depends on distances only, so its
     exact derivative is a force along the line between two particles, opposite at its ends, and
-    momentum, angular momentum and energy are kept. Bodies touch where S_A + S_B = 1: particles at
-    the centres of their cells at the distance (s_a + s_b) / 2, particles on the surface where
-    they meet. The usual pair force of a range of one spacing lets a lattice sink into another one,
-    half a spacing off, by 0.13 spacings, and sliding bodies interlock; here it is below 0.001.
+    momentum, angular momentum and energy are kept. Bodies touch where their surfaces are, whatever
+    their spacings: r_a follows from the depth of a below its surface and from the rows of particles
+    of B. It is no less than what B fills at a in the reference configuration, where the bodies are
+    apart by definition. The usual pair force of a range of one spacing lets a lattice sink into
+    another one, half a spacing off, by 0.13 spacings, and sliding bodies interlock; here it is
+    below 0.001.
 
     K is such that the contact yields as much as `1 / strength` spacings of material with the
     harmonic mean of both confined moduli. Deep inside, where S_B no longer changes, nothing pushes
@@ -127,7 +129,7 @@ class Contact(Effect):
         for one, other in self._who(setting.bodies):
             meeting = self._meeting(one, other)
             count = len(meeting.particles)
-            found[f"sites of {meeting.name}"] = 50 * count
+            found[f"sites of {meeting.name}"] = 41 * count
             if self.friction:
                 found[f"slip of {meeting.name}"] = 8 * d * count
         return found
