@@ -16,6 +16,7 @@ import pluggy
 
 from solidsph import compatibility, registry
 from solidsph.body import Body
+from solidsph.cover import cover_of
 from solidsph.dynamics import Dynamics
 from solidsph.engines.engine import Engine
 from solidsph.engines.history import HistoryFields, remembering
@@ -86,7 +87,7 @@ class Assembly:
         problems.add(compatibility.effects(effects))
         problems.stop_if_any()
 
-        problems.add(compatibility.dimensions(shapes, scene.cover))
+        problems.add(compatibility.dimensions(shapes, cover_of(scene)))
         problems.stop_if_any()
         problems.add(compatibility.names(sets))
         problems.stop_if_any()
@@ -243,7 +244,7 @@ class Assembly:
         kernel: Kernel,
         formulation: Formulation,
     ) -> Body:
-        radius = self._scene.cover * float(own.spacings.max())
+        radius = cover_of(self._scene) * float(own.spacings.max())
         body = Body(
             name=name,
             extent=particles.bodies[name],

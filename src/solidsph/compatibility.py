@@ -43,7 +43,7 @@ def numbers(scene: Scene) -> Iterator[str]:
     ):
         if value is not None and not (isfinite(value) and value > 0.0):
             yield f"{name} must be positive and finite, got {value}; give it in {unit}"
-    if isfinite(scene.cover) and scene.cover > MOST_COVER:
+    if scene.cover is not None and isfinite(scene.cover) and scene.cover > MOST_COVER:
         yield (
             f"cover must not exceed {MOST_COVER:g}, got {scene.cover:.6g}; it is in particle "
             "spacings, and 3 is usual"
