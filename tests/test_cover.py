@@ -56,7 +56,7 @@ def test_neighbours_in_a_row_are_as_far_apart_as_they_must_be(kernel: str) -> No
     without control leaves some saw-tooth; means are right to a per cent."""
     simulation = bar(kernel).build()
     found = stretches(simulation)
-    assert 0.67 < found.min()
+    assert found.min() > 0.67
     assert found.max() < 1.33
     assert found.mean() == pytest.approx(1.0, abs=0.02)
     assert "large-cover" not in {one.name for one in advised(simulation)}
@@ -70,7 +70,7 @@ def test_the_width_of_another_kernel_blinds_the_spline() -> None:
     assert heard.remedy == "cover = 2.6, or add [[effect]] 'hourglass-control'"
     controlled = bar("cubic-spline", 3.5).effect("hourglass-control").build()
     found = stretches(controlled)
-    assert 0.85 < found.min()
+    assert found.min() > 0.85
     assert found.max() < 1.15
     assert "large-cover" not in {one.name for one in advised(controlled)}
 
@@ -85,7 +85,7 @@ def test_a_blind_cover_is_warned_of_and_a_good_one_is_not(kernel: str, cover: fl
     warned = bool(names & {"large-cover", "small-cover"})
     if found.min() < 0.0 or found.max() > 2.0:
         assert warned
-    elif 0.67 < found.min() and found.max() < 1.33:
+    elif found.min() > 0.67 and found.max() < 1.33:
         # What is right at rest may still be too costly, or too narrow for sums of one.
         assert "large-cover" not in names or cover > 4.5
 
