@@ -119,7 +119,7 @@ def sheet() -> Builder:
 
 
 def test_a_crack_runs_from_the_notch_and_parts_the_sheet(tmp_path: Path) -> None:
-    # Long enough for what rings after the break to fade, and often enough to see the first bonds go.
+    # Long enough for the ringing after the break to fade; often enough to see the first bonds go.
     made = sheet().duration(0.3).outputs(90).build()
     state = made.run(record=tmp_path / "record.h5").state
     with Record(tmp_path / "record.h5") as record:

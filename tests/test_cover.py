@@ -18,6 +18,7 @@ from solidsph.advice import advised
 from solidsph.arrays import Array
 from solidsph.builder import Builder
 from solidsph.cover import BLIND, cover_of, held, own_cover
+from solidsph.errors import BuildError
 from solidsph.interfaces.kernel import Kernel
 from solidsph.parts import construct
 from solidsph.statics.equilibrium import equilibrium
@@ -128,6 +129,18 @@ def test_anyones_kernel_has_a_cover_of_its_own() -> None:
     wendland = own_cover(construct("kernels", "wendland-c2"))
     # Tenths of one are fifths of the other.
     assert own_cover(Half()) == pytest.approx(2.0 * wendland, abs=0.11)
+
+
+def test_a_profile_that_is_none_is_told_as_such() -> None:
+    """Without a cover its profile is asked for sooner; the message is the same."""
+
+    class Scalar(Kernel):
+        @staticmethod
+        def profile(q: Any, params: tuple[float, ...]) -> Any:
+            return 1.0 - q if q < 1.0 else 0.0
+
+    with pytest.raises(BuildError, match=r"kernel Scalar: profile\(q, params\) failed on an array"):
+        bar(Scalar()).build()
 
 
 def test_a_scene_names_a_cover_only_if_it_has_one() -> None:

@@ -87,7 +87,9 @@ class Assembly:
         problems.add(compatibility.effects(effects))
         problems.stop_if_any()
 
-        problems.add(compatibility.dimensions(shapes, cover_of(scene)))
+        cover = problems.attempt(cover_of, scene)
+        problems.stop_if_any()
+        problems.add(compatibility.dimensions(shapes, problems.settled(cover)))
         problems.stop_if_any()
         problems.add(compatibility.names(sets))
         problems.stop_if_any()

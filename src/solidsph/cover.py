@@ -17,7 +17,7 @@ from solidsph.arrays import Array
 from solidsph.interfaces.kernel import Kernel
 from solidsph.parts import construct
 from solidsph.scene import Scene
-from solidsph.smoothing import profile_slope
+from solidsph.smoothing import check_profile, profile_slope
 
 # The default is the largest tenth at which a bar is held at least so well. The figure is that of
 # 3.5 spacings of the paper's own kernel, less rounding; it makes 2.6 of the cubic spline.
@@ -39,13 +39,18 @@ def cover_of(scene: Scene) -> float:
     """The cover that the scene names, or else its kernel's own [spacings].
 
     Raises:
-        SceneError, PluginError: the kernel cannot be made.
+        SceneError, PluginError: the kernel cannot be made, or its profile is not a weight.
     """
     return own_cover(construct("kernels", scene.kernel)) if scene.cover is None else scene.cover
 
 
 def own_cover(kernel: Kernel) -> float:
-    """The largest cover at which the gradient holds neighbours in a row [spacings]."""
+    """The largest cover at which the gradient holds neighbours in a row [spacings].
+
+    Raises:
+        PluginError: the profile is not a weight.
+    """
+    check_profile(kernel)
     enough = [cover for cover in _COVERS if held(kernel, 1, cover) >= _HELD]
     return float(max(enough, default=_USUAL))
 
