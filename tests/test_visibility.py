@@ -23,7 +23,6 @@ from solidsph.neighbours import Hidden, neighbour_pairs
 from solidsph.particles import Particles
 from solidsph.parts import construct
 from solidsph.results.energy import KINETIC
-from solidsph.testing.shape import convex_lines, distance_bound
 from solidsph.visibility import hidden_pairs
 from tests.scenes import SOFT
 
@@ -451,26 +450,6 @@ def test_a_convex_body_asks_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_a_polygon_knows_whether_it_is_convex(vertices: Any, expected: bool) -> None:
     assert construct("shapes", {"type": "polygon", "vertices": vertices}).convex is expected
-
-
-def test_the_kit_catches_a_shape_that_lies() -> None:
-    """About being convex, and about how deep its points are."""
-    ring = construct("shapes", {"type": "annulus", "inner_radius": 0.4, "outer_radius": 0.8})
-
-    class Ring(type(ring)):  # type: ignore[misc]
-        @property
-        def convex(self) -> bool:
-            return True
-
-    class Deep(type(ring)):  # type: ignore[misc]
-        def signed_distance(self, points: Array) -> Array:
-            d = super().signed_distance(points)
-            return np.where(d < -0.05, 8.0 * d, d)
-
-    assert convex_lines(ring).measured.startswith("not promised")
-    assert convex_lines(Ring(0.4, 0.8)).passed is False
-    assert distance_bound(ring).passed is True
-    assert distance_bound(Deep(0.4, 0.8)).passed is False
 
 
 def test_symmetric_bodies_keep_symmetric_neighbours() -> None:
