@@ -206,6 +206,33 @@ traction = {{x = "2e4*min(t/0.01, 1)"}}
     ),
     Flawed(
         "large-cover",
+        "cover = 2.6, or add [[effect]] 'hourglass-control'",
+        """
+title = "a spline as wide as the default of another kernel"
+duration = 1.0
+statics = {}
+[body.bar]
+shape = {type = "box", lengths = [2.0, 0.4]}
+spacing = 0.033
+[kernel]
+type = "cubic-spline"
+cover = 3.5
+[material]
+type = "linear-elastic"
+youngs_modulus = 1e6
+poissons_ratio = 0.0
+density = 1000.0
+[[boundary]]
+type = "clamp"
+where = "left"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {x = 1000.0}
+""",
+    ),
+    Flawed(
+        "large-cover",
         "cover = 3",
         f"""
 title = "six spacings in space"
@@ -215,7 +242,8 @@ material = {RUBBER}
 shape = {{type = "box", lengths = [0.1, 0.1, 0.1]}}
 spacing = 0.0125
 [kernel]
-type = "cubic-spline"
+type = "gaussian"
+cut = 6.0
 cover = 6.0
 [[boundary]]
 type = "clamp"
@@ -224,6 +252,37 @@ where = "bottom"
 type = "traction"
 where = "top"
 traction = {{y = "-2e4*min(t/0.005, 1)"}}
+""",
+    ),
+    Flawed(
+        "half-supports",
+        "ghosts = 4",
+        """
+title = "a quarter of a sheet with a hole"
+duration = 1.0
+statics = {}
+[body.sheet]
+spacing = 0.05
+discretisation = {type = "lattice", on_boundary = true, ghosts = 4, ghost_faces = ["bottom"]}
+[body.sheet.shape]
+type = "difference"
+of = {type = "box", lengths = [1.0, 1.0]}
+minus = {type = "disc", radius = 0.2}
+[material]
+type = "linear-elastic"
+youngs_modulus = 1e6
+poissons_ratio = 0.3
+density = 1000.0
+[[boundary]]
+type = "symmetry"
+axis = "x"
+[[boundary]]
+type = "symmetry"
+axis = "y"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {x = 1000.0}
 """,
     ),
     Flawed(
@@ -804,7 +863,7 @@ shape = {{type = "interval", length = 0.15}}
 spacing = 0.0025
 [kernel]
 type = "modified-mollifier"
-cover = 5.5
+cover = 3.5
 [[boundary]]
 type = "traction"
 where = "left"

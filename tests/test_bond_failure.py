@@ -107,7 +107,7 @@ def sheet() -> Builder:
             },
             spacing=0.05,
         )
-        .kernel("cubic-spline", cover=1.8)
+        .kernel("cubic-spline")
         .material("neo-hookean", youngs_modulus=E, poissons_ratio=NU, density=DENSITY)
         .boundary("prescribed-motion", where="Y > 0.9", displacement={"y": "0.1*t"})
         .boundary("prescribed-motion", where="Y < 0.1", displacement={"y": "-0.1*t"})
@@ -119,7 +119,8 @@ def sheet() -> Builder:
 
 
 def test_a_crack_runs_from_the_notch_and_parts_the_sheet(tmp_path: Path) -> None:
-    made = sheet().build()
+    # Long enough for the ringing after the break to fade; often enough to see the first bonds go.
+    made = sheet().duration(0.3).outputs(90).build()
     state = made.run(record=tmp_path / "record.h5").state
     with Record(tmp_path / "record.h5") as record:
         damage = record.field("damage")[:]
@@ -128,7 +129,7 @@ def test_a_crack_runs_from_the_notch_and_parts_the_sheet(tmp_path: Path) -> None
     tips = [X[row >= 0.25, 0].max(initial=0.0) for row in damage]
     begun = next(tip for tip in tips if tip > 0.0)
     assert tips[0] == 0.0
-    assert begun < 0.6  # at the notch, whose end is at 0.4
+    assert begun < 0.45  # at the notch, whose end is at 0.4, within a spacing
     assert tips[-1] > 0.9
     assert np.all(np.diff(tips) >= 0.0)  # it only grows
     # As the sheet is its own mirror image, so is the crack.

@@ -730,6 +730,26 @@ class DistanceInOtherUnits(GoodShape):
         return 1e3 * super().signed_distance(points)
 
 
+class DeeperThanItIs(GoodShape):
+    """Right near the boundary only: a point in the middle seems to be far from it."""
+
+    def signed_distance(self, points: Array) -> Array:
+        distance = super().signed_distance(points)
+        return np.where(distance < -0.1, 4.0 * distance, distance)
+
+
+class NotConvex(GoodShape):
+    """A square without its middle."""
+
+    @property
+    def convex(self) -> bool:
+        return True
+
+    def signed_distance(self, points: Array) -> Array:
+        hole = Box([0.4, 0.4], [0.3, 0.3]).signed_distance(points)
+        return np.maximum(super().signed_distance(points), -hole)
+
+
 class InsideOut(GoodShape):
     def signed_distance(self, points: Array) -> Array:
         return -super().signed_distance(points)
@@ -753,6 +773,8 @@ SHAPES = [
     (LargerThanItIs, {"volume"}),
     (DistanceFromInside, {"on boundary"}),
     (DistanceInOtherUnits, {"distance near boundary"}),
+    (DeeperThanItIs, {"distance bound"}),
+    (NotConvex, {"convex lines"}),
     (InsideOut, {"sign", "distance near boundary"}),
     (SampledCoarsely, {"sampling"}),
     (FacesBySpacing, {"named faces"}),

@@ -17,6 +17,7 @@ import pluggy
 
 from solidsph import compatibility
 from solidsph.body import Body
+from solidsph.cover import cover_of
 from solidsph.dynamics import Dynamics
 from solidsph.engines.history import HistoryFields, remembering
 from solidsph.errors import SceneError
@@ -176,7 +177,7 @@ class Assembly:
         """The particles of all bodies with their tags, if there are any."""
         problems, shapes, sets = self._problems, parts.shapes, parts.sets
         fitting = [
-            *compatibility.dimensions(shapes, self._scene.cover),
+            *compatibility.dimensions(shapes, parts.cover),
             *compatibility.names(sets),
         ]
         problems.add(fitting)
@@ -223,7 +224,7 @@ class Assembly:
         kernel: Kernel,
         formulation: Formulation,
     ) -> Body:
-        radius = self._scene.cover * float(own.spacings.max())
+        radius = cover_of(self._scene) * float(own.spacings.max())
         body = Body(
             name=name,
             shape=shape,

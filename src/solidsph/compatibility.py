@@ -45,7 +45,7 @@ def numbers(scene: Scene) -> Iterator[str]:
     ):
         if value is not None and not (isfinite(value) and value > 0.0):
             yield f"{name} must be positive and finite, got {value}; give it in {unit}"
-    if isfinite(scene.cover) and scene.cover > MOST_COVER:
+    if scene.cover is not None and isfinite(scene.cover) and scene.cover > MOST_COVER:
         yield (
             f"cover must not exceed {MOST_COVER:g}, got {scene.cover:.6g}; it is in particle "
             "spacings, and 3 is usual"
@@ -170,7 +170,7 @@ class Names:
         return ""
 
 
-def dimensions(shapes: Mapping[str, Shape], cover: float) -> Iterator[str]:
+def dimensions(shapes: Mapping[str, Shape], cover: float | None) -> Iterator[str]:
     """One dimension for all bodies, and a cover that reaches far enough in it."""
     each = {name: shape.dimension for name, shape in shapes.items()}
     if not each:
@@ -181,7 +181,7 @@ def dimensions(shapes: Mapping[str, Shape], cover: float) -> Iterator[str]:
         return
     d = next(iter(each.values()))
     least = sqrt(d)
-    if 0.0 < cover <= least:
+    if cover is not None and 0.0 < cover <= least:
         yield (
             f"cover = {cover:.6g} is too small in {d}D: a particle must reach its diagonal "
             f"neighbours, {least:.4g} spacings away; take at least {ceil(10 * least + 5) / 10:g}"

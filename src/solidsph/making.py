@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 
 from solidsph import compatibility, registry
+from solidsph.cover import cover_of
 from solidsph.engines.engine import Engine
 from solidsph.engines.select import engine_named
 from solidsph.interfaces.discretisation import Discretisation
@@ -36,6 +37,7 @@ class Parts:
     """What the names of a scene stand for; None where a name could not be understood."""
 
     kernel: Kernel | None
+    cover: float | None  # support radius [spacings]
     formulation: Formulation | None
     integrator: Integrator | None
     engine: Engine | None
@@ -66,6 +68,7 @@ class Making:
 
             problems.add(advice.unknown(scene.silence))
         kernel: Kernel | None = self._make("kernels", scene.kernel)
+        cover = None if kernel is None else problems.attempt(cover_of, scene)
         formulation: Formulation | None = self._make("formulations", scene.formulation)
         integrator = self._integrator()
         engine: Engine | None = problems.attempt(engine_named, _engine_name(scene))
@@ -74,7 +77,16 @@ class Making:
         problems.add(compatibility.effects(effects))
         shapes, materials, sets = self._body_parts()
         return Parts(
-            kernel, formulation, integrator, engine, handlers, effects, shapes, materials, sets
+            kernel,
+            cover,
+            formulation,
+            integrator,
+            engine,
+            handlers,
+            effects,
+            shapes,
+            materials,
+            sets,
         )
 
     def _make(self, kind: str, wanted: PartLike) -> Any:

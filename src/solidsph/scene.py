@@ -80,7 +80,7 @@ class Scene:
     duration: float  # [s]
     title: str = ""
     kernel: PartLike = "modified-mollifier"
-    cover: float = 3.5  # support radius in particle spacings [-]
+    cover: float | None = None  # support radius in particle spacings; the kernel's own if None [-]
     material: PartLike | None = None
     formulation: PartLike = "total-lagrangian"
     boundaries: Sequence[ImposedScene] = ()
@@ -135,7 +135,9 @@ def _table(scene: Scene) -> dict[str, Any]:
     if scene.silence:
         table["silence"] = list(scene.silence)
     table["body"] = {name: _body_table(body) for name, body in scene.bodies.items()}
-    table["kernel"] = {**_part(scene.kernel, "kernels"), "cover": scene.cover}
+    table["kernel"] = _part(scene.kernel, "kernels")
+    if scene.cover is not None:
+        table["kernel"] = {**table["kernel"], "cover": scene.cover}
     if scene.material is not None:
         table["material"] = _part(scene.material, "materials")
     table["formulation"] = _part(scene.formulation, "formulations")

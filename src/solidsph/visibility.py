@@ -3,9 +3,9 @@
 The visibility criterion of Belytschko, Lu and Gu (1994), Int. J. Numer. Meth. Engng 37, 229-256:
 a neighbour across a gap, a slot or a notch is none.
 
-Lines are followed by the shape's signed distance. It changes by no more than the distance walked,
-so a point at depth D clears the line for D on both sides, and what is not cleared is halved. Nothing
-that leaves the body by two tolerances escapes, and where both ends are deep nothing is asked at all.
+Lines are followed by the shape's signed distance. A point at depth D clears the line for D on both
+sides, and what is not cleared is halved and asked again, so no line escapes that leaves the body by
+more than two tolerances. Where the ends are deep enough nothing is asked at all.
 """
 
 from __future__ import annotations
@@ -101,7 +101,8 @@ def _inwards(shape: Shape, points: Array, step: float) -> Array:
             points + along
         )
     lengths = np.linalg.norm(slopes, axis=1, keepdims=True)
-    return np.divide(slopes, lengths, out=np.zeros_like(slopes), where=lengths > 1e-3 * step)
+    away = lengths > 1e-3 * step
+    return np.asarray(np.where(away, slopes / np.where(away, lengths, 1.0), 0.0))
 
 
 def _near_surface(X: Array, depths: Array, radius: float, spacing: float) -> Iterator[Indices]:

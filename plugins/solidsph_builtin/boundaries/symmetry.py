@@ -30,9 +30,10 @@ _ON_PLANE = 1e-6
 class Symmetry(BoundaryHandler):
     """Mirrors the body at the plane {axis} = {at}; the rest of it lies on either side.
 
-    Particles on the plane stay on it, and ghosts beyond the plane move as mirror images. One of
-    the two must be there: particles on the plane, or ghosts to complete the supports, such as
-    those of `ghost_faces = ["left"]`.
+    Ghosts beyond the plane, such as those of `ghost_faces = ["left"]`, move as mirror images and
+    complete the supports; particles on the plane stay on it. One of the two must be there. On the
+    plane without ghosts, particles have half a support: unless the gradient takes the surface into
+    account, as 'consistent' does, stresses beside a hole on the plane come out a third too high.
     """
 
     axis: str
@@ -54,7 +55,9 @@ class Symmetry(BoundaryHandler):
         if not len(on_plane) and not len(beyond):
             raise SceneError(
                 f"symmetry: no particle lies on the plane {self.axis} = {self.at:.6g} m and no "
-                "ghost beyond it; place particles on it (on_boundary = true) or add ghosts"
+                "ghost beyond it; give the discretisation ghosts behind that face, ghosts = N as "
+                "many as the cover and ghost_faces = [its name]; with gradient = 'consistent', "
+                "particles on the plane (on_boundary = true) do as well"
             )
         conditions: list[Condition] = []
         if len(on_plane):

@@ -15,6 +15,7 @@ from solidsph.advice.coarse_outputs import coarse_outputs
 from solidsph.advice.deep_clamp import deep_clamp
 from solidsph.advice.few_across import few_across
 from solidsph.advice.few_steps import few_steps
+from solidsph.advice.half_supports import half_supports
 from solidsph.advice.hourglass_unneeded import hourglass_unneeded
 from solidsph.advice.large_cover import large_cover
 from solidsph.advice.near_incompressible import near_incompressible
@@ -45,6 +46,7 @@ _LOOKS: tuple[Look, ...] = (
     few_across,
     small_cover,
     large_cover,
+    half_supports,
     near_incompressible,
     unseen_motions,
     bar_speed,

@@ -30,6 +30,6 @@ def deep_clamp(seen: Seen) -> Iterator[Advice]:
             yield Advice(
                 found=f"{idle} of the {len(held)} particles of body {one.name!r} are held farther "
                 f"than the support, {support:.3g} m, from every free one",
-                expected=f"held to a depth of {np.ceil(seen.scene.cover):g} particles",
+                expected=f"held to a depth of {np.ceil(seen.cover):g} particles",
                 remedy="shorten the body there, or hold less of it",
             )

@@ -1,11 +1,15 @@
-"""A support so large that it costs more than it gives, or lets neighbours pair."""
+"""A support so large that it is blind to neighbours in a row, lets them pair, or costs too much."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from solidsph.advice.advice import Advice
 from solidsph.advice.seen import Seen
+from solidsph.cover import BLIND, held, own_cover
+from solidsph.interfaces.effect import Need
 from solidsph.interfaces.formulation import Configuration
 
 # Beyond these, in spacings, a kernel smooths details away and each evaluation costs several times
@@ -19,11 +23,26 @@ _USUAL = 3.0
 
 
 def large_cover(seen: Seen) -> Iterator[Advice]:
-    """By the neighbours that it brings."""
-    d, cover = seen.dimension, seen.scene.cover
+    """By what the gradient holds on a lattice in rows, and by the neighbours that it brings."""
+    d, cover = seen.dimension, seen.cover
     body = seen.simulation.setting.bodies[0]
+    kernel = body.smoothing.kernel
+    share = held(kernel, d, cover)
+    # Sums that end right at the surface set off no saw-tooth there.
+    if share < BLIND and not seen.fits_surface and seen.lacks(Need.UNSEEN_MOTIONS):
+        # Where only the next neighbours act, waves are held by 2 / pi of their wave number.
+        part = max(0.0, 50.0 * np.pi * share)
+        best = own_cover(kernel)
+        yield Advice(
+            found=f"with cover = {cover:g}, {type(kernel).__name__} in {d}D holds neighbours in a "
+            f"row against each other at {part:.2g} % of the frequency that next neighbours alone "
+            "would: their displacements are off by several times their difference",
+            expected=f"{50.0 * np.pi * BLIND:.2g} % or more, as at cover = {best:g}",
+            remedy=f"cover = {best:g}, or add [[effect]] 'hourglass-control'",
+        )
+        return
     moving = body.formulation.configuration is Configuration.CURRENT
-    pairs = moving and not body.smoothing.kernel.nonnegative_transform
+    pairs = moving and not kernel.nonnegative_transform
     most = _PAIRING[d] if pairs else _MOST[d]
     if cover <= most:
         return

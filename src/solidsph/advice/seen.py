@@ -15,8 +15,11 @@ from solidsph.advice import signals
 from solidsph.advice.thickness import through
 from solidsph.arrays import Array, Mask
 from solidsph.body import Body
+from solidsph.cover import cover_of
 from solidsph.interfaces.condition import ExtensionCondition
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.formulation import Formulation
+from solidsph.interfaces.gradient import Gradient
 from solidsph.interfaces.shape import Shape
 from solidsph.parts import construct
 from solidsph.simulation import Simulation
@@ -165,6 +168,18 @@ class Seen:
     @property
     def _undeclared(self) -> bool:
         return any(effect.answers is None for effect in self.simulation.effects.values())
+
+    @cached_property
+    def cover(self) -> float:
+        """Support radius in particle spacings, the scene's or the kernel's own."""
+        return cover_of(self.simulation.scene)
+
+    @cached_property
+    def fits_surface(self) -> bool:
+        """Whether the gradient is changed for each body as a whole, so that sums end right where
+        the body does."""
+        formulation: Formulation = construct("formulations", self.simulation.scene.formulation)
+        return type(formulation.gradient).of_body is not Gradient.of_body
 
     @cached_property
     def bodies(self) -> Sequence[SeenBody]:

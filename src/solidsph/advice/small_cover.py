@@ -22,19 +22,19 @@ _PLACES = (0.0, 0.25, 0.5)
 def small_cover(seen: Seen) -> Iterator[Advice]:
     """How far the kernel's sum over a lattice is from 1, at worst."""
     own = seen.simulation.setting.bodies[0].smoothing
-    wrong = _unevenness(own, seen.scene.cover)
+    wrong = _unevenness(own, seen.cover)
     if wrong <= _WRONG:
         return
     enough = next(
         (
             cover
-            for cover in np.arange(np.ceil(10.0 * seen.scene.cover), 60.0) / 10.0
+            for cover in np.arange(np.ceil(10.0 * seen.cover), 60.0) / 10.0
             if _unevenness(smoothing_kernel(own.kernel, own.dimension, cover), cover) <= _WRONG
         ),
         None,
     )
     yield Advice(
-        found=f"with cover = {seen.scene.cover:g} the kernel's sum over a lattice is "
+        found=f"with cover = {seen.cover:g} the kernel's sum over a lattice is "
         f"{100 * wrong:.2g} % off",
         expected=f"at most {100 * _WRONG:g} %: a smooth kernel needs more neighbours",
         remedy="choose another kernel" if enough is None else f"cover = {enough:.2g} or more",

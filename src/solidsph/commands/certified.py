@@ -45,6 +45,7 @@ class SchemeOptions:
         Raises:
             SceneError: there is no such scene, case or part.
         """
+        from solidsph.cover import own_cover
         from solidsph.parts import describe
         from solidsph.scene import Scene
         from solidsph.studies.scheme import Scheme
@@ -60,6 +61,7 @@ class SchemeOptions:
         changes: dict[str, Any] = {}
         if self.kernel is not None:
             changes["kernel"] = example_part("kernels", self.kernel)
+            changes["cover"] = own_cover(changes["kernel"])
         if self.cover is not None:
             changes["cover"] = self.cover
         if self.material is not None:

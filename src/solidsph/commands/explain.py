@@ -22,6 +22,7 @@ from solidsph.costs.model import Prediction, predicted
 from solidsph.costs.process import machine_memory
 from solidsph.costs.shares import Share, shares
 from solidsph.costs.work import Compilation
+from solidsph.cover import cover_of
 from solidsph.errors import SceneError
 from solidsph.interfaces.case import Case
 from solidsph.parts import construct
@@ -241,12 +242,28 @@ def _numbers(simulation: Simulation) -> list[dict[str, Any]]:
         ("dimensions", d, "1 is uniaxial strain, 2 is plane strain"),
         ("particles", int((~particles.ghosts).sum()), "from shapes and spacings"),
         ("ghosts", int(particles.ghosts.sum()), "complete the support of those near a surface"),
-        ("neighbours", neighbours, f"a particle's, on average, within {scene.cover:g} spacings"),
+        ("neighbours", neighbours, "a particle's, on average, within the support"),
+        ("cover [spacings]", cover_of(scene), _why_cover(scene)),
+        *_hidden(simulation),
         ("confined wave speed [m/s]", speed, "sqrt((lambda + 2 mu) / rho), the fastest body's"),
         ("engine", type(simulation.dynamics.internal).__name__, f'engine = "{scene.engine}"'),
         *(_of_motion(simulation) if scene.statics is None else _of_statics(simulation)),
     ]
     return [{"quantity": name, "value": value, "why": why} for name, value, why in rows]
+
+
+def _why_cover(scene: Scene) -> str:
+    if scene.cover is not None:
+        return "support radius, named by the scene"
+    return "support radius; the kernel's own, the largest that holds neighbours in a row"
+
+
+def _hidden(simulation: Simulation) -> list[tuple[str, Any, str]]:
+    """Pairs of near particles that are no neighbours, where there are any."""
+    found = [body.hidden for body in simulation.setting.bodies if body.hidden is not None]
+    count = sum(len(one.keys) for one in found) // 2
+    why = "near, but no neighbours: their straight line leaves the body"
+    return [("pairs across gaps", count, why)] if count else []
 
 
 def _of_motion(simulation: Simulation) -> list[tuple[str, Any, str]]:

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from solidsph.body import Body
 from solidsph.costs.dissection import dissected
 from solidsph.costs.work import Compilation, Loop, Piece, StaticWork, Work
+from solidsph.cover import cover_of
 from solidsph.engines.tally import Tally, Way
 from solidsph.interfaces.condition import (
     ExtensionCondition,
@@ -68,7 +69,7 @@ def counted(simulation: Simulation) -> Work:
         record_bytes=record_bytes(n, d, outputs, _own_fields(simulation)),
         compilations=frozenset(_compilations(simulation, tally, compiled=compiled)),
         statics=own,
-        cover=simulation.scene.cover,
+        cover=cover_of(simulation.scene),
         motions=len(simulation.dynamics.motions),
     )
 

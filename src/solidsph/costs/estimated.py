@@ -18,6 +18,7 @@ import numpy as np
 from solidsph.costs.counted import ITERATIONS, record_bytes
 from solidsph.costs.dissection import dissected
 from solidsph.costs.work import Compilation, Loop, Piece, StaticWork, Work
+from solidsph.cover import cover_of
 from solidsph.engines.tally import Tally, Way, vectors
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Configuration, Formulation
@@ -97,7 +98,7 @@ def estimated(scene: Scene) -> Work:
         compilations=frozenset(_compilations(d, compiled=compiled, moving=moving)),
         statics=statics,
         counted=False,
-        cover=scene.cover,
+        cover=cover_of(scene),
         motions=len(scene.boundaries),
     )
 
@@ -113,8 +114,9 @@ def _body(scene: Scene, body: BodyScene) -> BodyEstimate:
     sides = np.maximum(1.0, (upper - lower) / h)
     lattice = _on_a_lattice(body)
     particles = max(1.0, volume / h**d)
-    around = lattice_neighbours(scene.cover, d) if lattice else ball(scene.cover, d)
-    cut = _surface(shape) / h ** (d - 1) * cut_off(scene.cover, d) * around / ball(scene.cover, d)
+    cover = cover_of(scene)
+    around = lattice_neighbours(cover, d) if lattice else ball(cover, d)
+    cut = _surface(shape) / h ** (d - 1) * cut_off(cover, d) * around / ball(cover, d)
     share = min(1.0, particles / float(np.prod(sides)))
     return BodyEstimate(
         particles=particles,
@@ -220,12 +222,13 @@ def _compilations(d: int, *, compiled: bool, moving: bool) -> Iterator[Compilati
 
 def _statics(scene: Scene, bodies: Sequence[BodyEstimate], d: int) -> StaticWork:
     assert scene.statics is not None
-    factors = [dissected(body.cells, 2.0 * scene.cover, d) for body in bodies]
+    reach = 2.0 * cover_of(scene)
+    factors = [dissected(body.cells, reach, d) for body in bodies]
     return StaticWork(
         load_steps=scene.statics.load_steps,
         iterations=scene.statics.load_steps * ITERATIONS,
         freedoms=round(sum(body.particles for body in bodies) * d),
-        entries=round(sum(b.particles for b in bodies) * ball(2.0 * scene.cover, d) * d * d),
+        entries=round(sum(b.particles for b in bodies) * ball(reach, d) * d * d),
         fill=sum(one.fill for one in factors),
         multiplications=sum(one.multiplications for one in factors),
     )

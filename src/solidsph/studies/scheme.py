@@ -10,6 +10,7 @@ import numpy as np
 
 from solidsph.arrays import Array
 from solidsph.builder import Builder
+from solidsph.cover import cover_of, own_cover
 from solidsph.errors import SceneError
 from solidsph.interfaces.formulation import Configuration, Formulation
 from solidsph.interfaces.integrator import Integrator
@@ -66,7 +67,7 @@ class Scheme:
     """
 
     kernel: Kernel = attrs.field(factory=lambda: _kernel("modified-mollifier"), converter=_kernel)
-    cover: float = 3.5  # [spacings]
+    cover: float = attrs.field()  # the kernel's own, unless it is given [spacings]
     formulation: Formulation = attrs.field(
         factory=lambda: _formulation("total-lagrangian"), converter=_formulation
     )
@@ -77,6 +78,10 @@ class Scheme:
     )
     spacing: float = 1.0  # [m]
     time_step_factor: float = 0.5  # in use, of the CFL step [-]
+
+    @cover.default
+    def _own_cover(self) -> float:
+        return own_cover(self.kernel)
 
     @classmethod
     def of(cls, scene: Scene) -> Scheme:
@@ -91,7 +96,7 @@ class Scheme:
             raise SceneError("the scene names no material; add [material]")
         return cls(
             kernel=scene.kernel,
-            cover=scene.cover,
+            cover=cover_of(scene),
             formulation=scene.formulation,
             material=material,
             effects=tuple(effect.part for effect in scene.effects),

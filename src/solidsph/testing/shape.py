@@ -141,6 +141,29 @@ def sign(shape: Shape) -> Verdict:
 
 
 @check
+def distance_bound(shape: Shape) -> Verdict:
+    """A distance is never more than there is: from a point to another it changes by no more than
+    the way between them."""
+    probes = _around(shape)
+    distances = shape.signed_distance(probes)
+    apart = np.linalg.norm(probes[:, None] - probes[None], axis=2)
+    excess = float((np.abs(distances[:, None] - distances[None]) - apart).max())
+    return at_most(max(0.0, excess) / _size(shape), _ROUNDING)
+
+
+@check
+def convex_lines(shape: Shape) -> Verdict:
+    """What declares to be convex is: no line between two points inside leaves the shape."""
+    if not shape.convex:
+        return not_promised("it does not declare to be convex")
+    probes = _around(shape)
+    inside = probes[shape.signed_distance(probes) < 0.0]
+    between = [t * inside[:, None] + (1.0 - t) * inside[None] for t in (0.25, 0.5)]
+    points = np.concatenate(between).reshape(-1, shape.dimension)
+    return at_most(float(shape.signed_distance(points).max()) / _size(shape), _ROUNDING)
+
+
+@check
 def sampling(shape: Shape) -> Verdict:
     """Samples are at most the asked spacing apart: none stands for more than spacing^(d-1)."""
     # In 1D the boundary is points, of area 1 each.
@@ -172,6 +195,8 @@ CHECKS: tuple[Check, ...] = (
     on_boundary,
     distance_near_boundary,
     sign,
+    distance_bound,
+    convex_lines,
     sampling,
     named_faces,
 )

@@ -97,7 +97,7 @@ class NeighbourSearch:
         starts, columns = candidates(positions, (1.0 + _MARGIN) * self.radius)
         if self.hidden is not None:
             rows = np.repeat(np.arange(n), np.diff(starts))
-            seen = ~self.hidden.between(rows, columns)
+            seen = ~self.hidden.between(rows, columns.astype(np.intp))
             starts = np.concatenate([[0], np.cumsum(seen)])[starts]
             columns = columns[seen]
         self._list = Near(starts, columns, np.empty(0))  # distances are asked for when they count
