@@ -45,6 +45,7 @@ from solidsph.setting import Setting
 from solidsph.simulation import Simulation
 from solidsph.smoothing import smoothing_kernel
 from solidsph.step_size import largest_step
+from solidsph.surface import Conditions
 from solidsph.where import EVERYWHERE, Where, select
 
 # No run of more steps ends; a scene that asks for them has its units wrong.
@@ -89,7 +90,7 @@ class Assembly:
         problems.stop_if_any()
         problems.add(compatibility.names(sets))
         problems.stop_if_any()
-        particles = self._tagged(Particles.joined(sets))
+        particles, tag_conditions = self._tagged(Particles.joined(sets))
         problems.add(compatibility.apart(shapes, particles))
         bodies = [
             problems.attempt(self._body, name, particles, own, material, kernel, formulation)
@@ -107,6 +108,7 @@ class Assembly:
             masses=np.concatenate([body.masses for body in made]),
             bodies=made,
             step_size=scene.duration / steps,
+            conditions=tag_conditions,
         )
         conditions = self._bound(handlers, effects, setting)
         motions = _in_order([c for c in conditions if isinstance(c, MotionCondition)], particles)
@@ -253,8 +255,8 @@ class Assembly:
             return body
         return attrs.evolve(body, formulation=_with_gradient(formulation, gradient))
 
-    def _tagged(self, particles: Particles) -> Particles:
-        """Particles with the tags that the scene adds to its bodies."""
+    def _tagged(self, particles: Particles) -> tuple[Particles, Conditions]:
+        """Particles with the tags that the scene adds to its bodies, and what these say."""
         tags = dict(particles.tags)
         conditions: dict[str, list[tuple[slice, Where]]] = {}
         taken = compatibility.Names(particles.tags)
@@ -272,7 +274,7 @@ class Assembly:
                     mask[chosen[(chosen >= extent.start) & (chosen < extent.stop)]] = True
                     tags[tag] = mask
                     conditions.setdefault(tag, []).append((extent, where))
-        return attrs.evolve(particles, tags=tags, conditions=conditions)
+        return attrs.evolve(particles, tags=tags), conditions
 
     def _bound(
         self,
