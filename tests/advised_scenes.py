@@ -763,13 +763,12 @@ where = "edge-1"
 traction = {y = 1e-3}
 """,
     f"""
-title = "a sheet with corners of 20 degrees, 0.34 wide"
+title = "a sheet with corners of 20 degrees, 0.36 wide"
 duration = 0.01
-formulation = {{type = "total-lagrangian", gradient = "quadratic"}}
 material = {RUBBER}
 [body.sheet]
 shape = {{type = "polygon", vertices = [[0, 0], [2, 0], [3, 0.364], [1, 0.364]]}}
-spacing = 0.05
+spacing = 0.04
 [[boundary]]
 type = "clamp"
 where = "edge-3"

@@ -46,6 +46,7 @@ from solidsph.setting import Setting
 from solidsph.simulation import Simulation
 from solidsph.smoothing import smoothing_kernel
 from solidsph.step_size import largest_step
+from solidsph.surface import Conditions
 from solidsph.visibility import hidden_pairs
 from solidsph.where import Where, select
 
@@ -84,9 +85,10 @@ class Assembly:
         scene, problems = self._scene, self._problems
         parts = self._making.parts()
         placed = self._placed(parts)
-        self._stop_if_any(placed)
+        self._stop_if_any(None if placed is None else placed[0])
 
-        particles, effects = problems.settled(placed), parts.effects
+        particles, tag_conditions = problems.settled(placed)
+        effects = parts.effects
         kernel = problems.settled(parts.kernel)
         formulation = problems.settled(parts.formulation)
         problems.add(compatibility.apart(parts.shapes, parts.sets))
@@ -118,6 +120,7 @@ class Assembly:
             bodies=made,
             step_size=step_size,
             end=end,
+            conditions=tag_conditions,
         )
         conditions = self._bound(parts.handlers, effects, setting)
         motions = _in_order([c for c in conditions if isinstance(c, MotionCondition)], particles)
@@ -170,11 +173,11 @@ class Assembly:
         """What is wrong with the scene's words, their values and, if asked for, its places."""
         placed = self._placed(self._making.parts())
         if places and placed is not None:
-            self._look_for(placed)
+            self._look_for(placed[0])
         return self._problems.found
 
-    def _placed(self, parts: Parts) -> Particles | None:
-        """The particles of all bodies with their tags, if there are any."""
+    def _placed(self, parts: Parts) -> tuple[Particles, Conditions] | None:
+        """The particles of all bodies with their tags, and what these say, if there are any."""
         problems, shapes, sets = self._problems, parts.shapes, parts.sets
         fitting = [
             *compatibility.dimensions(shapes, parts.cover),
@@ -245,8 +248,8 @@ class Assembly:
             return body
         return attrs.evolve(body, formulation=_with_gradient(formulation, gradient))
 
-    def _tagged(self, particles: Particles) -> Particles:
-        """Particles with the tags that the scene adds to its bodies."""
+    def _tagged(self, particles: Particles) -> tuple[Particles, Conditions]:
+        """Particles with the tags that the scene adds to its bodies, and what these say."""
         tags = dict(particles.tags)
         conditions: dict[str, list[tuple[slice, Where]]] = {}
         taken = compatibility.Names(particles.tags)
@@ -264,7 +267,7 @@ class Assembly:
                     mask[chosen[(chosen >= extent.start) & (chosen < extent.stop)]] = True
                     tags[tag] = mask
                     conditions.setdefault(tag, []).append((extent, where))
-        return attrs.evolve(particles, tags=tags, conditions=conditions)
+        return attrs.evolve(particles, tags=tags), conditions
 
     def _bound(
         self,

@@ -6,7 +6,7 @@ is a file read and two runs never share a history.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -47,10 +47,6 @@ class Particles:
     tags: Mapping[str, Mask] = attrs.field(factory=dict)  # named sets of particles, each (n,)
     bodies: Mapping[str, slice] = attrs.field(factory=dict)  # each body is one run of particles
     faces: Mapping[str, Face] = attrs.field(factory=dict)  # a particle at an edge is on several
-    # What the scene's own tags say, body by body: on a surface they are asked face by face.
-    conditions: Mapping[str, Sequence[tuple[slice, str | Callable[[Array], Mask]]]] = attrs.field(
-        factory=dict
-    )
     cells: Array = attrs.field()  # (n,) weights in sums over neighbours [m^d]
 
     @cells.default

@@ -12,7 +12,7 @@ from solidsph.arrays import Array, Indices
 from solidsph.body import Body
 from solidsph.errors import SceneError
 from solidsph.particles import Face, Particles
-from solidsph.surface import Pieces
+from solidsph.surface import Conditions, Pieces
 from solidsph.where import Where, described, select
 
 
@@ -25,6 +25,7 @@ class Setting:
     bodies: Sequence[Body]
     step_size: float  # time step of the run [s]
     end: float = inf  # of the run [s]; no formula of time need have a value beyond it
+    conditions: Conditions = attrs.field(factory=dict)  # of the tags that the scene adds
 
     def select(self, where: Where) -> Indices:
         """Indices of the particles at `where`.
@@ -40,7 +41,7 @@ class Setting:
         Raises:
             SceneError: no surface is there, or `where` cannot be understood.
         """
-        pieces = Pieces.of(self.particles)
+        pieces = self.pieces()
         chosen = pieces.at(where) & (pieces.areas > 0.0)
         if not chosen.any():
             self.select(where)  # which says so where there is no particle either
@@ -50,6 +51,10 @@ class Setting:
                 "is on both)"
             )
         return pieces.owned(chosen)
+
+    def pieces(self) -> Pieces:
+        """The whole surface, in pieces."""
+        return Pieces.of(self.particles, self.conditions)
 
     def smoothing_matrix(self) -> csr_array:
         """W of the paper's eq. 8, sparse: its product with values gives their approximation."""

@@ -7,8 +7,9 @@ the pieces of that face only; all else holds where it does for the particle that
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from typing import TypeAlias
 
 import attrs
 import numpy as np
@@ -18,12 +19,16 @@ from solidsph.arrays import Array, Indices, Mask
 from solidsph.particles import Face, Particles
 from solidsph.where import EVERYWHERE, Where, holds
 
+Conditions: TypeAlias = Mapping[str, Sequence[tuple[slice, Where]]]
+"""What the tags that a scene adds say, by tag: the condition of each body that adds it."""
+
 
 @attrs.frozen(eq=False, slots=False)
 class Pieces:
     """The surface of all bodies in pieces, one for each particle and face."""
 
     particles: Particles
+    conditions: Conditions
     owners: Indices  # (m,) the particle that owns each
     faces: NDArray[np.intp]  # (m,) number of its face
     names: Sequence[str]  # of the faces
@@ -31,13 +36,14 @@ class Pieces:
     areas: Array  # (m,) [m^(d-1)]
 
     @classmethod
-    def of(cls, particles: Particles) -> Pieces:
-        """Those of the surface of `particles`."""
+    def of(cls, particles: Particles, conditions: Conditions) -> Pieces:
+        """Those of the surface of `particles`, on which the scene's tags are asked anew."""
         found = list(particles.faces.values())
         counts = [face.particles.size for face in found]
         d = particles.dimension
         return cls(
             particles=particles,
+            conditions=conditions,
             owners=np.concatenate([np.zeros(0, np.intp), *(face.particles for face in found)]),
             faces=np.repeat(np.arange(len(found)), counts),
             names=tuple(particles.faces),
@@ -86,10 +92,10 @@ class Pieces:
         particles = self.particles
         if tag == EVERYWHERE:
             return ~particles.ghosts[self.owners]
-        if tag not in particles.conditions:
+        if tag not in self.conditions:
             return np.asarray(particles.tags[tag][self.owners])
         mask = np.zeros(self.owners.shape, dtype=np.bool_)
-        for extent, where in particles.conditions[tag]:
+        for extent, where in self.conditions[tag]:
             inside = (self.owners >= extent.start) & (self.owners < extent.stop)
             mask |= inside & holds(particles, where, tagged, self.owners)
         return mask

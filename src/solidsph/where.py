@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import TypeAlias
 
 import numpy as np
@@ -79,16 +79,10 @@ def holds(
     tags = _by_variable(_known(particles))
     bodies = _by_variable(particles.bodies)
     text = as_formula(particles, where)
-    values: dict[str, Array | Mask] = {}
-    for body, tag in _LIKE_OF_A_BODY.findall(text):
-        if body in bodies:
-            _check_of_body(particles, where, bodies[body], tags.get(tag, tag))
-    for body, tag in _OF_A_BODY.findall(text):
-        if body not in bodies:
-            continue  # which the formula will not know either
-        inside = np.zeros(particles.count, dtype=np.bool_)
-        inside[particles.bodies[bodies[body]]] = True
-        values[f"{body}.{tag}"] = inside[owners] & tagged(tags[tag])
+    values: dict[str, Array | Mask] = {
+        f"{body}.{tag}": _inside(particles, bodies[body])[owners] & tagged(tags[tag])
+        for body, tag in _of_bodies(particles, where, text, bodies, tags)
+    }
     if text not in tags and text not in values and not any(mark in where for mark in "<>=() "):
         _check_names(particles, where)
     axes = AXES[: particles.dimension]
@@ -109,6 +103,26 @@ def holds(
     if result.dtype != np.bool_:
         raise SceneError(f"where = {where!r} is a number, not a condition; compare it: '... < 0.1'")
     return np.broadcast_to(result, values[axes[0]].shape)
+
+
+def _of_bodies(
+    particles: Particles,
+    where: str,
+    text: str,
+    bodies: Mapping[str, str],
+    tags: Mapping[str, str],
+) -> list[tuple[str, str]]:
+    """Each body and tag of it that a formula names, as variables; what is no body is left out."""
+    for body, tag in _LIKE_OF_A_BODY.findall(text):
+        if body in bodies:
+            _check_of_body(particles, where, bodies[body], tags.get(tag, tag))
+    return [(body, tag) for body, tag in _OF_A_BODY.findall(text) if body in bodies]
+
+
+def _inside(particles: Particles, body: str) -> Mask:
+    mask = np.zeros(particles.count, dtype=np.bool_)
+    mask[particles.bodies[body]] = True
+    return mask
 
 
 def names_used(particles: Particles, where: str) -> frozenset[str]:

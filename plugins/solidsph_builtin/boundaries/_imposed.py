@@ -14,7 +14,6 @@ from solidsph.interfaces.declared import ScheduledMotion
 from solidsph.motion import VectorField
 from solidsph.particles import Face
 from solidsph.setting import Setting
-from solidsph.surface import Pieces
 from solidsph.where import Where
 from solidsph_builtin.boundaries._reports import reaction, stress_reaction
 
@@ -78,5 +77,5 @@ def _surface(setting: Setting, indices: Indices, where: Where | None) -> Face:
     """The surface at `where`, or all that the particles `indices` own."""
     if where is None:
         return Face(indices, setting.particles.area_vectors[indices])
-    pieces = Pieces.of(setting.particles)
+    pieces = setting.pieces()
     return pieces.owned(pieces.at(where))

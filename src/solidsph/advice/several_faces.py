@@ -11,7 +11,6 @@ from solidsph.advice.advice import Advice
 from solidsph.advice.seen import Seen
 from solidsph.arrays import Mask
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.particles import Particles
 from solidsph.parts import construct
 from solidsph.surface import Pieces
 from solidsph.where import AXES, Where, names_used
@@ -30,13 +29,13 @@ def several_faces(seen: Seen) -> Iterator[Advice]:
     condition says "surface", or consists of names alone, such as "not left", all of it is meant. So
     are the faces of one name on several bodies, unless one of them lies against another body.
     """
-    pieces = Pieces.of(seen.simulation.particles)
+    pieces = seen.simulation.setting.pieces()
     for entry in seen.scene.boundaries:
         handler: BoundaryHandler = construct("boundaries", entry.part)
         where: Where | None = getattr(handler, "where", None)
         if not handler.loads_surface or where is None:
             continue
-        names = _names(pieces.particles, where)
+        names = _names(pieces, where)
         chosen = pieces.at(where) & (pieces.areas > 0.0)
         loose = pieces.unnamed(where) & chosen
         shares = _shares(pieces, chosen)
@@ -64,15 +63,15 @@ def several_faces(seen: Seen) -> Iterator[Advice]:
         )
 
 
-def _names(particles: Particles, where: Where) -> frozenset[str]:
+def _names(pieces: Pieces, where: Where) -> frozenset[str]:
     """What a condition names, and the conditions of the scene's own tags in it."""
     if not isinstance(where, str):
         return frozenset(AXES)  # a function of positions
-    names = names_used(particles, where)
+    names = names_used(pieces.particles, where)
     own = [name.split(".")[-1] for name in names]
     for tag in own:
-        for _, condition in particles.conditions.get(tag, ()):
-            names |= _names(particles, condition)
+        for _, condition in pieces.conditions.get(tag, ()):
+            names |= _names(pieces, condition)
     return names
 
 
@@ -91,7 +90,7 @@ def _shares(pieces: Pieces, chosen: Mask) -> dict[str, float]:
 def _in_several_bodies(pieces: Pieces, chosen: Mask, names: frozenset[str]) -> bool:
     """Whether a face was named by a condition that names no body."""
     particles = pieces.particles
-    if len(particles.bodies) < 2 or names & {*particles.bodies, *particles.conditions}:
+    if len(particles.bodies) < 2 or names & {*particles.bodies, *pieces.conditions}:
         return False
     named = np.isin(pieces.faces, [pieces.names.index(f) for f in names if f in pieces.names])
     return bool(np.unique(pieces.bodies[chosen & named]).size > 1)
