@@ -32,9 +32,9 @@ def _check_vertices(shape: Shape, field: attrs.Attribute[Any], value: object) ->
 class Polygon(Shape):
     """The points enclosed by straight edges from each of the `vertices` to the next.
 
-    Vertices may run either way round, and the first may be repeated at the end, as drawings and
-    geographic formats close their rings: the last edge is there in any case. Faces: edge-0 from the first vertex to the second, edge-1,
-    and so on.
+    Vertices may run either way round, and the first may be repeated at the end, as drawings close
+    their rings: the last edge is there in any case. Faces: edge-0 from the first vertex to the
+    second, edge-1, and so on.
 
     Raises:
         SceneError: a vertex is not two finite numbers, there are fewer than 3, or the edges

@@ -18,6 +18,7 @@ from solidsph.costs.process import peak_memory
 from solidsph.errors import ConvergenceError, DivergedError
 from solidsph.interfaces.case import Case, Curves, Measurement
 from solidsph.results.record import Record
+from solidsph.scene import Scene
 from solidsph.simulation import Simulation
 
 FINISHED = "finished"
@@ -59,13 +60,23 @@ Begin = Callable[[str, Simulation], Sequence[object]]
 """Called before each scene with its name; returns observers of its run."""
 
 
+Ahead = Callable[[Scene], None]
+"""Called before each scene is built."""
+
+
+def _unchecked(scene: Scene) -> None:
+    pass
+
+
 def _unobserved(name: str, simulation: Simulation) -> Sequence[object]:
     return ()
 
 
-def run_case(case: Case, folder: Path, *, begin: Begin = _unobserved) -> CaseResult:
+def run_case(
+    case: Case, folder: Path, *, ahead: Ahead = _unchecked, begin: Begin = _unobserved
+) -> CaseResult:
     """Run every scene of `case`, record it in `folder`, measure and draw."""
-    runs = run_scenes(case, folder, begin=begin)
+    runs = run_scenes(case, folder, ahead=ahead, begin=begin)
     with opened(runs) as records:
         measurements = case.measure(records)
         pictures = case.draw(records, folder)
@@ -76,7 +87,9 @@ def run_case(case: Case, folder: Path, *, begin: Begin = _unobserved) -> CaseRes
     return CaseResult(measurements, runs, pictures, tables, peak_memory())
 
 
-def run_scenes(case: Case, folder: Path, *, begin: Begin = _unobserved) -> Sequence[SceneRun]:
+def run_scenes(
+    case: Case, folder: Path, *, ahead: Ahead = _unchecked, begin: Begin = _unobserved
+) -> Sequence[SceneRun]:
     """Run every scene of `case` and record it in `folder`.
 
     A scene that diverges, or finds no equilibrium, does not end the case: what it recorded is
@@ -86,6 +99,7 @@ def run_scenes(case: Case, folder: Path, *, begin: Begin = _unobserved) -> Seque
     for name, scene in case.scenes().items():
         path = folder / f"{name}.h5"
         outcome, begun = FINISHED, clock.perf_counter()
+        ahead(scene)
         simulation = Builder(scene).build()
         effort: Mapping[str, Any] = {}
         observers = begin(name, simulation)
