@@ -44,9 +44,6 @@ from solidsph.smoothing import smoothing_kernel
 from solidsph.step_size import largest_step
 from solidsph.where import select
 
-# Of a step: an end that is missed by less is met.
-NEAR = 1e-6
-
 # No run of more steps ends; a scene that asks for them has its units wrong.
 _MOST_STEPS = 1e10
 
@@ -64,11 +61,8 @@ def wrong_besides(scene: Scene, *, complete: bool) -> Sequence[str]:
 class Assembly:
     """One build of one scene."""
 
-    def __init__(
-        self, scene: Scene, manager: pluggy.PluginManager, until: float | None = None
-    ) -> None:
+    def __init__(self, scene: Scene, manager: pluggy.PluginManager) -> None:
         self._scene = scene
-        self._until = until  # a later end than the scene's duration [s]
         self._manager = manager
         self._problems = Problems()
         self._making = Making(scene, self._problems)
@@ -101,14 +95,12 @@ class Assembly:
         step = problems.attempt(self._step_size, scheme, effects, made)
         self._stop_if_any(particles)
         steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
-        step_size = scene.duration / steps
-        steps, end = self._extended(steps, step_size)
         setting = Setting(
             particles=particles,
             masses=np.concatenate([body.masses for body in made]),
             bodies=made,
-            step_size=step_size,
-            end=end,
+            step_size=scene.duration / steps,
+            end=scene.duration,
         )
         conditions = self._bound(parts.handlers, effects, setting)
         motions = _in_order([c for c in conditions if isinstance(c, MotionCondition)], particles)
@@ -194,14 +186,6 @@ class Assembly:
         for where in dict.fromkeys(one for one in places if isinstance(one, str)):
             if not wrong.intersection(re.findall(r"\w+", where.replace("-", "_"))):
                 self._problems.attempt(select, particles, where)
-
-    def _extended(self, steps: int, step_size: float) -> tuple[int, float]:
-        """Steps up to the end of the run, and that end [s]."""
-        further = ceil((self._until or 0.0) / step_size - NEAR)
-        if further <= steps:
-            return steps, self._scene.duration
-        # A hair less, so that rounding asks no formula beyond the end that was asked for.
-        return further, further * step_size * (1.0 - 1e-12)
 
     def _body(
         self,

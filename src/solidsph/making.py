@@ -149,6 +149,8 @@ class Making:
                 shapes[name] = shape
                 if discretisation is not None:
                     made[name] = discretisation
+        if not bodies and self._scene.material is not None:
+            self._make("materials", self._scene.material)  # of no use, but it may be wrong too
         if self._problems.found and not all(
             _soon_made(shape, bodies[name].spacing) for name, shape in shapes.items()
         ):

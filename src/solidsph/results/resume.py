@@ -8,7 +8,6 @@ from pathlib import Path
 
 import attrs
 
-from solidsph.assembly import NEAR
 from solidsph.builder import Builder
 from solidsph.carry_out import carry_out
 from solidsph.errors import RecordError
@@ -20,6 +19,9 @@ from solidsph.resumption import Resumption
 from solidsph.scene import Scene
 from solidsph.session import FINISHED
 from solidsph.simulation import Result, Simulation
+
+# Of a step: an end that is missed by less is met.
+_NEAR = 1e-6
 
 
 @attrs.frozen(eq=False)
@@ -159,8 +161,8 @@ def _extended(simulation: Simulation, until: float) -> Simulation:
     end = simulation.steps * simulation.step_size
     if simulation.scene.statics is not None:
         raise RecordError("an equilibrium has no later end; leave `until` (--until) out")
-    if not end * (1.0 - NEAR) <= until < float("inf"):
+    if not end * (1.0 - _NEAR) <= until < float("inf"):
         raise RecordError(
             f"until = {until:.9g} s is before the end of the run, {end:.9g} s; give a later one"
         )
-    return simulation.extended(max(simulation.steps, ceil(until / simulation.step_size - NEAR)))
+    return simulation.extended(max(simulation.steps, ceil(until / simulation.step_size - _NEAR)))
