@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solidsph import Scene, Simulation
+from solidsph import Scene, Simulation, cli
 from solidsph.builder import Builder
 from solidsph.commands.target import resolve
 from solidsph.costs import fits
@@ -343,3 +343,19 @@ def test_a_reader_that_goes_away_fails_no_run(command: str, tmp_path: Path) -> N
     assert "Traceback" not in done.stderr
     assert "Exception ignored" not in done.stderr
     assert list(tmp_path.glob("results/*/record.h5"))
+
+
+def test_a_warning_is_told_without_path_and_source(capsys: pytest.CaptureFixture[str]) -> None:
+    cli._tell(UserWarning("few neighbours"), UserWarning, "/some/where.py", 7)
+    assert capsys.readouterr().err == "warning: few neighbours\n"
+    cli._tell(RuntimeWarning("overflow"), RuntimeWarning, "/some/where.py", 7)
+    assert "/some/where.py:7" in capsys.readouterr().err  # not about the input: it says where
+
+
+def test_check_says_how_to_give_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
+    def lacking(kind: str, name: str, **given: object) -> object:
+        return construct("materials", {"type": name, "density": 1.0})
+
+    monkeypatch.setattr("solidsph.testing.example_part", lacking)
+    with pytest.raises(SceneError, match="such as --set youngs_modulus="):
+        cli.cli.main(["check", "neo-hookean"], standalone_mode=False)
