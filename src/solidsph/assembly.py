@@ -50,9 +50,6 @@ from solidsph.surface import Conditions
 from solidsph.visibility import hidden_pairs
 from solidsph.where import Where, select
 
-# Of a step: an end that is missed by less is met.
-NEAR = 1e-6
-
 
 def wrong_besides(scene: Scene, *, complete: bool) -> Sequence[str]:
     """Problems of a scene of which something could not be read and was left out.
@@ -67,11 +64,8 @@ def wrong_besides(scene: Scene, *, complete: bool) -> Sequence[str]:
 class Assembly:
     """One build of one scene."""
 
-    def __init__(
-        self, scene: Scene, manager: pluggy.PluginManager, until: float | None = None
-    ) -> None:
+    def __init__(self, scene: Scene, manager: pluggy.PluginManager) -> None:
         self._scene = scene
-        self._until = until  # a later end than the scene's duration [s]
         self._manager = manager
         self._problems = Problems()
         self._making = Making(scene, self._problems)
@@ -112,14 +106,12 @@ class Assembly:
         step = problems.attempt(self._step_size, scheme, effects, made)
         self._stop_if_any(particles)
         steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
-        step_size = scene.duration / steps
-        steps, end = self._extended(steps, step_size)
         setting = Setting(
             particles=particles,
             masses=np.concatenate([body.masses for body in made]),
             bodies=made,
-            step_size=step_size,
-            end=end,
+            step_size=scene.duration / steps,
+            end=scene.duration,
             conditions=tag_conditions,
         )
         conditions = self._bound(parts.handlers, effects, setting)
@@ -208,14 +200,6 @@ class Assembly:
         for where in dict.fromkeys(one for one in places if isinstance(one, str)):
             if not wrong.intersection(re.findall(r"\w+", where.replace("-", "_"))):
                 self._problems.attempt(select, particles, where)
-
-    def _extended(self, steps: int, step_size: float) -> tuple[int, float]:
-        """Steps up to the end of the run, and that end [s]."""
-        further = ceil((self._until or 0.0) / step_size - NEAR)
-        if further <= steps:
-            return steps, self._scene.duration
-        # A hair less, so that rounding asks no formula beyond the end that was asked for.
-        return further, further * step_size * (1.0 - 1e-12)
 
     def _body(
         self,

@@ -173,18 +173,15 @@ class Builder:
             **self._values,
         )
 
-    def build(self, *, until: float | None = None) -> Simulation:
+    def build(self) -> Simulation:
         """Make every part, check every pair of them, and assemble the simulation.
-
-        Args:
-            until: a later end than the duration [s], rounded up to a whole step of the same size.
 
         Raises:
             BuildError: with every problem found, each with its remedy.
         """
         manager = listeners()
         manager.hook.solidsph_configure(builder=self)
-        return Assembly(self.scene(), manager, until).simulation()
+        return Assembly(self.scene(), manager).simulation()
 
 
 def _part(part: PartLike, parameters: Mapping[str, Any]) -> PartLike:

@@ -11,7 +11,6 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Mask
 from solidsph.body import Body
 from solidsph.interfaces.condition import (
     ForceCondition,
@@ -211,23 +210,21 @@ def apart(shapes: Mapping[str, Shape], sets: Mapping[str, Particles]) -> Iterato
 
 def motions(held_by: Sequence[MotionCondition], particles: Particles) -> Iterator[str]:
     """No degree of freedom determined twice, and no ghost left adrift."""
-    seen: dict[str, Mask] = {}
-    for motion in held_by:
-        own = motion.held
-        for other, theirs in seen.items():
-            both = own & theirs
-            if both.any():
-                first, axis = (int(k) for k in np.argwhere(both)[0])
-                yield (
-                    f"{motion.label!r} and {other!r} both determine the motion of "
-                    f"{int(both.any(axis=1).sum())} particles (the first: {first}, along "
-                    f"{'xyz'[axis]}); narrow the `where` of one"
-                )
-        seen[motion.label] = own
-    covered = np.zeros(particles.positions.shape, dtype=np.bool_)
-    for own in seen.values():
-        covered |= own
-    adrift = particles.ghosts & ~covered.all(axis=1)
+    # By freedom: the number of the first motion that determines it, or -1.
+    first_of = np.full(particles.positions.shape, -1)
+    for number, motion in enumerate(held_by):
+        entries = np.nonzero(motion.held)
+        owners = first_of[entries]
+        for other in np.unique(owners[owners >= 0]).tolist():
+            both, axes = (one[owners == other] for one in entries)
+            yield (
+                f"{motion.label!r} and {held_by[other].label!r} both determine the motion of "
+                f"{len(np.unique(both))} particles (the first: {both[0]}, along {'xyz'[axes[0]]}); "
+                "narrow the `where` of one"
+            )
+        free = owners < 0
+        first_of[tuple(one[free] for one in entries)] = number
+    adrift = particles.ghosts & (first_of < 0).any(axis=1)
     if adrift.any():
         tags = [
             tag

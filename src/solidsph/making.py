@@ -55,6 +55,7 @@ class Making:
         self._scene = scene
         self._problems = problems
         self.labels: set[str] = set()  # of the accounts of boundaries and effects
+        self._repeated: dict[str, int] = {}  # how often a label was wanted
         self.used: dict[registry.Entry, None] = {}  # plugins in the order of their use, each once
 
     def parts(self) -> Parts:
@@ -136,11 +137,18 @@ class Making:
                 self._problems.add(
                     [f"two accounts are labelled {label!r}; give each a label of its own"]
                 )
-            while label in self.labels:
-                label = f"{label}'"
+            label = self._free(label)
             self.labels.add(label)
             made[label] = part
         return made
+
+    def _free(self, label: str) -> str:
+        """The label, with a prime if it is taken, or with the first number from 3 on."""
+        if label not in self.labels:
+            return label
+        count = self._repeated[label] = self._repeated.get(label, 1) + 1
+        candidate = f"{label}'" if count == 2 else f"{label} {count}"
+        return candidate if candidate not in self.labels else self._free(label)
 
     def _body_parts(
         self,
@@ -162,6 +170,8 @@ class Making:
                 shapes[name] = shape
                 if discretisation is not None:
                     made[name] = discretisation
+        if not bodies and self._scene.material is not None:
+            self._make("materials", self._scene.material)  # of no use, but it may be wrong too
         if self._problems.found and not all(
             _soon_made(shape, bodies[name].spacing) for name, shape in shapes.items()
         ):

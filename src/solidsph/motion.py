@@ -28,22 +28,25 @@ _AT_END = {n: {-k: (-1) ** n * w for k, w in _AT_START[n].items()} for n in _AT_
 # Of a step: times are sums of steps, and so much of one is rounding.
 _ROUNDING = 1e-3
 
+# And of a time itself.
+_OF_TIMES = 1e-9
+
 
 @attrs.frozen
 class VectorField:
     """Some components of a vector as functions of position and time; the others are left alone.
 
-    No component is asked at a time before 0, or after the `end` of the run: it may have no value
-    there.
+    Before 0 no component is asked, and beyond the `end` of the duration only in a run that has
+    been extended, and then at no later time than the run has reached: it may have no value there.
     """
 
     components: Mapping[int, Component]
-    end: float = inf  # of the run [s]
+    end: float = inf  # of the duration [s]
     what: str = ""  # the field, as a message about it begins
 
     @classmethod
     def of(cls, table: Mapping[str, Component], what: str, *, end: float = inf) -> VectorField:
-        """From a scene's table such as {x = "0.1*t", y = 0}, in a run up to `end` [s].
+        """From a scene's table such as {x = "0.1*t", y = 0}, in a scene up to `end` [s].
 
         Raises:
             SceneError: an unknown component, or a formula that cannot be read.
@@ -95,7 +98,7 @@ class VectorField:
         component, count = self.components[axis], len(positions)
         if not self.varies(axis):
             times = times[:1]
-        times = np.clip(times, 0.0, self.end)
+        times = self._asked(times)
         if callable(component):
             found = np.stack([_spread(component(positions, float(t)), count) for t in times])
         elif isinstance(component, str):
@@ -126,15 +129,16 @@ class VectorField:
 
         (t, k), or (1, k) if it does not vary. Differences over the time `step` [s] of the run are
         what the integrators see: a kink in the motion, such as the end of a ramp, becomes the
-        impulse that the step delivers, and the work of the reaction stays right. At the start and
-        at the end of the run they are one-sided.
+        impulse that the step delivers, and the work of the reaction stays right. At the start they
+        look ahead. From the end of the duration on they look back, whether or not the run is
+        extended: what it has recorded up to there stays as it is.
         """
         if order == 0:
             return self.schedule(axis, positions, times)
         if not self.varies(axis):
             return np.zeros((1, len(positions)))
-        step = min(step, self.end / 3.0)  # a run of fewer steps has no room for their differences
-        times = np.clip(times, 0.0, self.end)
+        step = min(step, self.end / 4.0)  # a run of fewer steps has no room for their differences
+        times = self._asked(times)
         at_start = times < step * (1.0 - _ROUNDING)
         at_end = times > self.end - step * (1.0 - _ROUNDING)
         # What is a step from the end but for rounding is not to look beyond it.
@@ -152,6 +156,12 @@ class VectorField:
                 ]
                 derivative[chosen] = np.sum(terms, axis=0) / step**order
         return derivative
+
+    def _asked(self, times: Array) -> Array:
+        """Times (t,) as components are asked; what rounding carries beyond the end is the end."""
+        rounded = times <= self.end * (1.0 + _OF_TIMES)
+        found: Array = np.maximum(np.where(rounded, np.minimum(times, self.end), times), 0.0)
+        return found
 
     def derivative(
         self, axis: int, positions: Array, time: float, order: int, step: float

@@ -20,7 +20,7 @@ MOST_OF_A_KIND = 10
 _MOST_CHARACTERS = 1500
 
 # What differs between problems of one kind: names and numbers.
-_PARTICULAR = re.compile(r"'[^']*'|[-+]?\d[\d.]*(?:e[-+]?\d+)?")
+_PARTICULAR = re.compile(r"'[^']*'|\"[^\"]*\"|[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
 
 def summarised(problems: Iterable[str]) -> list[str]:

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import Distribution, EntryPoint, entry_points
+from pathlib import Path
 from typing import Any
 
 import attrs
@@ -59,7 +61,7 @@ def singular(kind: str) -> str:
 
 def available(kind: str) -> tuple[Entry, ...]:
     """Every part of a kind that is installed, by name; imports none of them."""
-    return tuple(sorted(_entry(kind, point) for point in _points(kind)))
+    return _entries(*_key(kind))
 
 
 def names(kind: str) -> tuple[str, ...]:
@@ -140,16 +142,40 @@ def entry_of(kind: str, part: object) -> Entry:
 
 def hook_points() -> tuple[EntryPoint, ...]:
     """Entry points of pluggy plugins."""
-    return tuple(_points(HOOKS))
+    return _points(HOOKS)
 
 
-def _points(kind: str) -> list[EntryPoint]:
-    points = entry_points(group=PREFIX + kind)
-    allowed = os.environ.get(RESTRICT)
+def _points(kind: str) -> tuple[EntryPoint, ...]:
+    return _scanned(*_key(kind))
+
+
+def _key(kind: str) -> tuple[Any, ...]:
+    """All that what is installed depends on: a scan of it takes milliseconds, a scene many."""
+    places = tuple((place, _modified(place)) for place in sys.path)
+    return entry_points, kind, os.environ.get(RESTRICT), places
+
+
+def _modified(place: str) -> int:
+    try:
+        return Path(place).stat().st_mtime_ns
+    except OSError:
+        return 0
+
+
+@lru_cache(maxsize=64)
+def _scanned(
+    scan: Callable[..., Any], kind: str, allowed: str | None, places: object
+) -> tuple[EntryPoint, ...]:
+    points = scan(group=PREFIX + kind)
     if allowed is None:
-        return list(points)
+        return tuple(points)
     chosen = {name.strip().lower() for name in allowed.split(",")}
-    return [p for p in points if p.dist is not None and p.dist.name.lower() in chosen]
+    return tuple(p for p in points if p.dist is not None and p.dist.name.lower() in chosen)
+
+
+@lru_cache(maxsize=64)
+def _entries(*key: Any) -> tuple[Entry, ...]:
+    return tuple(sorted(_entry(key[1], point) for point in _scanned(*key)))
 
 
 def _entry(kind: str, point: EntryPoint) -> Entry:

@@ -24,7 +24,7 @@ class Setting:
     masses: Array  # (n,) [kg], 0 for ghosts
     bodies: Sequence[Body]
     step_size: float  # time step of the run [s]
-    end: float = inf  # of the run [s]; no formula of time need have a value beyond it
+    end: float = inf  # of the scene's duration [s]; a formula of t may have no value beyond it
     conditions: Conditions = attrs.field(factory=dict)  # of the tags that the scene adds
 
     def select(self, where: Where) -> Indices:

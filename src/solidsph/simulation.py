@@ -89,24 +89,22 @@ class Simulation:
         return self.dynamics.internal.time_loop(self.dynamics, self.integrator, self.step_size)
 
     def extended(self, steps: int) -> Simulation:
-        """The same, built anew for so many steps in all: the step and the outputs stay as they are.
+        """The same, of so many steps in all: the step and the outputs up to now stay as they are.
 
         Raises:
             SceneError: the scene has more steps than that.
         """
         if steps < self.steps:
             raise SceneError(f"{steps} steps in all are fewer than the {self.steps} that there are")
-        return self if steps == self.steps else self._anew(self.step_size, steps)
+        return attrs.evolve(self, steps=steps)
 
     def halved(self) -> Simulation:
         """The same scene, built anew with half the step."""
-        finer = self._anew(0.5 * self.step_size, 2 * self.steps)
-        return attrs.evolve(finer, halvings=self.halvings + 1)
-
-    def _anew(self, step_size: float, steps: int) -> Simulation:
-        builder = self.builder(attrs.evolve(self.scene, time_step=step_size))
-        built = builder.build(until=steps * step_size)
-        return attrs.evolve(built, scene=self.scene, steps=steps, halvings=self.halvings)
+        builder = self.builder(attrs.evolve(self.scene, time_step=0.5 * self.step_size))
+        finer = builder.build()
+        return attrs.evolve(
+            finer, scene=self.scene, steps=2 * self.steps, halvings=self.halvings + 1
+        )
 
     def run(
         self,

@@ -44,17 +44,21 @@ def faces(surface: Surface, owners: Assignment) -> dict[str, Face]:
         surface: samples of a closed surface.
         owners: the particles to which the samples go.
     """
-    names = np.array(surface.faces)[owners.points]
+    numbers = {name: number for number, name in enumerate(dict.fromkeys(surface.faces))}
+    face_of = np.array([numbers[name] for name in surface.faces], dtype=np.intp)[owners.points]
     areas = surface.area_vectors[owners.points] * owners.shares[:, np.newaxis]
-    found = {}
-    for name in dict.fromkeys(surface.faces):
-        own = names == name
-        particles, which = np.unique(owners.particles[own], return_inverse=True)
-        area_vectors = np.zeros((particles.size, surface.points.shape[1]))
-        np.add.at(area_vectors, which, areas[own])
-        sizes = np.zeros(particles.size)
-        np.add.at(sizes, which, np.linalg.norm(areas[own], axis=1))
-        found[name] = Face(particles, area_vectors, sizes)
+    # One key for each particle on each face: an outline may have a hundred thousand faces.
+    count = int(owners.particles.max(initial=0)) + 1
+    keys, which = np.unique(face_of * count + owners.particles, return_inverse=True)
+    area_vectors = np.zeros((keys.size, surface.points.shape[1]))
+    np.add.at(area_vectors, which, areas)
+    lengths = np.zeros(keys.size)
+    np.add.at(lengths, which, np.linalg.norm(areas, axis=1))
+    bounds = np.searchsorted(keys, count * np.arange(len(numbers) + 1)).tolist()
+    found = {
+        name: Face(keys[a:b] % count, area_vectors[a:b], lengths[a:b])
+        for name, a, b in zip(numbers, bounds[:-1], bounds[1:], strict=True)
+    }
 
     vectors = np.concatenate([face.area_vectors for face in found.values()])
     sizes = np.linalg.norm(vectors, axis=1)
@@ -92,7 +96,7 @@ def tags(faces: Mapping[str, Face], ghosts: Mask, nearest_faces: Sequence[str]) 
         nearest_faces: (number of ghosts,) the face nearest to each of them.
     """
     found = {face: _mask(len(ghosts), own.particles) for face, own in faces.items()}
-    surface = np.logical_or.reduce(list(found.values()))
+    surface = _mask(len(ghosts), np.concatenate([own.particles for own in faces.values()]))
     if ghosts.any():
         names, numbers = np.array(nearest_faces), np.flatnonzero(ghosts)
         found |= {f"{face}-ghosts": _mask(len(ghosts), numbers[names == face]) for face in faces}

@@ -46,14 +46,18 @@ def remaining(
     """
     # Far above rounding, far below what the samples resolve.
     step = 1e-6 * spacing
-    kept: list[Mask] = []
-    for i, surface in enumerate(surfaces):
-        ahead = step * unit(surface.area_vectors)
-        keep = whole.signed_distance(surface.points + ahead) > 0.0
-        keep &= whole.signed_distance(surface.points - ahead) < 0.0
-        for earlier in parts[:i]:
-            keep &= np.abs(earlier.signed_distance(surface.points)) > step
-        kept.append(keep)
+    points = np.concatenate([surface.points for surface in surfaces])
+    ahead = step * unit(np.concatenate([surface.area_vectors for surface in surfaces]))
+    all_kept = whole.signed_distance(points + ahead) > 0.0
+    all_kept &= whole.signed_distance(points - ahead) < 0.0
+    kept: list[Mask] = np.split(all_kept, np.cumsum([len(s.points) for s in surfaces])[:-1])
+    lower, upper = (np.array(one) for one in zip(*(p.bounds() for p in parts), strict=True))
+    for i, (surface, keep) in enumerate(zip(surfaces, kept, strict=True)):
+        # Only a part whose box comes so near has a boundary there.
+        low, high = surface.points.min(axis=0) - 2.0 * step, surface.points.max(axis=0) + 2.0 * step
+        near = ((lower[:i] <= high) & (upper[:i] >= low)).all(axis=1)
+        for earlier in np.flatnonzero(near).tolist():
+            keep &= np.abs(parts[earlier].signed_distance(surface.points)) > step
     return Surface(
         points=np.concatenate([s.points[k] for s, k in zip(surfaces, kept, strict=True)]),
         area_vectors=np.concatenate(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from reprlib import repr as short
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from solidsph.arrays import Array
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph_builtin.shapes._checks import as_points, check_coordinates, refusal
+from solidsph_builtin.shapes._outline import Outline, first_crossing
 from solidsph_builtin.shapes._sampling import ON_LINE, joined, midpoints
 
 
@@ -28,13 +30,13 @@ def _check_vertices(shape: Shape, field: attrs.Attribute[Any], value: object) ->
         check_coordinates(2)(shape, field, vertex)
 
 
-@attrs.frozen
+@attrs.frozen(slots=False)
 class Polygon(Shape):
     """The points enclosed by straight edges from each of the `vertices` to the next.
 
-    Vertices may run either way round, and the first may be repeated at the end, as drawings and
-    geographic formats close their rings: the last edge is there in any case. Faces: edge-0 from the first vertex to the second, edge-1,
-    and so on.
+    Vertices may run either way round, and the first may be repeated at the end, as drawings close
+    their rings: the last edge is there in any case. Faces: edge-0 from the first vertex to the
+    second, edge-1, and so on.
 
     Raises:
         SceneError: a vertex is not two finite numbers, there are fewer than 3, or the edges
@@ -54,7 +56,7 @@ class Polygon(Shape):
         if self.volume() <= 1e-12 * np.ptp(starts, axis=0).max() ** 2:
             got = f"{self.volume()!r} m^2; use vertices off one line and edges that do not cross"
             raise refusal(self, "vertices", "around an area greater than zero", got)
-        pair = _first_crossing(starts, ends)
+        pair = first_crossing(starts, ends)
         if pair is not None:
             got = f"one where edge-{pair[0]} meets edge-{pair[1]}; make one shape of each region"
             raise refusal(self, "vertices", "a closed line that never meets itself", got)
@@ -79,22 +81,7 @@ class Polygon(Shape):
 
     def signed_distance(self, points: Array) -> Array:
         """As in the interface; exact everywhere."""
-        nearest = np.full(len(points), np.inf)
-        inside = np.zeros(len(points), dtype=np.bool_)
-        for start, end in zip(*self._edges(), strict=True):
-            edge = end - start
-            offset = points - start
-            along = np.clip((offset @ edge) / (edge @ edge), 0.0, 1.0)
-            gap = offset - along[:, np.newaxis] * edge
-            nearest = np.minimum(nearest, np.einsum("ni,ni->n", gap, gap))
-            # A ray to the right meets an edge that spans the point's height and lies to its
-            # right; a point is inside when the number of edges met is odd.
-            spans = (points[:, 1] < start[1]) != (points[:, 1] < end[1])
-            left = edge[0] * offset[:, 1] - edge[1] * offset[:, 0] > 0.0
-            inside ^= spans & (left == (edge[1] > 0.0))
-        distance = np.sqrt(nearest)
-        signed: Array = np.where(inside, -distance, distance)
-        return signed
+        return self._outline.signed_distance(points)
 
     def surface(self, spacing: float) -> Surface:
         """As in the interface; every edge has its exact length and normal."""
@@ -113,6 +100,10 @@ class Polygon(Shape):
         """Area [m^2]."""
         return abs(self._signed_area())
 
+    @cached_property
+    def _outline(self) -> Outline:
+        return Outline.of(self._edges()[0], counterclockwise=self._signed_area() > 0.0)
+
     def _edges(self) -> tuple[Array, Array]:
         """Where each edge starts (m, 2) and where it ends (m, 2) [m]."""
         starts = np.array(self.vertices)
@@ -123,32 +114,3 @@ class Polygon(Shape):
         # Seen from the first vertex, so that a body far from the origin loses no digits.
         x, y = (np.array(self.vertices) - self.vertices[0]).T
         return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-
-
-def _first_crossing(starts: Array, ends: Array) -> tuple[int, int] | None:
-    """The first two edges that share a point other than the vertex between neighbours."""
-    edges = ends - starts
-    low, high = np.minimum(starts, ends), np.maximum(starts, ends)
-    count = len(starts)
-    for i in range(count):
-        j = np.arange(i + 1, count)
-        # Two segments meet where their boxes overlap and each has its ends on both sides of
-        # the other, or on it.
-        meets = ((low[j] <= high[i]) & (high[j] >= low[i])).all(axis=1)
-        for edge, origin, one, other in (
-            (edges[i], starts[i], starts[j], ends[j]),
-            (edges[j], starts[j], starts[i], ends[i]),
-        ):
-            meets &= _cross(edge, one - origin) * _cross(edge, other - origin) <= 0.0
-        # Neighbours always meet at their vertex; they only must not fold back onto each other.
-        neighbours = (j == i + 1) | ((i == 0) & (j == count - 1))
-        folded = (_cross(edges[i], edges[j]) == 0.0) & (edges[j] @ edges[i] < 0.0)
-        meets = np.where(neighbours, folded, meets)
-        if meets.any():
-            return i, int(j[np.argmax(meets)])
-    return None
-
-
-def _cross(a: Array, b: Array) -> Array:
-    product: Array = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    return product

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import attrs
 import numpy as np
+from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array
+from solidsph.arrays import Array, Indices
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph_builtin.shapes._composite import as_parts, check_parts, remaining
+
+# Up to so many parts, all are asked of every point.
+_FEW_PARTS = 16
+
+# Points that are compared with the boxes of all parts at once.
+_TOGETHER = 128
 
 
 @attrs.frozen
@@ -36,10 +45,27 @@ class Union(Shape):
 
     def signed_distance(self, points: Array) -> Array:
         """As in the interface; inside, no more than the distance, and 0 on a seam of two parts."""
-        distance = self.of[0].signed_distance(points)
-        for part in self.of[1:]:
-            distance = np.minimum(distance, part.signed_distance(points))
+        distance = np.full(len(points), np.inf)
+        for rows, parts in self._near(points):
+            for part in parts:
+                distance[rows] = np.minimum(
+                    distance[rows], self.of[part].signed_distance(points[rows])
+                )
         return distance
+
+    def _near(self, points: Array) -> Iterator[tuple[Indices | slice, Sequence[int]]]:
+        """Groups of the points, and the parts that may be nearest to one of them."""
+        if len(self.of) <= _FEW_PARTS or not len(points):
+            yield slice(None), range(len(self.of))
+            return
+        lower, upper = (np.array(one) for one in zip(*(p.bounds() for p in self.of), strict=True))
+        order = cKDTree(points, leafsize=_TOGETHER).indices  # near each other in the order
+        for rows in np.array_split(order, 1 + len(order) // _TOGETHER):
+            low, high = points[rows].min(axis=0), points[rows].max(axis=0)
+            # Between the box of the points and that of a part: the least distance, and the most.
+            least = np.linalg.norm(np.maximum(0.0, np.maximum(lower - high, low - upper)), axis=1)
+            most = np.linalg.norm(np.maximum(upper - low, high - lower), axis=1)
+            yield rows, np.flatnonzero(least <= most.min()).tolist()
 
     def surface(self, spacing: float) -> Surface:
         """As in the interface, closed but for a sample wherever two boundaries cross."""

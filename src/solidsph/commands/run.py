@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,6 +64,12 @@ if TYPE_CHECKING:
     metavar="NAME=x@[X,Y]",
     help="With --receipts: a displacement to look at, or a column of the history.",
 )
+@click.option(
+    "--beyond-memory",
+    "beyond_memory",
+    is_flag=True,
+    help="Run although more memory is predicted than this machine has free.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def run(
@@ -76,6 +82,7 @@ def run(
     roll_backs: int,
     receipts: bool,
     receipts_of: tuple[str, ...],
+    beyond_memory: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -86,6 +93,7 @@ def run(
         return
     folder = output or Path("results") / name_of(target)
     shown = not (as_json or quiet)
+    ahead = _unchecked if beyond_memory else _checked
     if receipts_of and not receipts:
         raise SceneError("--receipts-of says what --receipts is to look at; add --receipts")
     if receipts_of:
@@ -102,12 +110,15 @@ def run(
             )
         for name in wanted.scenes():
             _make_way(folder / f"{name}.h5", overwrite=overwrite)
-        _run_case(target, wanted, folder, wanted_receipts, shown=shown, as_json=as_json)
+        _run_case(
+            target, wanted, folder, wanted_receipts, ahead=ahead, shown=shown, as_json=as_json
+        )
         return
     if roll_backs and not watch:
         raise SceneError("--roll-back needs --watch, which finds the last sound output")
     if watch and wanted.statics is not None:
         raise SceneError("--watch is for motions; an equilibrium is tested by itself")
+    ahead(wanted)
     watched = roll_backs if watch else None
     path = folder if folder.suffix in RECORD_SUFFIXES else folder / "record.h5"
     _make_way(path, overwrite=overwrite)
@@ -123,6 +134,16 @@ def _make_way(path: Path, *, overwrite: bool) -> None:
     left = check_replaceable(path, overwrite=overwrite)
     if left is not None and left.count:
         err.print(escape(f"{path} holds {left.told()}; it is replaced"), soft_wrap=True)
+
+
+def _checked(scene: Scene) -> None:
+    from solidsph.costs.fits import check_fits
+
+    check_fits(scene)
+
+
+def _unchecked(scene: Scene) -> None:
+    pass
 
 
 def _write(wanted: Scene | Case, path: Path) -> None:
@@ -221,6 +242,7 @@ def _run_case(
     folder: Path,
     receipts_of: Sequence[str] | None,
     *,
+    ahead: Callable[[Scene], None],
     shown: bool,
     as_json: bool,
 ) -> None:
@@ -244,7 +266,7 @@ def _run_case(
                 warn({name: [one for one in advice[name] if one.name not in before]})
             return [ProgressObserver(display, name, simulation)] if display else []
 
-        result = run_case(case, folder, begin=begin)
+        result = run_case(case, folder, ahead=ahead, begin=begin)
     predictions = told.scores(case_predictions, result.runs)
     found = None if receipts_of is None else of_case(case, receipts_of)
     if as_json:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import resource
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 
@@ -31,6 +32,21 @@ def memory_now() -> int:
 def machine_memory() -> int:
     """Memory of this machine [bytes]."""
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
+def available_memory() -> int:
+    """Memory that new work can take without swapping [bytes]; all there is where nobody tells."""
+    found = [machine_memory()]
+    status = Path("/proc/meminfo")
+    if status.exists():
+        for line in status.read_text().splitlines():
+            if line.startswith("MemAvailable"):
+                found.append(1024 * int(line.split()[1]))
+    # A container may have less than its machine.
+    limit, used = (Path("/sys/fs/cgroup") / name for name in ("memory.max", "memory.current"))
+    with suppress(OSError, ValueError):  # there is none, or it is "max"
+        found.append(max(0, int(limit.read_text()) - int(used.read_text())))
+    return min(found)
 
 
 def company() -> float:

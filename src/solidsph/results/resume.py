@@ -8,7 +8,6 @@ from pathlib import Path
 
 import attrs
 
-from solidsph.assembly import NEAR
 from solidsph.builder import Builder
 from solidsph.carry_out import carry_out
 from solidsph.errors import RecordError
@@ -23,6 +22,9 @@ from solidsph.resumption import Resumption
 from solidsph.scene import MOST_STEPS, Scene
 from solidsph.session import FINISHED
 from solidsph.simulation import Result, Simulation
+
+# Of a step: an end that is missed by less is met.
+_NEAR = 1e-6
 
 
 @attrs.frozen(eq=False)
@@ -169,7 +171,7 @@ def _extended(simulation: Simulation, until: float) -> Simulation:
     end = simulation.steps * simulation.step_size
     if simulation.scene.statics is not None:
         raise RecordError("an equilibrium has no later end; leave `until` (--until) out")
-    if not end * (1.0 - NEAR) <= until < float("inf"):
+    if not end * (1.0 - _NEAR) <= until < float("inf"):
         raise RecordError(
             f"until = {until:.9g} s is before the end of the run, {end:.9g} s; give a later one"
         )
@@ -178,4 +180,4 @@ def _extended(simulation: Simulation, until: float) -> Simulation:
             f"until = {until:.9g} s is {until / simulation.step_size:.3g} steps away, at most "
             f"{MOST_STEPS:.0e} are allowed; give an earlier one"
         )
-    return simulation.extended(max(simulation.steps, ceil(until / simulation.step_size - NEAR)))
+    return simulation.extended(max(simulation.steps, ceil(until / simulation.step_size - _NEAR)))

@@ -19,6 +19,7 @@ from solidsph.errors import ConvergenceError, DivergedError
 from solidsph.interfaces.case import Case, Curves, Measurement
 from solidsph.results.record import Record
 from solidsph.results.sole_writer import sole_writer
+from solidsph.scene import Scene
 from solidsph.simulation import Simulation
 
 FINISHED = "finished"
@@ -60,11 +61,21 @@ Begin = Callable[[str, Simulation], Sequence[object]]
 """Called before each scene with its name; returns observers of its run."""
 
 
+Ahead = Callable[[Scene], None]
+"""Called before each scene is built."""
+
+
+def _unchecked(scene: Scene) -> None:
+    pass
+
+
 def _unobserved(name: str, simulation: Simulation) -> Sequence[object]:
     return ()
 
 
-def run_case(case: Case, folder: Path, *, begin: Begin = _unobserved) -> CaseResult:
+def run_case(
+    case: Case, folder: Path, *, ahead: Ahead = _unchecked, begin: Begin = _unobserved
+) -> CaseResult:
     """Run every scene of `case`, record it in `folder`, measure and draw.
 
     Raises:
@@ -72,11 +83,11 @@ def run_case(case: Case, folder: Path, *, begin: Begin = _unobserved) -> CaseRes
     """
     # Until what was recorded has been measured, nobody else may replace it.
     with sole_writer(folder / "case"):
-        return _run_case(case, folder, begin)
+        return _run_case(case, folder, ahead, begin)
 
 
-def _run_case(case: Case, folder: Path, begin: Begin) -> CaseResult:
-    runs = run_scenes(case, folder, begin=begin)
+def _run_case(case: Case, folder: Path, ahead: Ahead, begin: Begin) -> CaseResult:
+    runs = run_scenes(case, folder, ahead=ahead, begin=begin)
     with opened(runs) as records:
         measurements = case.measure(records)
         pictures = case.draw(records, folder)
@@ -87,7 +98,9 @@ def _run_case(case: Case, folder: Path, begin: Begin) -> CaseResult:
     return CaseResult(measurements, runs, pictures, tables, peak_memory())
 
 
-def run_scenes(case: Case, folder: Path, *, begin: Begin = _unobserved) -> Sequence[SceneRun]:
+def run_scenes(
+    case: Case, folder: Path, *, ahead: Ahead = _unchecked, begin: Begin = _unobserved
+) -> Sequence[SceneRun]:
     """Run every scene of `case` and record it in `folder`.
 
     A scene that diverges, or finds no equilibrium, does not end the case: what it recorded is
@@ -97,6 +110,7 @@ def run_scenes(case: Case, folder: Path, *, begin: Begin = _unobserved) -> Seque
     for name, scene in case.scenes().items():
         path = folder / f"{name}.h5"
         outcome, begun = FINISHED, clock.perf_counter()
+        ahead(scene)
         simulation = Builder(scene).build()
         effort: Mapping[str, Any] = {}
         observers = begin(name, simulation)

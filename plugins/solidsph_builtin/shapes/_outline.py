@@ -1,0 +1,148 @@
+"""Outlines of many straight edges: which edge is nearest to a point, and whether any two cross."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import attrs
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solidsph.arrays import Array, Indices
+
+# Pairs of a point and an edge, or of two edges, that are looked at together.
+_AT_ONCE = 1 << 20
+
+
+@attrs.frozen(eq=False)
+class Outline:
+    """A closed line of straight edges, found by a tree of short pieces of them."""
+
+    starts: Array  # (m, d=2) where each edge starts [m]
+    edges: Array  # (m, 2) from there to where the next one starts [m]
+    normals: Array  # (m, 2) outward [-]
+    tree: cKDTree  # of the middles of the pieces
+    owners: Indices  # (p,) the edge of each piece
+    reach: float  # half the length of the longest piece [m]
+
+    @classmethod
+    def of(cls, starts: Array, *, counterclockwise: bool) -> Outline:
+        """From its corners (m, 2), each joined to the next and the last to the first."""
+        edges = np.roll(starts, -1, axis=0) - starts
+        lengths = np.hypot(*edges.T)
+        # Pieces no longer than an edge is on average: there are at most twice as many.
+        counts = np.ceil(lengths / lengths.mean()).astype(np.intp)
+        owners = np.repeat(np.arange(len(starts)), counts)
+        within = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
+        along = (within + 0.5) / counts[owners]
+        right = np.stack([edges[:, 1], -edges[:, 0]], axis=1) / lengths[:, np.newaxis]
+        return cls(
+            starts=starts,
+            edges=edges,
+            normals=right if counterclockwise else -right,
+            tree=cKDTree(starts[owners] + along[:, np.newaxis] * edges[owners]),
+            owners=owners,
+            reach=0.5 * float((lengths / counts).max()),
+        )
+
+    def signed_distance(self, points: Array) -> Array:
+        """Of `points` (n, 2) from the line, (n,) [m]; negative inside."""
+        distance = np.empty(len(points))
+        for rows, near in self._nearest(points):
+            distance[rows] = self._signed(points[rows], near)
+        return distance
+
+    def _nearest(self, points: Array) -> Iterator[tuple[Indices, Indices]]:
+        """Some of the points, and the edge nearest to each of them."""
+        left, count = np.arange(len(points)), 4
+        while left.size:
+            count = min(count, len(self.owners))
+            again = []
+            for rows in np.array_split(left, 1 + left.size * count // _AT_ONCE):
+                found = self.tree.query(points[rows], k=np.arange(1, count + 1))
+                gaps, pieces = (np.asarray(one) for one in found)
+                edges = self.owners[pieces]
+                squares = _squared(self._offsets(points[rows, np.newaxis], edges)[0])
+                best = np.argmin(squares, axis=1)
+                nearest = np.take_along_axis(squares, best[:, np.newaxis], axis=1)[:, 0]
+                # No piece beyond those asked for can be nearer.
+                near = gaps[:, -1] - self.reach > np.sqrt(nearest)
+                near |= count == len(self.owners)
+                yield rows[near], edges[near, best[near]]
+                again.append(rows[~near])
+            left, count = np.concatenate(again), 8 * count
+
+    def _offsets(self, points: Array, edges: Indices) -> tuple[Array, Array]:
+        """From the nearest place on each edge to the point (..., 2), and how far along it is."""
+        edge, offset = self.edges[edges], points - self.starts[edges]
+        along = np.clip(np.sum(offset * edge, axis=-1) / _squared(edge), 0.0, 1.0)
+        return offset - along[..., np.newaxis] * edge, along
+
+    def _signed(self, points: Array, edges: Indices) -> Array:
+        gaps, along = self._offsets(points, edges)
+        # At a corner neither edge alone tells the side, the sum of their normals does (Baerentzen &
+        # Aanaes 2005, in the plane).
+        count = len(self.starts)
+        normals = self.normals[edges]
+        for end, step in ((0.0, -1), (1.0, 1)):
+            at = along == end
+            normals[at] += self.normals[(edges[at] + step) % count]
+        outside = np.sum(gaps * normals, axis=1) >= 0.0
+        distance = np.sqrt(_squared(gaps))
+        return np.where(outside, distance, -distance)
+
+
+def first_crossing(starts: Array, ends: Array) -> tuple[int, int] | None:
+    """The first two edges that share a point other than the vertex between neighbours."""
+    edges, count = ends - starts, len(starts)
+    low, high = np.minimum(starts, ends), np.maximum(starts, ends)
+    first: tuple[int, int] | None = None
+    for one, two in _overlapping(low, high):
+        i, j = np.minimum(one, two), np.maximum(one, two)
+        # Two segments meet where their boxes overlap and each has its ends on both sides of the
+        # other, or on it.
+        near = ((low[j] <= high[i]) & (high[j] >= low[i])).all(axis=1)
+        i, j = i[near], j[near]
+        meets = np.ones(len(i), dtype=np.bool_)
+        for a, b in ((i, j), (j, i)):
+            before = _cross(edges[a], starts[b] - starts[a])
+            after = _cross(edges[a], ends[b] - starts[a])
+            meets &= before * after <= 0.0
+        # Neighbours always meet at their vertex; they only must not fold back onto each other.
+        neighbours = (j == i + 1) | ((i == 0) & (j == count - 1))
+        folded = _cross(edges[i], edges[j]) == 0.0
+        folded &= np.sum(edges[i] * edges[j], axis=1) < 0.0
+        meets = np.where(neighbours, folded, meets)
+        pairs = list(zip(i[meets].tolist(), j[meets].tolist(), strict=True))
+        first = min([*pairs, *([first] if first is not None else [])], default=None)
+    return first
+
+
+def _overlapping(low: Array, high: Array) -> Iterator[tuple[Indices, Indices]]:
+    """Pairs of boxes that overlap along the axis on which fewer do, some at a time."""
+    ways = []
+    for axis in range(low.shape[1]):
+        order = np.argsort(low[:, axis], kind="stable")
+        last = np.searchsorted(low[order, axis], high[order, axis], side="right")
+        ways.append((order, last - np.arange(1, len(order) + 1)))
+    order, counts = min(ways, key=lambda way: int(way[1].sum()))
+    bounds = np.cumsum(counts)
+    begin = 0
+    while begin < len(order):
+        done = bounds[begin - 1] if begin else 0
+        end = max(begin + 1, int(np.searchsorted(bounds, done + _AT_ONCE, side="right")))
+        some = np.arange(begin, end)
+        first = np.repeat(some, counts[some])
+        within = np.arange(len(first)) - np.repeat(bounds[some] - counts[some] - done, counts[some])
+        yield order[first], order[first + 1 + within]
+        begin = end
+
+
+def _squared(vectors: Array) -> Array:
+    result: Array = np.sum(vectors * vectors, axis=-1)
+    return result
+
+
+def _cross(a: Array, b: Array) -> Array:
+    product: Array = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return product
