@@ -1,0 +1,134 @@
+"""A file that a scene or a user names is a regular one of bounded size, read once and whole."""
+
+from __future__ import annotations
+
+import os
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solidsph import Scene, SceneError, Simulation
+from solidsph.builder import Builder
+from solidsph.files import content
+from tests.fuzzing import within
+from tests.scenes import SCENE_TOML
+
+SECONDS = 60.0  # what waits for a pipe waits for ever
+
+
+def with_points(file: Path | str) -> Builder:
+    return (
+        Simulation.builder()
+        .body(
+            "bar",
+            shape={"type": "interval", "length": 1.0},
+            spacing=0.25,
+            discretisation={"type": "points", "file": str(file)},
+        )
+        .material("neo-hookean", youngs_modulus=1e6, poissons_ratio=0.3, density=1e3)
+        .duration(0.01)
+    )
+
+
+def refusal(act) -> str:
+    with within(SECONDS), pytest.raises(Exception, match="regular|bytes|changed") as caught:
+        act()
+    return str(caught.value)
+
+
+READERS = {
+    "scene": lambda path: Scene.read(path),
+    "points": lambda path: with_points(path).build(),
+}
+
+
+@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize(
+    ("kind", "told"), [("pipe", "a pipe"), ("device", "a device"), ("folder", "a folder")]
+)
+def test_what_is_no_regular_file_is_not_read(
+    tmp_path: Path, reader: str, kind: str, told: str
+) -> None:
+    path = {"pipe": tmp_path / "pipe", "device": Path("/dev/zero"), "folder": tmp_path}[kind]
+    if kind == "pipe":
+        os.mkfifo(path)
+    (tmp_path / "link").symlink_to(path)
+    for one in (path, tmp_path / "link"):
+        message = refusal(lambda one=one: READERS[reader](one))
+        assert f"it is {told}, not a regular file" in message
+        assert str(one) in message
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_a_file_of_no_bounds_is_not_read(tmp_path: Path, reader: str) -> None:
+    """A terabyte of zeros that takes no place on the disk."""
+    path = tmp_path / "large"
+    path.touch()
+    os.truncate(path, 2**40)
+    assert "1,099,511,627,776 bytes, at most" in refusal(lambda: READERS[reader](path))
+
+
+def test_links_to_regular_files_are_followed(tmp_path: Path) -> None:
+    (tmp_path / "real.toml").write_text(SCENE_TOML)
+    (tmp_path / "scene.toml").symlink_to(tmp_path / "real.toml")
+    assert Scene.read(tmp_path / "scene.toml") == Scene.from_toml(SCENE_TOML)
+    np.savetxt(tmp_path / "real.csv", [0.125, 0.375, 0.625, 0.875])
+    (tmp_path / "points.csv").symlink_to(tmp_path / "real.csv")
+    assert with_points(tmp_path / "points.csv").build().particles.count == 4
+
+
+def test_a_file_that_grows_is_told_of(tmp_path: Path) -> None:
+    """Somebody writes on while it is read: what was there would be a part of the points."""
+    path = tmp_path / "points.csv"
+    path.write_bytes(b"0.5\n" * 2**20)
+    stop = threading.Event()
+
+    def write_on() -> None:
+        with path.open("ab", buffering=0) as file:
+            while not stop.is_set():
+                file.write(b"0.5\n" * 1000)
+
+    writer = threading.Thread(target=write_on)
+    writer.start()
+    try:
+        # Whether a write falls within one read is chance; within some of a hundred it is none.
+        told = set()
+        for _ in range(100):
+            try:
+                content(path, 2**34)
+            except OSError as cause:
+                told.add(str(cause))
+                break
+    finally:
+        stop.set()
+        writer.join()
+    assert told <= {"it changed while it was read; wait until it is complete"}
+
+
+def test_a_file_that_shrinks_is_told_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "points.csv"
+    path.write_bytes(b"0.5\n" * 100)
+    real, sizes = os.fstat, iter((400, 396))
+
+    class Stat:
+        def __init__(self, found: os.stat_result) -> None:
+            self.st_mode, self.st_size = found.st_mode, next(sizes)
+
+    monkeypatch.setattr("solidsph.files.os.fstat", lambda handle: Stat(real(handle)))
+    with pytest.raises(OSError, match="changed while it was read"):
+        content(path, 10**6)
+
+
+@pytest.mark.parametrize("shape", [(10**9, 10**9), (2**62,), (10**6, 3)])
+def test_an_array_that_claims_more_than_its_file_has(tmp_path: Path, shape: tuple) -> None:
+    path = tmp_path / "points.npy"
+    with path.open("wb") as file:
+        np.lib.format.write_array_header_1_0(
+            file, {"descr": "<f8", "fortran_order": False, "shape": shape}
+        )
+        file.write(bytes(80))
+    with within(SECONDS), pytest.raises(Exception, match="cannot read positions") as caught:
+        with_points(path).build()
+    assert "BuildError" in type(caught.value).__name__ or isinstance(caught.value, SceneError)
