@@ -165,6 +165,37 @@ def test_hook_plugins_listen_and_broken_ones_are_left_out_loudly(
         listeners()
 
 
+def test_of_two_hooks_of_one_name_the_first_is_heard(
+    foreign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And the warning names both, whatever is wrong with the second."""
+    from solidsph.hooks import STRICT, listeners
+
+    script = """
+    from solidsph.hooks import implementation
+    heard = []
+    @implementation
+    def solidsph_configure(builder):
+        heard.append(builder)
+    """
+    foreign("foreign-alpha", "foreign_alpha", script, "[solidsph.hooks]\near = foreign_alpha")
+    foreign("foreign-beta", "foreign_beta", script, "[solidsph.hooks]\near = foreign_beta")
+    with pytest.warns(UserWarning, match="is left out") as warned:
+        manager = listeners()
+    manager.hook.solidsph_configure(builder="this one")
+    loaded = [
+        sys.modules[f"foreign_{name}"]
+        for name in ("alpha", "beta")
+        if f"foreign_{name}" in sys.modules
+    ]
+    assert [one.heard for one in loaded if one.heard] == [["this one"]]
+    texts = [str(one.message) for one in warned]
+    assert any("foreign-alpha 1.2" in one and "foreign-beta 1.2" in one for one in texts)
+    monkeypatch.setenv(STRICT, "1")
+    with pytest.raises(PluginError, match="has that name already"):
+        listeners()
+
+
 def test_hooks_hear_the_life_of_a_run(foreign) -> None:
     script = """
     from solidsph.hooks import implementation

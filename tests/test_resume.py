@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import hashlib
+import io
 import json
 import os
 import re
@@ -12,14 +14,26 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
 
-from solidsph import DivergedError, Record, RecordError, Scene, Simulation, registry, resume
+from solidsph import (
+    DivergedError,
+    Record,
+    RecordError,
+    Scene,
+    Simulation,
+    SolidsphError,
+    State,
+    registry,
+    resume,
+)
 from solidsph.builder import Builder
 from solidsph.hooks import implementation
+from solidsph.parts import construct
 from solidsph.results import checkpointer
-from solidsph.results.checkpoint import checkpoint_path, read_checkpoint
+from solidsph.results.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
 from solidsph.results.resume import pending
 from tests.resuming import NEVER, OFTEN, Stop, assert_same_record, content
 from tests.scenes import REFERENCE_ONLY, SCENE_TOML, box, with_effect
@@ -437,6 +451,246 @@ def test_checkpoints_take_a_hundredth_of_the_time(
     assert clock.outputs == 41
     # Writing is thought to take 0.02 s, so the first comes after 2 s; the others after 12.5 s.
     assert clock.written_at == [3, 16, 29]
+
+
+# What the record does not hold
+
+
+def points_scene(folder: Path, offset: float = 0.0) -> str:
+    """Points in a file that the scene names from its folder; cells of a lattice, a little aside."""
+    x = (np.arange(12) + 0.5) / 12
+    points = np.array([(a, b) for a in x for b in x[:6]])
+    points[7, 0] += offset
+    folder.mkdir(exist_ok=True)
+    np.savetxt(folder / "points.csv", points, delimiter=",", fmt="%.17g")
+    return """
+duration = 0.01
+outputs = 4
+[body.plate]
+shape = {type = "box", lengths = [1.0, 0.5]}
+spacing = 0.0833
+discretisation = {type = "points", file = "points.csv"}
+[material]
+type = "neo-hookean"
+youngs_modulus = 1e6
+poissons_ratio = 0.3
+density = 1000.0
+[[initial]]
+velocity = {x = "3*sin(2*X)"}
+"""
+
+
+def stopped_at_points(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    text = points_scene(folder)
+    monkeypatch.chdir(folder)
+    path = folder / "out" / "run.h5"
+    with pytest.raises(KeyboardInterrupt):
+        Simulation.builder(Scene.from_toml(text)).build().run(record=path, observers=[Stop(3)])
+    return path
+
+
+@pytest.mark.parametrize("force", [False, True])
+@pytest.mark.parametrize(
+    ("change", "difference"),
+    [
+        ("moved", r"positions differ for 1 of 72, first for 7: \[.*\] in the record, \[.*\] now"),
+        ("fewer", "72 particles were recorded, now there are 71"),
+        ("in another order", "positions differ for 72 of 72"),
+        ("gone", "points.csv"),
+    ],
+)
+def test_other_points_in_the_file_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: str, difference: str, force: bool
+) -> None:
+    """The positions of the record belong to the points that it was begun with: forced or not."""
+    path = stopped_at_points(tmp_path / "work", monkeypatch)
+    file = tmp_path / "work" / "points.csv"
+    lines = file.read_text().splitlines()
+    if change == "moved":
+        points_scene(tmp_path / "work", offset=1e-3)
+    elif change == "gone":
+        file.unlink()
+    else:
+        file.write_text("\n".join(lines[:-1] if change == "fewer" else lines[::-1]))
+    before = path.read_bytes()
+    with pytest.raises(SolidsphError, match=difference) as caught:
+        resume(path, force=force)
+    assert "points.csv" in str(caught.value)
+    assert path.read_bytes() == before
+
+
+def test_a_relative_path_is_the_one_of_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From another folder, even one with another file of that name."""
+    path = stopped_at_points(tmp_path / "work", monkeypatch)
+    text = points_scene(tmp_path / "other", offset=1e-3)
+    monkeypatch.chdir(tmp_path / "other")
+    resume(path)
+    monkeypatch.chdir(tmp_path / "work")
+    Simulation.builder(Scene.from_toml(text)).build().run(record=tmp_path / "whole.h5")
+    assert_same_record(tmp_path / "whole.h5", path)
+
+
+def test_other_particles_of_an_object_are_refused(tmp_path: Path) -> None:
+    """An object has no form that could be compared with the record's; its particles have."""
+    shape = {"type": "interval", "length": 1.0}
+
+    def scene(positions: list[float]) -> Simulation:
+        points = {"type": "points", "positions": [[x] for x in positions]}
+        builder = Simulation.builder().body(
+            "bar", shape=shape, spacing=0.25, discretisation=construct("discretisations", points)
+        )
+        builder.material("neo-hookean", youngs_modulus=1e6, poissons_ratio=0.3, density=1e3)
+        builder.kernel("modified-mollifier", cover=3.0).initial(velocity={"x": "X"})
+        builder.effect("body-force", acceleration={"x": lambda X, t: X[:, 0]})
+        return builder.duration(0.01).outputs(4).build()
+
+    path = tmp_path / "run.h5"
+    with pytest.raises(KeyboardInterrupt):
+        scene([0.125, 0.375, 0.625, 0.875]).run(record=path, observers=[Stop(3)])
+    assert_refused(
+        path, "scene no longer gives the part|of another scene",
+        simulation=scene([0.125, 0.375, 0.625, 0.880]),
+    )  # fmt: skip
+
+
+def test_a_material_that_answers_otherwise_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its code has changed, and its version has not: what was recorded tells."""
+    path = tmp_path / "run.h5"
+    stopped(path)
+    kind = registry.load("materials", "neo-hookean")
+    law = kind.first_piola
+    monkeypatch.setattr(
+        kind, "first_piola", staticmethod(lambda F, p: law(F, (1.001 * p[0], p[1])))
+    )
+    assert_refused(path, "gives other stresses than were recorded")
+    resume(path, force=True)
+
+
+def test_code_that_changed_under_one_version_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, copy = tmp_path / "run.h5", tmp_path / "copy.py"
+    stopped(path)
+    module = sys.modules[registry.load("integrators", "velocity-verlet").__module__]
+    copy.write_text(Path(module.__file__).read_text() + "# changed\n")
+    monkeypatch.setattr(module, "__file__", str(copy))
+    assert_refused(path, r"code of solidsph_builtin.* was \w+, is \w+")
+    resume(path, force=True)
+
+
+# From the end
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_a_finished_run_is_extended_from_its_end(tmp_path: Path, kept: bool) -> None:
+    """A run of any length leaves a checkpoint of its end; without one all is repeated."""
+    path, heard = tmp_path / "run.h5", Heard()
+    moving(box(1)).build().run(record=path)
+    if not kept:
+        checkpoint_path(path).unlink()
+    found = pending(path, until=0.02)
+    assert (found.since.state is not None) == kept
+    assert not kept or found.since.state.time == pytest.approx(0.01, rel=1e-9)
+    found.carry_out([heard])
+    with Record(path) as record:
+        assert record.count == 2 * OUTPUTS + 1
+        assert record.times[-1] >= 0.02 * (1.0 - 1e-6)
+        assert len(heard.times) == (OUTPUTS if kept else record.count)
+        assert heard.times[-1] == record.times[-1]
+
+
+class Heard:
+    """The times of all outputs."""
+
+    def __init__(self) -> None:
+        self.times: list[float] = []
+
+    @implementation
+    def solidsph_step_end(self, simulation, observation) -> None:
+        self.times.append(observation.state.time)
+
+
+def test_an_interrupted_run_is_extended_from_where_it_was(tmp_path: Path) -> None:
+    path, heard = tmp_path / "run.h5", Heard()
+    stopped(path)
+    resume(path, until=0.02, observers=[heard])
+    with Record(path) as record:
+        assert record.count == 2 * OUTPUTS + 1
+        assert heard.times == record.times[2:].tolist()
+    resume(path, until=0.03, observers=[heard])
+    assert len(set(heard.times)) == len(heard.times)
+
+
+def test_an_end_that_never_comes_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    stopped(path)
+    for until in (1e30, 1e12):
+        assert_refused(path, "steps away, at most 1e.10 are allowed", until=until)
+
+
+# Checkpoints that are whole, and not what a run has left
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"positions": lambda x: x[:-1]}, "damaged"),
+        ({"positions": lambda x: x.astype(np.float32)}, "damaged"),
+        ({"velocities": lambda v: np.full_like(v, np.nan)}, "damaged"),
+        ({"accelerations": lambda a: a[:, 0]}, "damaged"),
+        ({"applied": lambda a: {"mine": np.zeros((12, 1))}}, "another scene|damaged"),
+        ({"work": lambda w: {"mine": 1.0}}, "another scene"),
+        ({"work": lambda w: dict.fromkeys(w or {"mine": 0}, "much")}, "damaged"),
+        ({"time": lambda t: "soon"}, "damaged"),
+        ({"step": lambda n: -1}, "damaged"),
+        ({"step": lambda n: 10**9}, "damaged"),
+        ({"memory": lambda m: {"mine": np.array(["text"])}}, "damaged"),
+        ({"positions": lambda x: x + 1e-9}, "is not its output at t"),
+        ({"velocities": lambda v: v * (1.0 + 1e-12)}, "is not its output at t"),
+        ({"steps": lambda n: 10**18}, "damaged"),
+        ({"halvings": lambda n: 10**9}, "damaged"),
+        ({"step_size": lambda h: 0.0}, "damaged"),
+        ({"circumstances": lambda c: {"numpy": 3}}, "damaged"),
+    ],
+)
+def test_a_forged_checkpoint_is_refused(
+    tmp_path: Path, changes: Mapping[str, Callable[[object], object]], message: str
+) -> None:
+    """Its digest is right: somebody has written it so."""
+    path = tmp_path / "run.h5"
+    stopped(path)
+    whole = read_checkpoint(checkpoint_path(path))
+    of_state = {field.name for field in attrs.fields(State)}
+    for name, change in changes.items():
+        holder = whole.state if name in of_state else whole
+        changed = attrs.evolve(holder, **{name: change(getattr(holder, name))})
+        whole = attrs.evolve(whole, state=changed) if name in of_state else changed
+    write_checkpoint(checkpoint_path(path), whole)
+    assert_refused(path, message)
+
+
+def test_a_checkpoint_that_claims_to_be_large_is_refused(tmp_path: Path) -> None:
+    """Zeros compress a thousandfold; what a run leaves is not compressed."""
+    path = tmp_path / "run.h5"
+    stopped(path)
+    packed = io.BytesIO()
+    np.savez_compressed(packed, facts=np.zeros(10**7, dtype=np.uint8))
+    body = packed.getvalue()
+    digest = hashlib.blake2b(body, digest_size=32).hexdigest()
+    checkpoint_path(path).write_bytes(f"solidsph checkpoint 1 {digest}\n".encode() + body)
+    assert_refused(path, "damaged.*claims more bytes")
+
+
+def test_a_checkpoint_that_is_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    stopped(path)
+    checkpoint_path(path).unlink()
+    os.mkfifo(checkpoint_path(path))
+    assert_refused(path, "it is a pipe, not a regular file")
 
 
 # Devices that fail

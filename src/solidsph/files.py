@@ -51,10 +51,11 @@ def content(path: Path, most: int) -> bytes:
     """
     # A pipe without a writer would otherwise keep `open` waiting.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    found = os.fstat(handle)
+    if not stat.S_ISREG(found.st_mode):
+        os.close(handle)
+        raise OSError(f"it is {_kind(found.st_mode)}, not a regular file")
     with os.fdopen(handle, "rb") as file:
-        found = os.fstat(handle)
-        if not stat.S_ISREG(found.st_mode):
-            raise OSError(f"it is {_kind(found.st_mode)}, not a regular file")
         if found.st_size > most:
             raise OSError(f"it has {found.st_size:,} bytes, at most {most:,} are read")
         data = file.read(found.st_size)

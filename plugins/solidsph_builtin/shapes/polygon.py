@@ -71,7 +71,9 @@ class Polygon(Shape):
         """Whether it turns the same way at every vertex."""
         starts, ends = self._edges()
         edges = ends - starts
-        turns = _cross(edges, np.roll(edges, -1, axis=0)) * self._signed_area()
+        following = np.roll(edges, -1, axis=0)
+        turns = edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0]
+        turns *= self._signed_area()
         return bool(np.all(turns >= 0.0))
 
     def bounds(self) -> tuple[Array, Array]:

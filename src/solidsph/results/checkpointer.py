@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import time as clock
 from collections.abc import Mapping
+from os.path import samestat
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,6 +40,7 @@ class Checkpointer:
         self._record = record
         self._path = checkpoint_path(record)
         self._is_ours = is_resumed  # not of an older run, which this one takes the place of
+        self._recorded: os.stat_result | None = None  # which file is the record
         self._state: State | None = None
         self._kept: Mapping[str, Array] = {}
         self._found: Mapping[str, str] = {}  # the circumstances, once they have been asked for
@@ -66,7 +69,7 @@ class Checkpointer:
 
     @implementation
     def solidsph_finish(self, simulation: Simulation, outcome: str) -> None:
-        if self._is_written or not self._record.exists():
+        if self._is_written or not self._is_recorded:
             return
         try:
             self._write(simulation)
@@ -77,9 +80,19 @@ class Checkpointer:
 
     def _hear(self, simulation: Simulation, observation: Observation) -> None:
         self._state, self._is_written = observation.state, False
+        if self._recorded is None:  # the recorder has heard it before
+            self._recorded = self._record.stat()
         kept: dict[str, Array] = {}
         simulation.manager.hook.solidsph_keep(simulation=simulation, kept=kept)
         self._kept = kept
+
+    @property
+    def _is_recorded(self) -> bool:
+        """Whether the record is still there, and no other in its place."""
+        try:
+            return self._recorded is not None and samestat(self._recorded, self._record.stat())
+        except OSError:
+            return False
 
     def _is_due(self, state: State) -> bool:
         cost = self._cost if self._cost is not None else _WRITING + _BYTE * _size(state)
