@@ -13,9 +13,9 @@ import pytest
 from solidsph import DivergedError, Record, RecordError, Simulation, resume
 from solidsph.builder import Builder
 from solidsph.results import checkpointer
+from solidsph.results.accounts import Accounts
 from solidsph.results.checkpoint import checkpoint_path, read_checkpoint
 from solidsph.watch import Grade, Symptom, Watchdog, run_watched
-from solidsph.watch.accounts import Accounts
 from solidsph.watch.crowding import CollapsingNeighbours
 from solidsph.watch.hourglass import StoredBesides
 from solidsph.watch.residual import EnergyFromNowhere
@@ -115,16 +115,18 @@ def test_neighbours(left: float, grade: Grade | None) -> None:
 @pytest.mark.parametrize(
     ("before", "residual", "grade"),
     [
-        (0.0, 0.05, None),
-        (0.0, 0.2, Grade.WARNING),
-        (0.0, -0.2, Grade.WARNING),
+        (0.05, 0.05, None),
+        (0.2, 0.2, Grade.WARNING),
+        (-0.2, -0.2, Grade.WARNING),
         (0.3, 0.2, None),  # it shrinks again
-        (0.0, 1.5, Grade.FAILURE),
+        (0.0, 0.2, None),  # it may shrink again, as in the first steps of a ramp
+        (0.0, 1.5, None),
+        (1.2, 1.5, Grade.FAILURE),
         (0.0, np.nan, Grade.FAILURE),
     ],
 )
 def test_energy(before: float, residual: float, grade: Grade | None) -> None:
-    accounts = Accounts(start=1.0, residual=residual, before=before, paid=1.0)
+    accounts = Accounts(1.0, residual, before, paid=1.0, paid_before=1.0)
     finding = found(EnergyFromNowhere(), box(1), accounts=accounts)
     assert (finding and finding.grade) == grade
 

@@ -1,6 +1,5 @@
 """Smoothed Particle Hydrodynamics for nonlinear solid mechanics."""
 
-from solidsph.carry_out import carry_out
 from solidsph.errors import (
     BuildError,
     ConvergenceError,
@@ -9,6 +8,7 @@ from solidsph.errors import (
     RecordError,
     SceneError,
     SolidsphError,
+    UnsoundError,
 )
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.case import Case, Measurement
@@ -26,6 +26,9 @@ from solidsph.results.record import Record
 from solidsph.results.resume import resume
 from solidsph.scene import Scene
 from solidsph.simulation import Result, Simulation
+
+carry_out = Simulation.run
+"""The run as a function: `carry_out(simulation)`."""
 
 __all__ = [
     "BoundaryHandler",
@@ -53,6 +56,7 @@ __all__ = [
     "Simulation",
     "SolidsphError",
     "State",
+    "UnsoundError",
     "carry_out",
     "resume",
 ]

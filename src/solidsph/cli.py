@@ -12,7 +12,7 @@ from importlib.metadata import version
 
 import click
 
-from solidsph.errors import ConvergenceError, DivergedError, SolidsphError
+from solidsph.errors import ConvergenceError, DivergedError, SolidsphError, UnsoundError
 
 VERBS = (
     *("run", "resume", "explain", "cases", "plugins", "check", "plot"),
@@ -68,7 +68,8 @@ def main() -> None:
         sys.exit(INTERRUPTED)
     except SolidsphError as cause:
         print(f"error: {cause}", file=sys.stderr)
-        sys.exit(FAILED if isinstance(cause, (ConvergenceError, DivergedError)) else WRONG_INPUT)
+        failed = isinstance(cause, (ConvergenceError, DivergedError, UnsoundError))
+        sys.exit(FAILED if failed else WRONG_INPUT)
     except OSError as cause:
         print(f"error: {cause}; check the path, its permissions and the disk", file=sys.stderr)
         sys.exit(WRONG_INPUT)

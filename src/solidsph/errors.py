@@ -6,6 +6,10 @@ A message says what was wrong, the value, what was expected and what to do.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from solidsph.simulation import Result
 
 
 class SolidsphError(Exception):
@@ -88,6 +92,42 @@ def _rebuild_diverged(
         cause=cause,
         remedy=remedy,
     )
+
+
+class UnsoundError(SolidsphError):
+    """A motion got to its end, but its energies do not add up: its result is not to be used.
+
+    Attributes:
+        time: when it began [s].
+        part: the largest energy residual over the energy in play [-].
+        tolerance: the scene's `energy_tolerance` [-].
+        cause: what is likely to have done it.
+        remedy: what to try.
+        result: what the run left behind all the same; None in another process.
+    """
+
+    def __init__(self, *, time: float, part: float, tolerance: float, cause: str, remedy: str):
+        self.time = time
+        self.part = part
+        self.tolerance = tolerance
+        self.cause = cause
+        self.remedy = remedy
+        self.result: Result | None = None
+        super().__init__(
+            f"the run got to its end, but its energies do not add up: the energy residual reaches "
+            f"{part:.3g} of the energy in play, and energy_tolerance = {tolerance:g}; that began "
+            f"at t = {time:.6g} s. Likely cause: {cause}. Remedy: {remedy}"
+        )
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Keyword-only arguments do not survive the default pickling between processes.
+        return _rebuild_unsound, (self.time, self.part, self.tolerance, self.cause, self.remedy)
+
+
+def _rebuild_unsound(
+    time: float, part: float, tolerance: float, cause: str, remedy: str
+) -> UnsoundError:
+    return UnsoundError(time=time, part=part, tolerance=tolerance, cause=cause, remedy=remedy)
 
 
 class ConvergenceError(SolidsphError):

@@ -71,6 +71,9 @@ class SleepScene:
 
 DEFAULT_INTEGRATOR = "velocity-verlet"
 
+OFF = "off"
+"""The `energy_tolerance` of a scene whose energies nobody is to judge."""
+
 
 @attrs.frozen
 class Scene:
@@ -93,6 +96,7 @@ class Scene:
     time_step: float | None = None  # [s]; overrides the factor
     outputs: int = 200  # recorded states after the first
     engine: str = "auto"
+    energy_tolerance: float | str = 0.01  # energy residual over energy in play, or "off" [-]
     silence: Sequence[str] = ()  # names of warnings that are not to be shown
 
     @classmethod
@@ -141,7 +145,7 @@ _SECTIONS = {
     "sleep": "[sleep]",
     "statics": "[statics]",
 }
-_SCALARS = ("title", "duration", "outputs", "engine", "silence")
+_SCALARS = ("title", "duration", "outputs", "engine", "energy_tolerance", "silence")
 
 
 def _scene(table: Mapping[str, Any]) -> Scene:
@@ -163,6 +167,8 @@ def _scene(table: Mapping[str, Any]) -> Scene:
             values[key] = _text(table[key], key)
     if "outputs" in table:
         values["outputs"] = _count(table["outputs"], "outputs")
+    if "energy_tolerance" in table:
+        values["energy_tolerance"] = table["energy_tolerance"]
     if "silence" in table:
         values["silence"] = _names(table["silence"], "silence")
     for key in ("material", "formulation"):
@@ -295,6 +301,8 @@ def _table(scene: Scene) -> dict[str, Any]:
     if scene.title:
         table["title"] = scene.title
     table |= {"duration": scene.duration, "outputs": scene.outputs, "engine": scene.engine}
+    if scene.energy_tolerance != attrs.fields(Scene).energy_tolerance.default:
+        table["energy_tolerance"] = scene.energy_tolerance
     if scene.silence:
         table["silence"] = list(scene.silence)
     table["body"] = {name: _body_table(body) for name, body in scene.bodies.items()}

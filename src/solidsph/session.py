@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from solidsph.errors import DivergedError
+from solidsph.errors import DivergedError, UnsoundError
 from solidsph.resumption import Resumption
 
 if TYPE_CHECKING:
@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 FINISHED, INTERRUPTED = "finished", "interrupted"
 """Outcomes of a run that got to its end, and of one that somebody stopped."""
+
+UNSOUND = "unsound"
+"""How the outcome begins of a run that got to its end with energies that do not add up."""
 
 
 @contextmanager
@@ -64,5 +67,6 @@ def session(
 def _told(cause: BaseException) -> str:
     if isinstance(cause, KeyboardInterrupt):
         return INTERRUPTED
-    kind = "diverged" if isinstance(cause, DivergedError) else type(cause).__name__
+    kinds = {DivergedError: "diverged", UnsoundError: UNSOUND}
+    kind = kinds.get(type(cause), type(cause).__name__)
     return f"{kind}: {cause}"

@@ -124,7 +124,6 @@ def _run_scene(
     as_json: bool,
 ) -> None:
     from solidsph.advice import advised
-    from solidsph.carry_out import carry_out
     from solidsph.commands import prediction as told
     from solidsph.commands.receipted import of_scene, show_receipts
     from solidsph.commands.warned import warn
@@ -142,7 +141,7 @@ def _run_scene(
     with progress(shown) as display:
         observers = [ProgressObserver(display, Path(target).stem, simulation)] if display else []
         if watched is None:
-            result = carry_out(simulation, record=path, observers=observers)
+            result = simulation.run(record=path, observers=observers)
         else:
             from solidsph.watch import run_watched
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import attrs
 
 from solidsph.builder import Builder
-from solidsph.carry_out import carry_out
 from solidsph.errors import RecordError
 from solidsph.results.checkpoint import Checkpoint, checkpoint_path, read_checkpoint
 from solidsph.results.circumstances import circumstances, differences, named_parts
@@ -34,7 +33,7 @@ class Pending:
 
     def carry_out(self, observers: Sequence[object] = ()) -> Result:
         """Go on to the end; the record is then what one run without a break would have left."""
-        return carry_out(self.simulation, record=self.path, observers=observers, since=self.since)
+        return self.simulation.run(record=self.path, observers=observers, since=self.since)
 
 
 def resume(

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from solidsph.arrays import Array, Indices
 from solidsph.body import Body
 from solidsph.interfaces.condition import Observation
-from solidsph.watch.accounts import Accounts
+from solidsph.results.accounts import Accounts
 from solidsph.watch.symptom import Finding, Symptom, graded
 
 if TYPE_CHECKING:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, ClassVar, final
 
 import attrs
 import numpy as np
 
 from solidsph.interfaces.condition import Observation, StoringCondition
+from solidsph.results.accounts import Accounts
 from solidsph.results.energy import strain_energy
-from solidsph.watch.accounts import Accounts
-from solidsph.watch.residual import rounding
+from solidsph.soundness import rounding
 from solidsph.watch.symptom import Finding, Symptom, graded
 
 if TYPE_CHECKING:
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 @attrs.frozen
 class StoredBesides(Symptom):
     """What conditions store, as hourglass control does, is much beside the strain energy."""
+
+    # What conditions store is another pass over all pairs, by arrays: some ten steps or so.
+    steps_between: ClassVar[int] = 1000
 
     warning: float = 0.1  # share of both [-]
     failure: float = 0.6  # [-]

@@ -8,7 +8,8 @@ import attrs
 import numpy as np
 
 from solidsph.interfaces.condition import Observation
-from solidsph.watch.accounts import Accounts
+from solidsph.results.accounts import Accounts
+from solidsph.soundness import rounding
 from solidsph.watch.symptom import Finding, Symptom, graded
 
 if TYPE_CHECKING:
@@ -18,10 +19,11 @@ if TYPE_CHECKING:
 @final
 @attrs.frozen
 class EnergyFromNowhere(Symptom):
-    """The energy residual grows beyond a part of all the energy that was ever paid for.
+    """The energy residual is beyond a part of the energy in play at two outputs in succession,
+    and does not fall.
 
-    That is the energy at the start and the work of every account, by its amount. A residual that
-    shrinks again is no symptom.
+    In play is the energy at the start and the work of every account, by its amount. In the first
+    steps of a load there is next to none, and the residual may be all of it; then it falls.
     """
 
     warning: float = 0.1  # [-]
@@ -30,11 +32,12 @@ class EnergyFromNowhere(Symptom):
     def look(
         self, simulation: Simulation, observation: Observation, accounts: Accounts
     ) -> Finding | None:
-        residual = abs(accounts.residual)
-        if residual <= abs(accounts.before):
+        floor = rounding(simulation)
+        part = abs(accounts.residual) / (accounts.paid + floor)
+        before = abs(accounts.before) / (accounts.paid_before + floor)
+        if part < before:
             return None
-        part = residual / (accounts.paid + rounding(simulation))
-        grade = graded(part, self.warning, self.failure)
+        grade = graded(min(part, before), self.warning, self.failure)  # of no number, that
         if grade is None:
             return None
         own = 0.5 * observation.masses * observation.squared_speeds
@@ -47,10 +50,3 @@ class EnergyFromNowhere(Symptom):
             "half the time step; if the residual stays, the variational divergence, whose forces "
             "have an energy, or the total Lagrangian form",
         )
-
-
-def rounding(simulation: Simulation) -> float:
-    """An energy below which everything is rounding [J]: strains of about 1e-12."""
-    return 1e-24 * sum(
-        float(body.masses.sum()) * body.material.wave_speed**2 for body in simulation.setting.bodies
-    )

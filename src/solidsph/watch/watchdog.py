@@ -12,7 +12,7 @@ from solidsph.errors import DivergedError, RecordError
 from solidsph.hooks import implementation
 from solidsph.interfaces.condition import Observation
 from solidsph.particles import State
-from solidsph.watch.accounts import Accounts
+from solidsph.results.accounts import Accounts
 from solidsph.watch.crowding import CollapsingNeighbours
 from solidsph.watch.hourglass import StoredBesides
 from solidsph.watch.residual import EnergyFromNowhere
@@ -73,6 +73,7 @@ class Watchdog:
         self._picture = picture
         self._told = told
         self._accounts = Accounts()
+        self._looked: dict[Symptom, int] = {}  # the step of the last look
         self._is_clean = False  # whether `good` had no finding at all
 
     @implementation
@@ -88,7 +89,11 @@ class Watchdog:
     @implementation
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
         self._accounts.add(observation)
-        looks = (one.look(simulation, observation, self._accounts) for one in self._symptoms)
+        looks = (
+            one.look(simulation, observation, self._accounts)
+            for one in self._symptoms
+            if self._is_due(one, simulation, observation.state.step)
+        )
         found = [one for one in looks if one is not None]
         state = observation.state
         self.findings += [(state.time, one) for one in found]
@@ -101,6 +106,13 @@ class Watchdog:
             kept: dict[str, Array] = {}
             simulation.manager.hook.solidsph_keep(simulation=simulation, kept=kept)
             self.good, self._is_clean = Good(state, kept), not found
+
+    def _is_due(self, symptom: Symptom, simulation: Simulation, step: int) -> bool:
+        due = step - self._looked.get(symptom, 0) >= symptom.steps_between
+        if due or step == simulation.steps:
+            self._looked[symptom] = step
+            return True
+        return False
 
     @implementation
     def solidsph_keep(self, simulation: Simulation, kept: dict[str, Array]) -> None:

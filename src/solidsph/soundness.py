@@ -1,0 +1,151 @@
+"""Soundness: whether the energies of a motion add up, judged when it is over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solidsph.errors import UnsoundError
+from solidsph.hooks import implementation
+from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.formulation import Configuration
+from solidsph.interfaces.history import HistoryMaterial
+from solidsph.results.accounts import Accounts
+from solidsph.scene import OFF
+
+if TYPE_CHECKING:
+    from solidsph.arrays import Array
+    from solidsph.simulation import Simulation
+
+_KEPT = "soundness"
+
+# A residual is remembered with its time when it has grown by so much: few are, in any run.
+_GROWTH = 1.02
+
+# A deformed body may be stiffer than at rest: a margin of this much is none.
+_MARGIN = 1.25
+
+# Strains that rounding makes of the numbers that an engine adds up, in units of their precision.
+_ROUNDED = 5e3
+
+
+class Soundness:
+    """Hears every output of a motion, and judges its energy ledger at the end.
+
+    The largest energy residual is compared with the energy in play: the energy at the start and
+    the work of every account by its amount, the most of it in the whole run. So what rounding or
+    the first steps of a ramp leave of a tiny energy is of no consequence once there is more.
+    """
+
+    def __init__(self) -> None:
+        self._accounts = Accounts()
+        self._rises = np.empty((0, 2))  # times [s] and residuals [J], each larger than all before
+
+    @implementation
+    def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
+        self._accounts.add(observation)
+        residual = abs(self._accounts.residual)
+        if simulation.effects and self._accounts.residual < 0.0 and _parts(simulation):
+            return  # neighbours that part take the energy between them away
+        largest = self._rises[-1, 1] if len(self._rises) else 0.0
+        if not residual <= _GROWTH * largest:
+            self._rises = np.append(self._rises, [[observation.state.time, residual]], axis=0)
+
+    @implementation
+    def solidsph_resume(
+        self, simulation: Simulation, observation: Observation, kept: Mapping[str, Array]
+    ) -> None:
+        if _KEPT in kept:
+            self._accounts = Accounts.taken(kept[_KEPT])
+            self._rises = kept[f"{_KEPT} rises"]
+        else:  # nobody judged until here
+            self._accounts.add(observation)
+
+    @implementation
+    def solidsph_keep(self, simulation: Simulation, kept: dict[str, Array]) -> None:
+        kept[_KEPT], kept[f"{_KEPT} rises"] = self._accounts.kept(), self._rises
+
+    def judge(self, simulation: Simulation) -> None:
+        """Called at the end of the run.
+
+        Raises:
+            UnsoundError: the residual was larger than the scene's `energy_tolerance` allows.
+        """
+        tolerance = simulation.scene.energy_tolerance
+        if tolerance == OFF or not len(self._rises):
+            return
+        in_play = self._accounts.paid + rounding(simulation)
+        parts = self._rises[:, 1] / in_play
+        beyond = np.flatnonzero(~(parts <= float(tolerance)))
+        if len(beyond):
+            cause, remedy = _explained(simulation)
+            raise UnsoundError(
+                time=float(self._rises[beyond[0], 0]),
+                part=float(parts.max()),
+                tolerance=float(tolerance),
+                cause=cause,
+                remedy=f"{remedy}. If the loss is meant, raise energy_tolerance in the scene",
+            )
+
+
+def rounding(simulation: Simulation) -> float:
+    """An energy below which everything is rounding [J]."""
+    strain = _ROUNDED * simulation.dynamics.internal.precision
+    return strain**2 * sum(
+        float(body.masses.sum()) * body.material.wave_speed**2 for body in simulation.setting.bodies
+    )
+
+
+def _parts(simulation: Simulation) -> bool:
+    return any(effect.parts_neighbours for effect in simulation.effects.values())
+
+
+def _explained(simulation: Simulation) -> tuple[str, str]:
+    """The likely cause, and a remedy."""
+    formulations = [body.formulation for body in simulation.setting.bodies]
+    for one in formulations:
+        if one.configuration is Configuration.CURRENT:
+            return (
+                "the updated Lagrangian form, whose sums have no energy of their own and pull "
+                "particles together under tension",
+                "the total Lagrangian form",
+            )
+        if not one.divergence.adjoint:
+            return (
+                f"the divergence {type(one.divergence).__name__}, whose forces have no energy near "
+                "a surface",
+                "divergence = 'variational'",
+            )
+    from solidsph.statics.stable_step import critical_step  # only where it is asked for
+
+    margin = critical_step(simulation).margin
+    if margin < _MARGIN:
+        return (
+            f"the time step: the critical step of the undeformed scene is {margin:.4g} times that "
+            "in use, and the fastest vibrations grow",
+            f"a time_step_factor of {0.8 * margin * simulation.scene.time_step_factor:.2g}"
+            if simulation.scene.time_step is None
+            else f"a time_step of {0.8 * margin * simulation.step_size:.3g} s",
+        )
+    if any(isinstance(body.material, HistoryMaterial) for body in simulation.setting.bodies):
+        return (
+            "steps in which the material's history changes by much, or vibrations that they do "
+            "not resolve",
+            "half the time step",
+        )
+    controlled = any(
+        effect.stiffness_rate(simulation.setting.bodies) > 0.0
+        for effect in simulation.effects.values()
+    )
+    if not controlled and any(one.gradient.exact_degree >= 1 for one in formulations):
+        return (
+            "vibrations that the step does not resolve, or motions that the gradient does not see",
+            "half the time step, or the effect 'hourglass-control'",
+        )
+    return (
+        "vibrations that the step does not resolve, or a part whose forces are not those of its "
+        "energy (`solidsph check NAME`)",
+        "half the time step",
+    )
