@@ -95,7 +95,7 @@ def _rebuild_diverged(
 
 
 class UnsoundError(SolidsphError):
-    """A motion got to its end, but its energies do not add up: its result is not to be used.
+    """The energies of a motion do not add up: its result is not to be used.
 
     Attributes:
         time: when it began [s].
@@ -114,9 +114,10 @@ class UnsoundError(SolidsphError):
         self.remedy = remedy
         self.result: Result | None = None
         super().__init__(
-            f"the run got to its end, but its energies do not add up: the energy residual reaches "
-            f"{part:.3g} of the energy in play, and energy_tolerance = {tolerance:g}; that began "
-            f"at t = {time:.6g} s. Likely cause: {cause}. Remedy: {remedy}"
+            f"the energies of the run do not add up: from t = {time:.6g} s on the energy residual "
+            f"is beyond energy_tolerance = {tolerance:g} of the energy in play, and reaches "
+            f"{part:.3g} of it; what was recorded stays readable. Likely cause: {cause}. Remedy: "
+            f"{remedy}"
         )
 
     def __reduce__(self) -> tuple[object, ...]:

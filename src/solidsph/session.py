@@ -20,6 +20,11 @@ UNSOUND = "unsound"
 """How the outcome begins of a run that got to its end with energies that do not add up."""
 
 
+def is_over(outcome: str) -> bool:
+    """Whether a run with this outcome got to its end, sound or not."""
+    return outcome == FINISHED or outcome.startswith(UNSOUND)
+
+
 @contextmanager
 def session(
     simulation: Simulation,

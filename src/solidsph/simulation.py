@@ -157,7 +157,7 @@ class Simulation:
                 state=state,
                 record=path,
                 seconds=clock.perf_counter() - begun,
-                effort={"steps": self.steps, "step size [s]": self.step_size, **loop.effort},
+                effort={"steps": state.step, "step size [s]": self.step_size, **loop.effort},
             )
 
         hook = self.manager.hook

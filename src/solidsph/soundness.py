@@ -1,4 +1,4 @@
-"""Soundness: whether the energies of a motion add up, judged when it is over."""
+"""Soundness: whether the energies of a motion add up."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solidsph.errors import UnsoundError
+from solidsph.errors import DivergedError, UnsoundError
 from solidsph.hooks import implementation
 from solidsph.interfaces.condition import Observation
 from solidsph.interfaces.formulation import Configuration
@@ -17,9 +17,13 @@ from solidsph.scene import OFF
 
 if TYPE_CHECKING:
     from solidsph.arrays import Array
+    from solidsph.particles import State
     from solidsph.simulation import Simulation
 
 _KEPT = "soundness"
+
+# Of the energy in play: a run with such a residual has no energy that means anything.
+_LOST = 1.0
 
 # A residual is remembered with its time when it has grown by so much: few are, in any run.
 _GROWTH = 1.02
@@ -32,26 +36,33 @@ _ROUNDED = 5e3
 
 
 class Soundness:
-    """Hears every output of a motion, and judges its energy ledger at the end.
+    """Hears every output of a motion, and judges its energy ledger.
 
     The largest energy residual is compared with the energy in play: the energy at the start and
     the work of every account by its amount, the most of it in the whole run. So what rounding or
-    the first steps of a ramp leave of a tiny energy is of no consequence once there is more.
+    the first steps of a ramp leave of a tiny energy is of no consequence once there is more, and
+    the judgement is one of the end. Only a run whose residual is larger than all energy in play,
+    twice in succession and not falling, is stopped before: nothing is left in it to be wrong.
     """
 
     def __init__(self) -> None:
         self._accounts = Accounts()
         self._rises = np.empty((0, 2))  # times [s] and residuals [J], each larger than all before
+        self._part = 0.0  # at the last output: the residual over the energy in play so far
 
     @implementation
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
         self._accounts.add(observation)
-        residual = abs(self._accounts.residual)
-        if simulation.effects and self._accounts.residual < 0.0 and _parts(simulation):
-            return  # neighbours that part take the energy between them away
+        residual = self._accounts.residual
+        if residual < 0.0 and any(one.parts_neighbours for one in simulation.effects.values()):
+            residual = 0.0  # neighbours that part take the energy between them away
         largest = self._rises[-1, 1] if len(self._rises) else 0.0
-        if not residual <= _GROWTH * largest:
-            self._rises = np.append(self._rises, [[observation.state.time, residual]], axis=0)
+        if not abs(residual) <= _GROWTH * largest:
+            rise = [[observation.state.time, abs(residual)]]
+            self._rises = np.append(self._rises, rise, axis=0)
+        before, self._part = self._part, part_of_play(simulation, self._accounts)
+        if self._part >= before >= _LOST:
+            self.judge(simulation)
 
     @implementation
     def solidsph_resume(
@@ -73,21 +84,43 @@ class Soundness:
         Raises:
             UnsoundError: the residual was larger than the scene's `energy_tolerance` allows.
         """
-        tolerance = simulation.scene.energy_tolerance
-        if tolerance == OFF or not len(self._rises):
-            return
+        found = self._found(simulation)
+        if found is not None:
+            raise found
+
+    @implementation
+    def solidsph_failure(self, simulation: Simulation, state: State, error: DivergedError) -> None:
+        found = self._found(simulation)
+        if found is not None:
+            error.cause += f" (before, from t = {found.time:.6g} s on, the energies did not add up)"
+            error.remedy = f"{found.remedy}; likely cause: {found.cause}"
+
+    def _found(self, simulation: Simulation) -> UnsoundError | None:
+        tolerance = allowed(simulation)
         in_play = self._accounts.paid + rounding(simulation)
         parts = self._rises[:, 1] / in_play
-        beyond = np.flatnonzero(~(parts <= float(tolerance)))
-        if len(beyond):
-            cause, remedy = _explained(simulation)
-            raise UnsoundError(
-                time=float(self._rises[beyond[0], 0]),
-                part=float(parts.max()),
-                tolerance=float(tolerance),
-                cause=cause,
-                remedy=f"{remedy}. If the loss is meant, raise energy_tolerance in the scene",
-            )
+        beyond = np.flatnonzero(~(parts <= tolerance))
+        if not len(beyond):
+            return None
+        cause, remedy = _explained(simulation)
+        return UnsoundError(
+            time=float(self._rises[beyond[0], 0]),
+            part=float(parts.max()),
+            tolerance=tolerance,
+            cause=cause,
+            remedy=f"{remedy}; or, if the loss is meant, a larger energy_tolerance in the scene",
+        )
+
+
+def allowed(simulation: Simulation) -> float:
+    """The energy residual over the energy in play that the scene tolerates."""
+    wanted = simulation.scene.energy_tolerance
+    return np.inf if wanted == OFF else float(wanted)
+
+
+def part_of_play(simulation: Simulation, accounts: Accounts) -> float:
+    """The energy residual at the last output over the energy in play so far."""
+    return abs(accounts.residual) / (accounts.paid + rounding(simulation))
 
 
 def rounding(simulation: Simulation) -> float:
@@ -96,10 +129,6 @@ def rounding(simulation: Simulation) -> float:
     return strain**2 * sum(
         float(body.masses.sum()) * body.material.wave_speed**2 for body in simulation.setting.bodies
     )
-
-
-def _parts(simulation: Simulation) -> bool:
-    return any(effect.parts_neighbours for effect in simulation.effects.values())
 
 
 def _explained(simulation: Simulation) -> tuple[str, str]:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+import click
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -46,6 +47,13 @@ def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]
 def show_json(data: Mapping[str, Any]) -> None:
     """One JSON object on the standard output."""
     sys.stdout.write(json.dumps(_jsonable(data), indent=2, allow_nan=False) + "\n")
+
+
+def facts() -> dict[str, Any]:
+    """What the object of --json holds whatever the outcome; a verb enters what it knows so far."""
+    context = click.get_current_context(silent=True)
+    found: dict[str, Any] = {} if context is None else context.ensure_object(dict)
+    return found
 
 
 @contextmanager

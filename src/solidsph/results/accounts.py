@@ -16,19 +16,15 @@ class Accounts:
 
     start: float = np.nan  # energy of the bodies at the first output [J]
     residual: float = 0.0  # at the last output: what no account explains [J]
-    before: float = 0.0  # the same at the output before [J]
     paid: float = 0.0  # the most so far of the start and the work of all accounts, by amount [J]
-    paid_before: float = 0.0  # the same at the output before [J]
 
     def add(self, observation: Observation) -> None:
         """Enter one more output."""
         if np.isnan(self.start):
             self.start = total_energy(observation)
-        self.before, self.residual = self.residual, residual(observation, self.start)
-        self.paid_before, self.paid = (
-            self.paid,
-            max(self.paid, self.start + sum(abs(one) for one in observation.state.work.values())),
-        )
+        self.residual = residual(observation, self.start)
+        work = observation.state.work.values()
+        self.paid = max(self.paid, self.start + sum(abs(one) for one in work))
 
     def kept(self) -> Array:
         """As one array."""

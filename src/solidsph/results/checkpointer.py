@@ -14,6 +14,7 @@ from solidsph.particles import State
 from solidsph.results.checkpoint import Checkpoint, write_checkpoint
 from solidsph.results.circumstances import circumstances
 from solidsph.results.recorder import remove, scene_text
+from solidsph.session import is_over
 
 if TYPE_CHECKING:
     from solidsph.arrays import Array
@@ -69,7 +70,7 @@ class Checkpointer:
         state = self._state
         if state is None or self._is_written:
             return
-        if outcome != "finished":
+        if not is_over(outcome):
             try:
                 self._write(simulation)
             except RecordError:  # what stopped the run is what is to be told

@@ -16,7 +16,7 @@ from solidsph.results.record import Record
 from solidsph.results.recorder import COMPOSED, scene_text
 from solidsph.resumption import Resumption
 from solidsph.scene import Scene
-from solidsph.session import FINISHED
+from solidsph.session import is_over
 from solidsph.simulation import Result, Simulation
 
 # Of a step: an end that is missed by less is met.
@@ -61,7 +61,7 @@ def resume(
     """
     found = pending(Path(path), simulation=simulation, until=until, force=force)
     if found is None:
-        raise RecordError(f"the run in {path} is finished; give `until` to extend it")
+        raise RecordError(f"the run in {path} is over; give `until` to extend it")
     return found.carry_out(observers)
 
 
@@ -72,10 +72,10 @@ def pending(
     until: float | None = None,
     force: bool = False,
 ) -> Pending | None:
-    """As `resume`, but only made ready; None if the run is finished."""
+    """As `resume`, but only made ready; None if the run is over."""
     with Record(path) as record:
         checkpoint = _checkpoint(record)
-        if record.outcome == FINISHED and until is None:
+        if is_over(record.outcome) and until is None:
             return None
         if simulation is not None and scene_text(simulation) != record.scene:
             raise RecordError(
