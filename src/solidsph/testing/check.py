@@ -20,6 +20,7 @@ class CheckResult:
     passed: bool
     measured: str
     required: str
+    checked: bool = True  # False: the part does not promise it, and nothing was asked of it
 
 
 Check: TypeAlias = Callable[[Any], CheckResult]
@@ -32,6 +33,7 @@ class Verdict:
 
     passed: bool
     measured: str
+    checked: bool = True
 
 
 def check(measure: Callable[[Part], Verdict]) -> Callable[[Part], CheckResult]:
@@ -48,7 +50,7 @@ def check(measure: Callable[[Part], Verdict]) -> Callable[[Part], CheckResult]:
             verdict = measure(part)
         except Exception as cause:
             verdict = Verdict(False, f"{type(cause).__name__}: {cause}")
-        return CheckResult(name, verdict.passed, verdict.measured, required)
+        return CheckResult(name, verdict.passed, verdict.measured, required, verdict.checked)
 
     return checked
 
@@ -64,8 +66,8 @@ def more_than(value: float, limit: float) -> Verdict:
 
 
 def not_promised(reason: str) -> Verdict:
-    """Passed: the part declares that it does not promise this."""
-    return Verdict(True, f"not promised: {reason}")
+    """Not failed, and not checked: the part declares that it does not promise this."""
+    return Verdict(True, f"not promised: {reason}", checked=False)
 
 
 def worst(verdicts: list[Verdict]) -> Verdict:
