@@ -14,13 +14,14 @@ import attrs
 import numpy as np
 import pluggy
 
-from solidsph import compatibility, registry
+from solidsph import compatibility, handed_back, registry
+from solidsph.blame import described, is_foreign
 from solidsph.body import Body
 from solidsph.dynamics import Dynamics
 from solidsph.engines.engine import Engine
 from solidsph.engines.history import HistoryFields, remembering
 from solidsph.engines.select import engine_named
-from solidsph.errors import SceneError
+from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.condition import (
     Condition,
     ForceCondition,
@@ -57,9 +58,10 @@ class Assembly:
     def __init__(self, scene: Scene, manager: pluggy.PluginManager) -> None:
         self._scene = scene
         self._manager = manager
-        self._problems = Problems()
         self._labels: set[str] = set()  # of the accounts of boundaries and effects
         self._used: dict[registry.Entry, None] = {}  # plugins in the order of their use, each once
+        self._foreign: list[tuple[str, Any]] = []  # kind and part, of those that are not our own
+        self._problems = Problems(self._used.keys())
 
     def simulation(self) -> Simulation:
         """Build it.
@@ -99,6 +101,8 @@ class Assembly:
 
         made = [problems.settled(body) for body in bodies]
         scheme = problems.settled(integrator)
+        problems.attempt(self._check_constants, scheme, effects, made)
+        problems.stop_if_any()
         step = problems.attempt(self._step_size, scheme, effects, made)
         problems.stop_if_any()
         steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
@@ -109,6 +113,7 @@ class Assembly:
             step_size=scene.duration / steps,
         )
         conditions = self._bound(handlers, effects, setting)
+        problems.stop_if_any()
         motions = _in_order([c for c in conditions if isinstance(c, MotionCondition)], particles)
         stresses = [c for c in conditions if isinstance(c, StressCondition)]
         problems.add(compatibility.motions(motions, particles))
@@ -151,6 +156,11 @@ class Assembly:
 
             problems.attempt(check_sleep, made_ready)
             problems.stop_if_any()
+        if self._foreign:
+            from solidsph.first_use import ask  # only where there is somebody to be asked
+
+            problems.attempt(ask, made_ready, self._foreign)
+            problems.stop_if_any()
         return made_ready
 
     def _make(self, kind: str, wanted: PartLike) -> Any:
@@ -168,9 +178,21 @@ class Assembly:
         )
         return made
 
+    def _check_constants(
+        self, integrator: Integrator, effects: Mapping[str, Effect], bodies: Sequence[Body]
+    ) -> None:
+        self._problems.add(handed_back.limits(integrator))
+        for body in bodies:
+            self._problems.add(handed_back.constants(body.material))
+        for label, effect in effects.items():
+            self._problems.add(handed_back.rates(label, effect, bodies))
+
     def _note(self, kind: str, part: Any) -> None:
         """Remember which plugins a part, and the parts inside it, came from."""
-        self._used[registry.entry_of(kind, part)] = None
+        entry = registry.entry_of(kind, part)
+        self._used[entry] = None
+        if is_foreign(entry):
+            self._foreign.append((kind, part))
         if not attrs.has(type(part)):
             return
         for field in attrs.fields(type(part)):
@@ -217,6 +239,10 @@ class Assembly:
                 continue
             particles = self._problems.attempt(discretisation.particles, shape, body.spacing)
             if particles is not None:
+                wrong = list(handed_back.particles(discretisation, particles, shape.dimension))
+                self._problems.add(wrong)
+                if wrong:
+                    continue
                 shapes[name], sets[name], materials[name] = shape, particles, material
         return shapes, sets, materials
 
@@ -277,12 +303,24 @@ class Assembly:
         setting: Setting,
     ) -> list[Condition]:
         conditions: list[Condition] = []
-        for label, handler in handlers.items():
-            conditions += self._problems.attempt(handler.bind, setting, label) or []
-        for label, effect in effects.items():
-            bound = self._problems.attempt(effect.bind, setting, label)
-            conditions += [] if bound is None else [bound]
+        parts = [("boundaries", *one) for one in handlers.items()]
+        parts += [("effects", *one) for one in effects.items()]
+        for kind, label, part in parts:
+            conditions += self._problems.attempt(self._bind, kind, part, setting, label) or []
         return conditions
+
+    def _bind(self, kind: str, part: Any, setting: Setting, label: str) -> Sequence[Condition]:
+        bound = part.bind(setting, label)
+        wrong = list(handed_back.conditions(kind, label, part, bound))
+        if wrong:
+            raise BuildError(wrong)
+        found: Sequence[Condition] = [bound] if kind == "effects" else bound
+        particles = setting.particles
+        for one in found:
+            wrong += handed_back.shapes(one, particles.count, particles.dimension)
+        if wrong:
+            raise BuildError([f"{described(registry.entry_of(kind, part))}, {w}" for w in wrong])
+        return found
 
     def _initial_state(self, particles: Particles) -> State:
         # By shape and not `zeros_like`: pages of zeros that are never written take no memory.

@@ -12,13 +12,22 @@ import attrs
 import numpy as np
 import pluggy
 
+from solidsph.blame import culprit
 from solidsph.dynamics import Dynamics
 from solidsph.engines.engine import Engine
-from solidsph.errors import BuildError, DivergedError, SceneError, UnsoundError
+from solidsph.errors import (
+    BuildError,
+    DivergedError,
+    PluginError,
+    SceneError,
+    SolidsphError,
+    UnsoundError,
+)
+from solidsph.hooks import heard_by
 from solidsph.interfaces.condition import Condition, Observation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.integrator import Integrator
-from solidsph.particles import Particles, State
+from solidsph.particles import Particles, State, read_only
 from solidsph.registry import Entry
 from solidsph.resumption import Resumption
 from solidsph.scene import Scene
@@ -183,6 +192,16 @@ class Simulation:
         except UnsoundError as unsound:
             unsound.result = result()
             raise
+        except (SolidsphError, OSError, MemoryError, Warning):
+            raise
+        except Exception as cause:
+            who = culprit(cause, self.parts) or heard_by(cause, self.manager)
+            if not who:
+                raise
+            raise PluginError(
+                f"{who} failed in the run: {type(cause).__name__}: {cause}; this is a fault of "
+                "that part"
+            ) from cause
         return result()
 
     def output_steps(self) -> tuple[int, ...]:
@@ -200,7 +219,7 @@ class Simulation:
         return tuple(int(step) for step in np.unique(whole) if step <= self.steps)
 
     def _observe(self, state: State) -> Observation:
-        observation = self.dynamics.observe(state)
+        observation = self.dynamics.observe(read_only(state))
         turned = ~(observation.volume_ratios > 0.0) & ~self.particles.ghosts
         if turned.any():
             raise self._diverged(state, "the volume has vanished or turned inside out")

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solidsph.errors import RecordError, SceneError
+from solidsph import handed_back
+from solidsph.errors import PluginError, RecordError, SceneError
 from solidsph.hooks import implementation
 from solidsph.interfaces.condition import FieldCondition, Observation
 from solidsph.results.energy import KINETIC, STRAIN, kinetic_energy, ledger, strain_energy
@@ -147,7 +148,11 @@ class Recorder:
     def _history(self, simulation: Simulation, observation: Observation) -> dict[str, float]:
         columns = dict(ledger(observation, self._initial_energy, simulation.conditions))
         for condition in simulation.conditions:
-            columns |= condition.report(observation)
+            reported = condition.report(observation)
+            wrong = handed_back.columns(condition.label, reported)
+            if wrong:
+                raise PluginError(f"{wrong}. This is a fault of the part with that label")
+            columns |= reported
         return columns
 
 
