@@ -68,12 +68,11 @@ def _quick(kind: str, part: Any) -> Iterator[str]:
         return
     from solidsph.testing import checks  # brings the kits with it
 
-    for one in checks(kind):
-        if one.__name__ not in _QUICK[kind]:
-            continue
-        result = one(part)
-        if not result.passed:
-            yield _told(kind, part, f"{result.name}: {result.measured}", result.required)
+    results = [one(part) for one in checks(kind) if one.__name__ in _QUICK[kind]]
+    failed = [one for one in results if not one.passed]
+    if failed:
+        measured = "; ".join(f"{one.name}: {one.measured}" for one in failed)
+        yield _told(kind, part, measured, "; ".join(one.required for one in failed))
 
 
 def _told(kind: str, part: Any, measured: str, required: str) -> str:
@@ -99,8 +98,9 @@ def _of_effect(simulation: Simulation, label: str, effect: Any) -> Iterator[str]
         out[condition.particles] = condition.advance(0.0, 0.0, X + u, v, memory)[0]
         return out
 
+    wrong: list[str] = []
     if isinstance(condition, StoringCondition):
-        yield from _of_energy(simulation, condition, effect, force, du)
+        wrong += _of_energy(simulation, condition, effect, force, du)
     h = _SMALL
     norm = float(np.sum(masses[:, None] * du**2))
     for name, declared, change in (
@@ -119,13 +119,13 @@ def _of_effect(simulation: Simulation, label: str, effect: Any) -> Iterator[str]
         found = float(np.sum(du * change)) / norm
         if found > 1.01 * declared + 1e-9 * (2.0 / simulation.step_size) ** 2:
             power = 0.5 if name == "stiffness_rate" else 1.0
-            yield _told(
-                "effects",
-                effect,
-                f"label {label!r}: {name} is {declared**power:.4g}, and a motion has "
-                f"{found**power:.4g} 1/s at least",
-                "no motion has, by the effect alone, a larger one",
+            wrong.append(
+                f"{name} is {declared**power:.4g} 1/s, and a motion has {found**power:.4g} 1/s at "
+                "least by the effect alone"
             )
+    if wrong:
+        required = "what it stores is minus its work, and no motion is faster than it declares"
+        yield _told("effects", effect, f"label {label!r}: {'; '.join(wrong)}", required)
 
 
 def _of_energy(
@@ -140,20 +140,27 @@ def _of_energy(
     X = simulation.initial.positions
     u, d = 0.01 * du[::-1], _SMALL * du
 
-    def stored(u: Any) -> float:
+    def energies(u: Any) -> Any:
         state = attrs.evolve(simulation.initial, positions=X + u)
-        return float(np.sum(condition.energies(simulation.dynamics.observe(state))))
+        return condition.energies(simulation.dynamics.observe(state))
 
+    def stored(u: Any) -> float:
+        return float(np.sum(energies(u)))
+
+    if np.shape(energies(u)) != (len(X),):
+        raise BuildError(
+            [
+                f"{described(entry_of('effects', effect))}, label {condition.label!r}: `energies` "
+                f"have the shape {np.shape(energies(u))}; {(len(X),)} is expected"
+            ]
+        )
     f = force(u, np.zeros_like(X))
     change, work = stored(u + d) - stored(u - d), 2.0 * float(np.vdot(f, d))
     scale = 2.0 * float(np.abs(f * d).sum())
     if abs(change + work) > _DIFFERENT * scale:
-        yield _told(
-            "effects",
-            effect,
-            f"label {condition.label!r}: what it stores changes by {change:.4g} J along a motion "
-            f"in which its force does {work:.4g} J of work",
-            "what it stores is minus its work",
+        yield (
+            f"what it stores changes by {change:.4g} J along a motion in which its force does "
+            f"{work:.4g} J of work"
         )
 
 

@@ -59,7 +59,7 @@ class Soundness:
         # Times [s], what is lost and the residual [J] there, each loss larger than all before.
         self._rises = np.empty((0, 3))
         self._first = np.nan  # what the step blurs of the energy at the start [J]
-        self._part = 0.0  # at the last output: the residual over the energy in play so far
+        self._part = 0.0  # at the last output: what is lost over the energy in play so far
 
     @implementation
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
@@ -74,7 +74,8 @@ class Soundness:
         if not lost <= _GROWTH * largest:
             rise = [[observation.state.time, lost, abs(residual)]]
             self._rises = np.append(self._rises, rise, axis=0)
-        before, self._part = self._part, part_of_play(simulation, self._accounts)
+        in_play = self._accounts.paid + rounding(simulation)
+        before, self._part = self._part, lost / in_play
         if self._part >= before >= _LOST:
             self.judge(simulation)
 
