@@ -275,11 +275,11 @@ def leaves_its_history(material: HistoryMaterial) -> Verdict:
     for d, rng in seeded():
         path = _Path(d, rng)
         follower = _led(material, path, _DURATIONS[1], 10)
-        before = tuple(np.array(one) for one in follower.history)
+        given = tuple(np.array(one) for one in follower.history)  # which can be written to
         F = path.at(1.0)
-        material.advance(F, follower.history, 1e-3, material.params)
-        material.stress(F, follower.history, material.params)
-        pairs = zip(before, follower.history, strict=True)
+        material.advance(F, given, 1e-3, material.params)
+        material.stress(F, given, material.params)
+        pairs = zip(given, follower.history, strict=True)
         if not all(np.array_equal(a, b) for a, b in pairs):
             return Verdict(False, f"{d}D: it was changed in place")
     return Verdict(True, "untouched")
