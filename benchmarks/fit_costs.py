@@ -27,7 +27,7 @@ import attrs
 import numpy as np
 from scipy.optimize import nnls
 
-from solidsph import Simulation, carry_out
+from solidsph import Simulation
 from solidsph.builder import Builder
 from solidsph.costs import terms
 from solidsph.costs.calibration import Calibration, calibrated
@@ -160,7 +160,7 @@ def measured(specimen: Specimen) -> tuple[Work, dict[str, float]]:
     with tempfile.TemporaryDirectory() as folder:
         if specimen.statics:
             begun = clock()
-            result = carry_out(simulation, record=Path(folder) / "record.h5")
+            result = simulation.run(record=Path(folder) / "record.h5")
             found["iteration"] = (clock() - begun) / result.effort["iterations"]
         else:
             begun = clock()

@@ -25,7 +25,7 @@ from typing import Any
 from steps import bar, beam
 from table import Table
 
-from solidsph import Scene, Simulation, carry_out
+from solidsph import Scene, Simulation
 from solidsph.builder import Builder
 from solidsph.commands import prediction as told
 from solidsph.costs.counted import counted
@@ -126,7 +126,7 @@ def measure(file: Path, record: Path) -> dict[str, Any]:
     """What `solidsph run` takes."""
     begun, spent = time.perf_counter(), time.process_time()
     simulation, _ = told.built(Scene.read(file))
-    carry_out(simulation, record=record)
+    simulation.run(record=record)
     return {
         "seconds": time.perf_counter() - begun,
         "processor": time.process_time() - spent,

@@ -9,11 +9,10 @@ import attrs
 import numpy as np
 import pytest
 
-from solidsph import BuildError, Simulation
+from solidsph import BuildError, Simulation, carry_out
 from solidsph.advice import advised
 from solidsph.arrays import Array
 from solidsph.builder import Builder
-from solidsph.carry_out import carry_out
 from tests.scenes import SOFT
 
 PRESSED = 1000.0  # Pa

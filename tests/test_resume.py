@@ -47,7 +47,9 @@ GHOSTS = {"type": "lattice", "on_boundary": True, "ghosts": 3}
 
 
 def _plain() -> Builder:
-    return box(1, 12, discretisation=GHOSTS).formulation("total-lagrangian", divergence="plain")
+    # The plain divergence has no energy near a surface: these runs are not sound, but repeatable.
+    builder = box(1, 12, discretisation=GHOSTS).energy_tolerance("off")
+    return builder.formulation("total-lagrangian", divergence="plain")
 
 
 def _dirichlet(kind: str) -> Builder:
@@ -61,8 +63,11 @@ def _dirichlet(kind: str) -> Builder:
 
 BOUNDARIES: Mapping[str, Callable[[], Builder]] = {
     "clamp": lambda: box(2).boundary("clamp", where="left"),
-    "prescribed-motion": lambda: box(2).boundary(
-        "prescribed-motion", where="left", displacement={"x": "0.05*sin(500*t)"}
+    # A jump of the velocity by two thirds of the wave speed, which a few steps resolve to 2 %.
+    "prescribed-motion": lambda: (
+        box(2)
+        .energy_tolerance(0.05)
+        .boundary("prescribed-motion", where="left", displacement={"x": "0.05*sin(500*t)"})
     ),
     "pressure": lambda: box(2).boundary("pressure", where="right", pressure="1e4*t"),
     "traction": lambda: box(2).boundary("traction", where="right", traction={"y": "1e4*t"}),
@@ -127,7 +132,7 @@ def assert_goes_on(builder: Builder, folder: Path, *, simulation: bool = True) -
 def test_every_formulation(tmp_path: Path, formulation: str, gradient: str) -> None:
     if formulation != "total-lagrangian" and gradient in REFERENCE_ONLY:
         pytest.skip("the gradient is refused in this form")
-    builder = box(2).formulation(formulation, gradient=gradient)
+    builder = box(2).formulation(formulation, gradient=gradient).energy_tolerance("off")
     assert_goes_on(moving(builder), tmp_path)
 
 
@@ -258,7 +263,7 @@ def test_a_finished_run_says_so(tmp_path: Path) -> None:
     simulation = moving(box(1)).build()
     simulation.run(record=path)
     assert pending(path, simulation=simulation) is None
-    with pytest.raises(RecordError, match="is finished; give `until`"):
+    with pytest.raises(RecordError, match="is over; give `until`"):
         resume(path)
     with pytest.raises(RecordError, match=r"until = 0\.001 s is before the end"):
         resume(path, until=1e-3)

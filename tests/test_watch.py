@@ -10,15 +10,14 @@ import attrs
 import numpy as np
 import pytest
 
-from solidsph import DivergedError, Record, RecordError, Simulation, resume
+from solidsph import DivergedError, Record, RecordError, Simulation, UnsoundError, resume
 from solidsph.builder import Builder
 from solidsph.results import checkpointer
+from solidsph.results.accounts import Accounts
 from solidsph.results.checkpoint import checkpoint_path, read_checkpoint
 from solidsph.watch import Grade, Symptom, Watchdog, run_watched
-from solidsph.watch.accounts import Accounts
 from solidsph.watch.crowding import CollapsingNeighbours
 from solidsph.watch.hourglass import StoredBesides
-from solidsph.watch.residual import EnergyFromNowhere
 from solidsph.watch.speed import FasterThanSound
 from solidsph.watch.symptom import Finding
 from solidsph.watch.volume import VanishingVolume
@@ -64,7 +63,6 @@ def test_a_body_at_rest_has_no_symptom() -> None:
         VanishingVolume(),
         FasterThanSound(),
         CollapsingNeighbours(),
-        EnergyFromNowhere(),
         StoredBesides(),
     ):
         assert found(symptom, box(2).effect("hourglass-control")) is None, symptom
@@ -111,23 +109,6 @@ def test_neighbours(left: float, grade: Grade | None) -> None:
     if finding:
         assert finding.particle == 6
         assert f"come to {left:.3g}" in finding.cause
-
-
-@pytest.mark.parametrize(
-    ("before", "residual", "grade"),
-    [
-        (0.0, 0.05, None),
-        (0.0, 0.2, Grade.WARNING),
-        (0.0, -0.2, Grade.WARNING),
-        (0.3, 0.2, None),  # it shrinks again
-        (0.0, 1.5, Grade.FAILURE),
-        (0.0, np.nan, Grade.FAILURE),
-    ],
-)
-def test_energy(before: float, residual: float, grade: Grade | None) -> None:
-    accounts = Accounts(start=1.0, residual=residual, before=before, paid=1.0)
-    finding = found(EnergyFromNowhere(), box(1), accounts=accounts)
-    assert (finding and finding.grade) == grade
 
 
 def test_hourglass_share() -> None:
@@ -335,7 +316,7 @@ def test_a_growing_residual_stops_a_run(tmp_path: Path) -> None:
         .outputs(100)
         .build()
     )
-    with pytest.raises(DivergedError, match="energy residual grows"):
+    with pytest.raises(UnsoundError, match="do not add up"):
         run_watched(simulation, record=tmp_path / "run.h5")
 
 

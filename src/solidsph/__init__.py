@@ -1,6 +1,5 @@
 """Smoothed Particle Hydrodynamics for nonlinear solid mechanics."""
 
-from solidsph.carry_out import carry_out
 from solidsph.errors import (
     BuildError,
     BusyError,
@@ -11,6 +10,7 @@ from solidsph.errors import (
     RecordError,
     SceneError,
     SolidsphError,
+    UnsoundError,
 )
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.case import Case, Measurement
@@ -28,6 +28,9 @@ from solidsph.results.record import Record
 from solidsph.results.resume import resume
 from solidsph.scene import Scene
 from solidsph.simulation import Result, Simulation
+
+carry_out = Simulation.run
+"""The run as a function: `carry_out(simulation)`."""
 
 __all__ = [
     "BoundaryHandler",
@@ -57,6 +60,7 @@ __all__ = [
     "Simulation",
     "SolidsphError",
     "State",
+    "UnsoundError",
     "carry_out",
     "resume",
 ]

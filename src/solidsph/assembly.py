@@ -15,12 +15,13 @@ import attrs
 import numpy as np
 import pluggy
 
-from solidsph import compatibility
+from solidsph import compatibility, handed_back, registry
+from solidsph.blame import described
 from solidsph.body import Body
 from solidsph.cover import cover_of
 from solidsph.dynamics import Dynamics
 from solidsph.engines.history import HistoryFields, remembering
-from solidsph.errors import SceneError
+from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.condition import (
     Condition,
     ForceCondition,
@@ -39,7 +40,6 @@ from solidsph.interfaces.shape import Shape
 from solidsph.making import Making, Parts
 from solidsph.motion import VectorField
 from solidsph.particles import Particles, State
-from solidsph.problems import Problems
 from solidsph.results.shown import clashes
 from solidsph.scene import MOST_STEPS, Scene
 from solidsph.setting import Setting
@@ -67,8 +67,8 @@ class Assembly:
     def __init__(self, scene: Scene, manager: pluggy.PluginManager) -> None:
         self._scene = scene
         self._manager = manager
-        self._problems = Problems()
-        self._making = Making(scene, self._problems)
+        self._making = Making(scene)
+        self._problems = self._making.problems
 
     def simulation(self) -> Simulation:
         """Build it.
@@ -103,6 +103,8 @@ class Assembly:
 
         made = [problems.settled(body) for body in bodies]
         scheme = problems.settled(parts.integrator)
+        problems.attempt(self._check_constants, scheme, effects, made)
+        self._stop_if_any(particles)
         step = problems.attempt(self._step_size, scheme, effects, made)
         self._stop_if_any(particles)
         steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
@@ -115,6 +117,7 @@ class Assembly:
             conditions=tag_conditions,
         )
         conditions = self._bound(parts.handlers, effects, setting)
+        problems.stop_if_any()
         motions = _in_order([c for c in conditions if isinstance(c, MotionCondition)], particles)
         stresses = [c for c in conditions if isinstance(c, StressCondition)]
         problems.add(compatibility.motions(motions, particles))
@@ -159,6 +162,11 @@ class Assembly:
 
             problems.attempt(check_sleep, made_ready)
             problems.stop_if_any()
+        if self._making.foreign:
+            from solidsph.first_use import ask  # only where there is somebody to be asked
+
+            problems.attempt(ask, made_ready, self._making.foreign)
+            problems.stop_if_any()
         return made_ready
 
     def problems(self, *, places: bool) -> Sequence[str]:
@@ -167,6 +175,15 @@ class Assembly:
         if places and placed is not None:
             self._look_for(placed[0])
         return self._problems.found
+
+    def _check_constants(
+        self, integrator: Integrator, effects: Mapping[str, Effect], bodies: Sequence[Body]
+    ) -> None:
+        self._problems.add(handed_back.limits(integrator))
+        for body in bodies:
+            self._problems.add(handed_back.constants(body.material))
+        for label, effect in effects.items():
+            self._problems.add(handed_back.rates(label, effect, bodies))
 
     def _placed(self, parts: Parts) -> tuple[Particles, Conditions] | None:
         """The particles of all bodies with their tags, and what these say, if there are any."""
@@ -260,12 +277,24 @@ class Assembly:
         setting: Setting,
     ) -> list[Condition]:
         conditions: list[Condition] = []
-        for label, handler in handlers.items():
-            conditions += self._problems.attempt(handler.bind, setting, label) or []
-        for label, effect in effects.items():
-            bound = self._problems.attempt(effect.bind, setting, label)
-            conditions += [] if bound is None else [bound]
+        parts = [("boundaries", *one) for one in handlers.items()]
+        parts += [("effects", *one) for one in effects.items()]
+        for kind, label, part in parts:
+            conditions += self._problems.attempt(self._bind, kind, part, setting, label) or []
         return conditions
+
+    def _bind(self, kind: str, part: Any, setting: Setting, label: str) -> Sequence[Condition]:
+        bound = part.bind(setting, label)
+        wrong = list(handed_back.conditions(kind, label, part, bound))
+        if wrong:
+            raise BuildError(wrong)
+        found: Sequence[Condition] = [bound] if kind == "effects" else bound
+        particles = setting.particles
+        for one in found:
+            wrong += handed_back.shapes(one, particles.count, particles.dimension)
+        if wrong:
+            raise BuildError([f"{described(registry.entry_of(kind, part))}, {w}" for w in wrong])
+        return found
 
     def _initial_state(self, particles: Particles) -> State:
         # By shape and not `zeros_like`: pages of zeros that are never written take no memory.

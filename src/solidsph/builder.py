@@ -6,7 +6,7 @@ It only collects; `solidsph.assembly` makes the parts and checks them against ea
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 import attrs
 
@@ -145,6 +145,11 @@ class Builder:
     def engine(self, engine: str) -> Builder:
         """Which engine carries out the sums; "auto" chooses."""
         self._values["engine"] = engine
+        return self
+
+    def energy_tolerance(self, tolerance: float | Literal["off"]) -> Builder:
+        """How large the energy residual may be, over the energy in play, for a run to be sound."""
+        self._values["energy_tolerance"] = tolerance
         return self
 
     def silence(self, *names: str) -> Builder:

@@ -8,13 +8,14 @@ import signal
 import sys
 import threading
 import warnings
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from importlib.metadata import version
-from typing import TextIO
+from typing import Any, NoReturn, TextIO
 
 import click
 
-from solidsph.errors import ConvergenceError, DivergedError, SolidsphError
+from solidsph.errors import BuildError, ConvergenceError, DivergedError, SolidsphError, UnsoundError
 
 VERBS = (
     *("run", "resume", "explain", "cases", "plugins", "check", "plot"),
@@ -88,30 +89,69 @@ def main() -> None:
     if threading.current_thread() is threading.main_thread():
         # Whoever asks the process to end is heard like somebody at the keyboard.
         signal.signal(signal.SIGTERM, signal.default_int_handler)
+    facts: dict[str, Any] = {}  # what a verb with --json has to tell, whatever the outcome
     try:
-        code = cli.main(prog_name="solidsph", standalone_mode=False)
+        code = cli.main(prog_name="solidsph", standalone_mode=False, obj=facts)
     except click.ClickException as cause:
-        cause.show()
-        sys.exit(WRONG_INPUT)
+        if not _as_json():
+            cause.show()  # with the usage
+            sys.exit(WRONG_INPUT)
+        _end(WRONG_INPUT, "invalid input", f"error: {cause.format_message()}", facts)
     except (click.Abort, KeyboardInterrupt):
-        print(
+        _end(
+            INTERRUPTED,
+            "interrupted",
             "interrupted; what was recorded so far can be read, and gone on with: solidsph resume",
-            file=sys.stderr,
+            facts,
         )
-        sys.exit(INTERRUPTED)
     except SolidsphError as cause:
-        print(f"error: {cause}", file=sys.stderr)
-        sys.exit(FAILED if isinstance(cause, (ConvergenceError, DivergedError)) else WRONG_INPUT)
+        outcome = _FAILURES.get(type(cause))
+        problems = cause.problems if isinstance(cause, BuildError) else [str(cause)]
+        code = WRONG_INPUT if outcome is None else FAILED
+        _end(code, outcome or "invalid input", f"error: {cause}", facts, problems)
     except OSError as cause:
-        print(f"error: {cause}; check the path, its permissions and the disk", file=sys.stderr)
-        sys.exit(WRONG_INPUT)
+        text = f"error: {cause}; check the path, its permissions and the disk"
+        _end(WRONG_INPUT, "invalid input", text, facts)
     except Exception as cause:
         if os.environ.get(TRACEBACK) == "1":
             raise
-        print(
+        text = (
             f"error: {type(cause).__name__}: {cause}\nThis is a fault of solidsph or of a plugin, "
-            f"not of the input; {TRACEBACK}=1 shows where it happened",
-            file=sys.stderr,
+            f"not of the input; {TRACEBACK}=1 shows where it happened"
         )
-        sys.exit(FAILED)
+        _end(FAILED, "failed", text, facts)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+# Errors of a run that was asked for rightly: how its outcome is called.
+_FAILURES: Mapping[type[SolidsphError], str] = {
+    ConvergenceError: "no equilibrium",
+    DivergedError: "diverged",
+    UnsoundError: "unsound",
+}
+
+
+def _as_json() -> bool:
+    return "--json" in sys.argv[1:]
+
+
+def _end(
+    code: int, outcome: str, text: str, facts: Mapping[str, Any], problems: Sequence[str] = ()
+) -> NoReturn:
+    """Say what went wrong; with --json also as the one object on the standard output."""
+    if _as_json():
+        from solidsph.commands.console import show_json
+
+        told = text.removeprefix("error: ")
+        show_json(
+            {
+                **facts,
+                "outcome": outcome,
+                "exit code": code,
+                "error": told,
+                "problems": list(problems) or [told],
+            }
+        )
+        sys.stdout.flush()
+    print(text, file=sys.stderr)
+    sys.exit(code)

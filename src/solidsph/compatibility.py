@@ -24,7 +24,7 @@ from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.shape import Shape
 from solidsph.overlap import overlap
 from solidsph.particles import Particles
-from solidsph.scene import Scene
+from solidsph.scene import OFF, Scene
 from solidsph.where import AXES, EVERYWHERE, variable
 
 # Bodies that overlap by less, in spacings, merely touch: their shapes are drawn no more exactly.
@@ -53,6 +53,18 @@ def numbers(scene: Scene) -> Iterator[str]:
         yield f"time_step_factor must not exceed 1, got {scene.time_step_factor}; 0.5 is usual"
     if scene.outputs < 1:
         yield f"outputs must be at least 1, got {scene.outputs}; the last state is always recorded"
+    if not _is_tolerance(scene.energy_tolerance):
+        yield (
+            f"energy_tolerance must be a positive number or {OFF!r}, got "
+            f"{scene.energy_tolerance!r}; it is the energy residual over the energy in play that "
+            "is allowed, 0.01 if nothing is said"
+        )
+
+
+def _is_tolerance(value: object) -> bool:
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return isfinite(value) and value > 0.0
+    return value == OFF
 
 
 def sleep(scene: Scene) -> Iterator[str]:

@@ -20,7 +20,7 @@ from solidsph.interfaces.condition import (
     MotionCondition,
     Observation,
 )
-from solidsph.particles import Particles, State
+from solidsph.particles import Particles, State, shut
 
 _NOTHING: Mapping[str, Array] = MappingProxyType({})
 
@@ -44,6 +44,18 @@ class Dynamics:
     motions: Sequence[MotionCondition]
     loads: Sequence[ForceCondition]
     held: Sequence[Mask] = attrs.field(init=False)  # freedoms (n, d) that each motion determines
+
+    # What observers see of these, and cannot write to.
+    shown: Particles = attrs.field(init=False, repr=False)
+    shown_masses: Array = attrs.field(init=False, repr=False)
+
+    @shown.default
+    def _particles_to_look_at(self) -> Particles:
+        return self.particles.read_only()
+
+    @shown_masses.default
+    def _masses_to_look_at(self) -> Array:
+        return shut(self.masses)
 
     @held.default
     def _held_by_each(self) -> Sequence[Mask]:
@@ -115,8 +127,8 @@ class Dynamics:
         fields = self.internal.observed(displacements, state.memory)
         return Observation(
             state=state,
-            particles=self.particles,
-            masses=self.masses,
+            particles=self.shown,
+            masses=self.shown_masses,
             deformation_gradients=fields.deformation_gradients,
             stresses=fields.stresses,
             energy_densities=fields.energy_densities,

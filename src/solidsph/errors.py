@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from solidsph.simulation import Result
 
 
 class PortableError(Exception):
@@ -115,6 +118,33 @@ class DivergedError(SolidsphError):
             f"the run diverged at step {self.step}, t = {self.time:.6g} s: {self.cause} at "
             f"particle {self.particle}, where J = {self.volume_ratio:.6g}; the record holds "
             f"everything up to there. Try {self.remedy}"
+        )
+
+
+class UnsoundError(SolidsphError):
+    """The energies of a motion do not add up: its result is not to be used.
+
+    Attributes:
+        time: when it began [s].
+        part: the largest energy residual over the energy in play [-].
+        tolerance: the scene's `energy_tolerance` [-].
+        cause: what is likely to have done it.
+        remedy: what to try.
+        result: what the run left behind all the same; None in another process.
+    """
+
+    def __init__(self, *, time: float, part: float, tolerance: float, cause: str, remedy: str):
+        self.time = time
+        self.part = part
+        self.tolerance = tolerance
+        self.cause = cause
+        self.remedy = remedy
+        self.result: Result | None = None
+        super().__init__(
+            f"the energies of the run do not add up: from t = {time:.6g} s on the energy residual "
+            f"is beyond energy_tolerance = {tolerance:g} of the energy in play, and reaches "
+            f"{part:.3g} of it; what was recorded stays readable. Likely cause: {cause}. Remedy: "
+            f"{remedy}"
         )
 
 

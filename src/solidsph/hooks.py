@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from traceback import walk_tb
 from typing import TYPE_CHECKING
 
 import pluggy
@@ -69,6 +70,22 @@ class Moments:
     @specification
     def solidsph_finish(self, simulation: Simulation, outcome: str) -> None:
         """After the last step, or after the run stopped on an error: `outcome` says which."""
+
+
+def heard_by(cause: BaseException, manager: pluggy.PluginManager) -> str:
+    """The installed hook plugin whose code raised, as a message names it; nothing if none did."""
+    points = {point.name: point for point in hook_points()}
+    modules = {
+        getattr(plugin, "__name__", type(plugin).__module__): points[name]
+        for name, plugin in manager.list_name_plugin()
+        if name in points and plugin is not None
+    }
+    for frame, _ in reversed(list(walk_tb(cause.__traceback__))):
+        point = modules.get(frame.f_globals.get("__name__", ""))
+        if point is not None:
+            origin = f"{point.dist.name} {point.dist.version}" if point.dist else "unknown"
+            return f"hook plugin {point.name!r} ({point.value}, from {origin})"
+    return ""
 
 
 def listeners() -> pluggy.PluginManager:

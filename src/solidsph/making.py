@@ -8,7 +8,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph import compatibility, registry
+from solidsph import compatibility, handed_back, registry
+from solidsph.blame import is_foreign
 from solidsph.cover import cover_of
 from solidsph.engines.engine import Engine
 from solidsph.engines.select import engine_named
@@ -49,18 +50,19 @@ class Parts:
 
 
 class Making:
-    """Makes the parts of one scene, and notes what is wrong with them among the `problems`."""
+    """Makes the parts of one scene, and notes what is wrong with them among its `problems`."""
 
-    def __init__(self, scene: Scene, problems: Problems) -> None:
+    def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._problems = problems
         self.labels: set[str] = set()  # of the accounts of boundaries and effects
         self._repeated: dict[str, int] = {}  # how often a label was wanted
         self.used: dict[registry.Entry, None] = {}  # plugins in the order of their use, each once
+        self.foreign: list[tuple[str, Any]] = []  # kind and part, of those that are not our own
+        self.problems = Problems(self.used.keys())
 
     def parts(self) -> Parts:
         """All of them."""
-        scene, problems = self._scene, self._problems
+        scene, problems = self._scene, self.problems
         problems.add(compatibility.numbers(scene))
         problems.add(compatibility.statics(scene))
         problems.add(compatibility.sleep(scene))
@@ -91,7 +93,7 @@ class Making:
         )
 
     def _make(self, kind: str, wanted: PartLike) -> Any:
-        part = self._problems.attempt(construct, kind, wanted)
+        part = self.problems.attempt(construct, kind, wanted)
         if part is not None:
             self._note(kind, part)
         return part
@@ -101,13 +103,16 @@ class Making:
         made: Integrator | None = (
             self._make("integrators", self._scene.integrator or DEFAULT_INTEGRATOR)
             if self._scene.statics is None
-            else self._problems.attempt(construct, "integrators", DEFAULT_INTEGRATOR)
+            else self.problems.attempt(construct, "integrators", DEFAULT_INTEGRATOR)
         )
         return made
 
     def _note(self, kind: str, part: Any) -> None:
         """Remember which plugins a part, and the parts inside it, came from."""
-        self.used[registry.entry_of(kind, part)] = None
+        entry = registry.entry_of(kind, part)
+        self.used[entry] = None
+        if is_foreign(entry):
+            self.foreign.append((kind, part))
         if not attrs.has(type(part)):
             return
         for field in attrs.fields(type(part)):
@@ -125,16 +130,16 @@ class Making:
             if part is None:
                 continue
             if entry.label is not None and not entry.label.strip():
-                self._problems.add(["a label is empty; leave it out, or say what it is of"])
+                self.problems.add(["a label is empty; leave it out, or say what it is of"])
             if len(entry.label or "") > _LONGEST_LABEL:
-                self._problems.add(
+                self.problems.add(
                     [f"a label has {len(entry.label or '')} signs, at most {_LONGEST_LABEL} fit"]
                 )
             label = entry.label or _label(kind, part)[:_LONGEST_LABEL]
             if not label.isprintable():
-                self._problems.add([f"label {label!r} has signs that cannot be shown; use others"])
+                self.problems.add([f"label {label!r} has signs that cannot be shown; use others"])
             if label in self.labels and entry.label:
-                self._problems.add(
+                self.problems.add(
                     [f"two accounts are labelled {label!r}; give each a label of its own"]
                 )
             label = self._free(label)
@@ -172,21 +177,26 @@ class Making:
                     made[name] = discretisation
         if not bodies and self._scene.material is not None:
             self._make("materials", self._scene.material)  # of no use, but it may be wrong too
-        if self._problems.found and not all(
+        if self.problems.found and not all(
             _soon_made(shape, bodies[name].spacing) for name, shape in shapes.items()
         ):
             return shapes, materials, {}
-        found = {
-            name: self._problems.attempt(one.particles, shapes[name], bodies[name].spacing)
-            for name, one in made.items()
-        }
-        sets = {name: own for name, own in found.items() if own is not None}
+        sets: dict[str, Particles] = {}
+        for name, one in made.items():
+            shape = shapes[name]
+            own = self.problems.attempt(one.particles, shape, bodies[name].spacing)
+            if own is None:
+                continue
+            wrong = list(handed_back.particles(one, own, shape.dimension))
+            self.problems.add(wrong)
+            if not wrong:
+                sets[name] = own
         return shapes, materials, sets
 
     def _material(self, name: str, body: BodyScene) -> Material | None:
         wanted = body.material if body.material is not None else self._scene.material
         if wanted is None:
-            self._problems.add(
+            self.problems.add(
                 [f"body {name!r} has no material; give it one, or one to the whole scene"]
             )
             return None

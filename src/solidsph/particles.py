@@ -104,6 +104,19 @@ class Particles:
             cells=_joined([part.cells for part in parts]),
         )
 
+    def read_only(self) -> Particles:
+        """The same particles for those who look at them: the same memory, shut."""
+        return attrs.evolve(
+            self,
+            positions=shut(self.positions),
+            volumes=shut(self.volumes),
+            spacings=shut(self.spacings),
+            area_vectors=shut(self.area_vectors),
+            ghosts=shut(self.ghosts),
+            images=shut(self.images),
+            cells=shut(self.cells),
+        )
+
     def tagged(self, name: str) -> Indices:
         """Indices of the particles in the named set.
 
@@ -179,3 +192,23 @@ class State:
             applied=applied,
             work=work,
         )
+
+
+def read_only(state: State) -> State:
+    """The same state for those who look at it: the same memory, which they cannot write to."""
+    return attrs.evolve(
+        state,
+        positions=shut(state.positions),
+        velocities=shut(state.velocities),
+        accelerations=shut(state.accelerations),
+        memory={name: shut(values) for name, values in state.memory.items()},
+        applied={name: shut(values) for name, values in state.applied.items()},
+        work=dict(state.work),
+    )
+
+
+def shut(values: NDArray[Any]) -> NDArray[Any]:
+    """A view that cannot be written to."""
+    view = values.view()
+    view.flags.writeable = False
+    return view

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import TypeVar
 
+from solidsph.blame import told
 from solidsph.errors import BuildError, PluginError, SolidsphError
+from solidsph.registry import Entry
 
 T = TypeVar("T")
 
@@ -58,8 +60,9 @@ def _shortened(problem: str) -> str:
 class Problems:
     """Collects problems, each with its remedy, until it makes no sense to look further."""
 
-    def __init__(self) -> None:
+    def __init__(self, used: Collection[Entry] = ()) -> None:
         self._found: list[str] = []
+        self._used = used  # plugins that may be at fault; it may grow
 
     @property
     def found(self) -> Sequence[str]:
@@ -84,10 +87,8 @@ class Problems:
             raise
         except Exception as cause:  # a plugin's code may fail in any way
             owner = type(getattr(make, "__self__", make))
-            raise PluginError(
-                f"{owner.__module__}.{owner.__qualname__} failed: {type(cause).__name__}: {cause}; "
-                "this is a fault of that part, which should explain what it was given"
-            ) from cause
+            otherwise = f"{owner.__module__}.{owner.__qualname__}"
+            raise PluginError(told(cause, self._used, otherwise)) from cause
         return None
 
     def stop_if_any(self) -> None:

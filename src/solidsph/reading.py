@@ -43,7 +43,7 @@ _SECTIONS = {
     "sleep": "[sleep]",
     "statics": "[statics]",
 }
-_SCALARS = ("title", "duration", "outputs", "engine", "silence")
+_SCALARS = ("title", "duration", "outputs", "engine", "energy_tolerance", "silence")
 
 
 def text_of(path: Path) -> str:
@@ -129,7 +129,7 @@ def _scene(table: Mapping[str, Any], problems: Problems) -> tuple[Scene, bool]:
         take("outputs", _count, table["outputs"], "outputs")
     if "silence" in table:
         take("silence", _names, table["silence"], "silence")
-    for key in ("material", "formulation"):
+    for key in ("energy_tolerance", "material", "formulation"):
         if key in table:
             values[key] = table[key]
     for key, kind in (("sleep", SleepScene), ("statics", StaticsScene)):

@@ -71,6 +71,9 @@ DEFAULT_INTEGRATOR = "velocity-verlet"
 # No run of more steps ends; a scene that asks for them has its units wrong.
 MOST_STEPS = 1e10
 
+OFF = "off"
+"""The `energy_tolerance` of a scene whose energies nobody is to judge."""
+
 
 @attrs.frozen
 class Scene:
@@ -93,6 +96,7 @@ class Scene:
     time_step: float | None = None  # [s]; overrides the factor
     outputs: int = 200  # recorded states after the first
     engine: str = "auto"
+    energy_tolerance: float | str = 0.01  # energy residual over energy in play, or "off" [-]
     silence: Sequence[str] = ()  # names of warnings that are not to be shown
 
     @classmethod
@@ -132,6 +136,8 @@ def _table(scene: Scene) -> dict[str, Any]:
     if scene.title:
         table["title"] = scene.title
     table |= {"duration": scene.duration, "outputs": scene.outputs, "engine": scene.engine}
+    if scene.energy_tolerance != attrs.fields(Scene).energy_tolerance.default:
+        table["energy_tolerance"] = scene.energy_tolerance
     if scene.silence:
         table["silence"] = list(scene.silence)
     table["body"] = {name: _body_table(body) for name, body in scene.bodies.items()}

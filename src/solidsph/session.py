@@ -8,7 +8,7 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
-from solidsph.errors import BusyError, DivergedError
+from solidsph.errors import BusyError, DivergedError, UnsoundError
 from solidsph.resumption import Resumption
 
 if TYPE_CHECKING:
@@ -16,6 +16,14 @@ if TYPE_CHECKING:
 
 FINISHED, INTERRUPTED = "finished", "interrupted"
 """Outcomes of a run that got to its end, and of one that somebody stopped."""
+
+UNSOUND = "unsound"
+"""How the outcome begins of a run that got to its end with energies that do not add up."""
+
+
+def is_over(outcome: str) -> bool:
+    """Whether a run with this outcome got to its end, sound or not."""
+    return outcome == FINISHED or outcome.startswith(UNSOUND)
 
 
 @contextmanager
@@ -113,5 +121,6 @@ _changing = Lock()
 def _told(cause: BaseException) -> str:
     if isinstance(cause, KeyboardInterrupt):
         return INTERRUPTED
-    kind = "diverged" if isinstance(cause, DivergedError) else type(cause).__name__
+    kinds = {DivergedError: "diverged", UnsoundError: UNSOUND}
+    kind = kinds.get(type(cause), type(cause).__name__)
     return f"{kind}: {cause}"

@@ -12,18 +12,28 @@ import attrs
 import numpy as np
 import pluggy
 
+from solidsph.blame import culprit
 from solidsph.dynamics import Dynamics
 from solidsph.engines.engine import Engine
-from solidsph.errors import BuildError, DivergedError, SceneError
+from solidsph.errors import (
+    BuildError,
+    DivergedError,
+    PluginError,
+    SceneError,
+    SolidsphError,
+    UnsoundError,
+)
+from solidsph.hooks import heard_by
 from solidsph.interfaces.condition import Condition, Observation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.integrator import Integrator
-from solidsph.particles import Particles, State
+from solidsph.particles import Particles, State, read_only
 from solidsph.registry import Entry
 from solidsph.resumption import Resumption
 from solidsph.scene import Scene
 from solidsph.session import session
 from solidsph.setting import Setting
+from solidsph.soundness import Soundness
 from solidsph.time_loop import StepError, TimeLoop
 
 if TYPE_CHECKING:
@@ -80,6 +90,11 @@ class Simulation:
         with np.errstate(all="ignore"):  # as in the steps that follow
             return self.integrator.start(state, self.dynamics, self.step_size)
 
+    @property
+    def compiles_steps(self) -> bool:
+        """Whether whole steps are compiled, as far as the kinds of the parts tell."""
+        return self.dynamics.internal.compiles_steps(self.dynamics, self.integrator)
+
     def time_loop(self) -> TimeLoop:
         """What carries out the steps."""
         if self.scene.sleep is not None:
@@ -113,9 +128,7 @@ class Simulation:
         observers: Sequence[object] = (),
         since: Resumption | None = None,
     ) -> Result:
-        """Advance from the start to the end of the duration.
-
-        This is the motion, also of a scene with [statics]: `solidsph.carry_out` heeds those.
+        """Carry out the scene: find the equilibrium if it has [statics], follow the motion if not.
 
         Args:
             record: HDF5 file to write; the folder is made if it is missing. A record that is there
@@ -125,38 +138,78 @@ class Simulation:
                 finds it.
 
         Raises:
-            DivergedError: the run went wrong; what was recorded before stays readable.
+            DivergedError: the motion went wrong; what was recorded before stays readable.
+            UnsoundError: it got to its end, but its energies do not add up; all is recorded.
+            ConvergenceError: no equilibrium was found.
             BusyError: this simulation is being run already, in another thread.
             RecordError: the record cannot be written, or another run writes it.
         """
+        if self.scene.statics is None:
+            return self.run_motion(record=record, observers=observers, since=since)
+        from solidsph.statics.run import run_statics  # brings the sparse solvers with it
+
+        wanted = self.scene.statics
+        return run_statics(self, wanted, record=record, observers=observers, since=since)
+
+    def run_motion(
+        self,
+        *,
+        record: Path | str | None = None,
+        observers: Sequence[object] = (),
+        since: Resumption | None = None,
+    ) -> Result:
+        """Advance from the start to the end of the duration, also a scene that has [statics].
+
+        Arguments and errors are those of `run`.
+        """
         path = None if record is None else Path(record)
-        hook = self.manager.hook
         begun = clock.perf_counter()
-        with session(self, path, observers, since) as final:
-            loop = self.time_loop()
-            if since is None or since.state is None:
-                state = self.start()
-                hook.solidsph_step_end(simulation=self, observation=self._observe(state))
-            else:
-                state = since.state
-                observation = self._observe(state)
-                hook.solidsph_resume(simulation=self, observation=observation, kept=since.kept)
-            for stop in self.output_steps():
-                if stop <= state.step:
-                    continue
-                try:
-                    state = loop.advance(state, stop)
-                except StepError as failed:
-                    raise self._diverged(failed.state, failed.cause) from failed
-                hook.solidsph_step_end(simulation=self, observation=self._observe(state))
-        return Result(
-            state=state,
-            record=path,
-            seconds=clock.perf_counter() - begun,
-            effort={"steps": self.steps, "step size [s]": self.step_size, **loop.effort},
-            final=final,
-            notes=() if since is None else since.notes,
-        )
+        soundness = Soundness()
+
+        def result() -> Result:
+            return Result(
+                state=state,
+                record=path,
+                seconds=clock.perf_counter() - begun,
+                effort={"steps": state.step, "step size [s]": self.step_size, **loop.effort},
+                final=final,
+                notes=() if since is None else since.notes,
+            )
+
+        hook = self.manager.hook
+        try:
+            with session(self, path, [soundness, *observers], since) as final:
+                loop = self.time_loop()
+                if since is None or since.state is None:
+                    state = self.start()
+                    hook.solidsph_step_end(simulation=self, observation=self._observe(state))
+                else:
+                    state = since.state
+                    observation = self._observe(state)
+                    hook.solidsph_resume(simulation=self, observation=observation, kept=since.kept)
+                for stop in self.output_steps():
+                    if stop <= state.step:
+                        continue
+                    try:
+                        state = loop.advance(state, stop)
+                    except StepError as failed:
+                        raise self._diverged(failed.state, failed.cause) from failed
+                    hook.solidsph_step_end(simulation=self, observation=self._observe(state))
+                soundness.judge(self)
+        except UnsoundError as unsound:
+            unsound.result = result()
+            raise
+        except (SolidsphError, OSError, MemoryError, Warning):
+            raise
+        except Exception as cause:
+            who = culprit(cause, self.parts) or heard_by(cause, self.manager)
+            if not who:
+                raise
+            raise PluginError(
+                f"{who} failed in the run: {type(cause).__name__}: {cause}; this is a fault of "
+                "that part"
+            ) from cause
+        return result()
 
     def output_steps(self) -> tuple[int, ...]:
         """Steps after which the state is observed, evenly spread, the last one among them."""
@@ -173,7 +226,7 @@ class Simulation:
         return tuple(int(step) for step in np.unique(whole) if step <= self.steps)
 
     def _observe(self, state: State) -> Observation:
-        observation = self.dynamics.observe(state)
+        observation = self.dynamics.observe(read_only(state))
         turned = ~(observation.volume_ratios > 0.0) & ~self.particles.ghosts
         if turned.any():
             raise self._diverged(state, "the volume has vanished or turned inside out")

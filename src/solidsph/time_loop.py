@@ -9,10 +9,12 @@ from typing import Any, final
 import attrs
 import numpy as np
 
+from solidsph.blame import described
 from solidsph.dynamics import Dynamics
-from solidsph.errors import BuildError, PortableError
+from solidsph.errors import BuildError, PluginError, PortableError
 from solidsph.interfaces.integrator import Integrator
 from solidsph.particles import State
+from solidsph.registry import entry_of
 
 
 class StepError(PortableError):
@@ -55,13 +57,25 @@ class StepByStep(TimeLoop):
             try:
                 # What overflows or is undefined shows as a value that is not finite, below.
                 with np.errstate(all="ignore"):
-                    state = self.integrator.advance(state, self.dynamics, self.step_size)
+                    after = self.integrator.advance(state, self.dynamics, self.step_size)
             except BuildError as cause:  # a moving neighbourhood may stop determining a gradient
                 raise StepError(state, cause.problems[0]) from cause
+            self._check_progress(state, after)
+            state = after
             # One sum tells whether any entry is not finite, at a fraction of a step's cost.
             if not np.isfinite(state.accelerations.sum()):
                 raise StepError(state, NOT_FINITE)
         return state
+
+    def _check_progress(self, state: State, after: State) -> None:
+        gone = (after.time - state.time) / self.step_size
+        if after.step != state.step + 1 or not 0.999 < gone < 1.001:
+            who = described(entry_of("integrators", self.integrator))
+            raise PluginError(
+                f"{who} made a step from step {state.step}, t = {state.time:.9g} s, to step "
+                f"{after.step}, t = {after.time:.9g} s; a step adds 1 to the count and its size, "
+                f"{self.step_size:.9g} s, to the time"
+            )
 
 
 NOT_FINITE = "the acceleration is not finite"

@@ -130,6 +130,8 @@ class LargeStretch(Case):
             .kernel(self.kernel, cover=_PLAIN_COVER)
             .formulation("total-lagrangian", gradient="standard", divergence="plain")
             .boundary("ghost-extension")
+            # These sums have no energy near the ends: that is what the scene is to show.
+            .energy_tolerance("off")
             .engine(self.engine)
             .scene(),
             **{_strip(held): with_scheme(self._strip(held), self).scene() for held in self.across},

@@ -236,6 +236,8 @@ class TensileInstability(Case):
             # Both forms with the paper's sums; differences keep the updated form's strain
             # independent of where the bar stands.
             .formulation(form, gradient="difference", divergence="plain")
+            # Under tension the updated form has no energy: its instability is what is measured.
+            .energy_tolerance("off" if form == "updated-lagrangian" else 0.01)
             .boundary("prescribed-motion", where="left", displacement={"x": uniform})
             .boundary("prescribed-motion", where="right", displacement={"x": uniform})
             .boundary("ghost-extension")

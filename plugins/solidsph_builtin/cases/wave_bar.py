@@ -254,6 +254,8 @@ class WaveBar(Case):
                 density=DENSITY,
             )
             .formulation("total-lagrangian", gradient="standard", divergence="plain")
+            # The paper's sums have no energy near the ends, and what it shows is the wave.
+            .energy_tolerance("off")
             .boundary("clamp", where="right")
             .boundary(
                 "prescribed-motion", where="left", displacement={"x": self._motion(PAPER, pulse)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -20,6 +20,9 @@ from solidsph.commands.certified import (
 from solidsph.commands.console import say, show_json, show_table
 from solidsph.commands.target import parameters
 from solidsph.errors import SceneError
+
+if TYPE_CHECKING:
+    from solidsph.testing.check import CheckResult
 
 
 @click.command()
@@ -120,6 +123,7 @@ def _conform(name: str, kind: str | None, settings: tuple[str, ...], as_json: bo
                     {
                         "check": result.name,
                         "passed": result.passed,
+                        "checked": result.checked,
                         "measured": result.measured,
                         "required": result.required,
                     }
@@ -131,12 +135,21 @@ def _conform(name: str, kind: str | None, settings: tuple[str, ...], as_json: bo
         show_table(
             f"{registry.singular(found)} {name} ({entry.distribution} {entry.version}): {part}",
             ["check", "", "measured", "required"],
-            [[r.name, "pass" if r.passed else "FAIL", r.measured, r.required] for r in results],
+            [[r.name, _verdict(r), r.measured, r.required] for r in results],
         )
         count = sum(not result.passed for result in results)
         say("certified" if good else f"NOT certified: {count} of {len(results)} checks failed")
+        left = [result.name for result in results if not result.checked]
+        if left:
+            say(f"not checked, since it does not promise them: {', '.join(left)}")
     if not good:
         raise SystemExit(1)
+
+
+def _verdict(result: CheckResult) -> str:
+    if not result.checked:
+        return "not checked"
+    return "pass" if result.passed else "FAIL"
 
 
 def _conform_all(kind: str | None, as_json: bool) -> None:
@@ -154,8 +167,8 @@ def _conform_all(kind: str | None, as_json: bool) -> None:
                     "kind": registry.singular(one),
                     "part": name,
                     "distribution": f"{entry.distribution} {entry.version}",
-                    "passed": len(results) - len(failed),
-                    "checks": len(results),
+                    "passed": sum(result.passed and result.checked for result in results),
+                    "checks": sum(result.checked for result in results),
                     "failed": failed,
                 }
             )

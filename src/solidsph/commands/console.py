@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from math import isfinite
 from typing import IO, TYPE_CHECKING, Any
 
+import click
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -68,6 +69,13 @@ def show_json(data: Mapping[str, Any]) -> None:
         sys.stdout.flush()
     except BrokenPipeError:
         _stop_writing(sys.stdout)
+
+
+def facts() -> dict[str, Any]:
+    """What the object of --json holds whatever the outcome; a verb enters what it knows so far."""
+    context = click.get_current_context(silent=True)
+    found: dict[str, Any] = {} if context is None else context.ensure_object(dict)
+    return found
 
 
 @contextmanager

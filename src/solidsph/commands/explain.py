@@ -15,7 +15,6 @@ from solidsph.commands.console import say, show_json, show_table
 from solidsph.commands.target import parameters, resolve
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.cluster import Cluster
-from solidsph.costs.counted import compiles_steps
 from solidsph.costs.estimated import estimated
 from solidsph.costs.foreseen import foreseen
 from solidsph.costs.model import Prediction, predicted
@@ -312,7 +311,7 @@ def _of_statics(simulation: Simulation) -> list[tuple[str, Any, str]]:
 
 
 def _loop(simulation: Simulation) -> tuple[str, str, str]:
-    if compiles_steps(simulation):
+    if simulation.compiles_steps:
         return ("time loop", "compiled", "whole steps together: all parts are of declared kinds")
     return ("time loop", "step by step", "each step by the parts themselves, which fits all")
 

@@ -10,6 +10,8 @@ import click
 from solidsph.commands.console import ProgressObserver, progress, say, show_json
 from solidsph.errors import RecordError
 from solidsph.results.layout import RECORD_SUFFIXES
+from solidsph.results.record import Record
+from solidsph.session import UNSOUND
 
 if TYPE_CHECKING:
     from solidsph.results.resume import Pending
@@ -31,17 +33,25 @@ def resume(result: Path, until: float | None, force: bool, as_json: bool, quiet:
     for path in _records(result):
         found = pending(path, until=until, force=force)
         if found is None:
-            facts.append({"record": str(path), "outcome": "finished before"})
+            facts.append({"record": str(path), "outcome": f"{_outcome(path)} before"})
             if not as_json:
-                say(f"{path} is finished; --until T extends it")
+                say(f"{path} is {_outcome(path)}; --until T extends it")
             continue
         facts.append(_carried_out(found, shown=not (as_json or quiet)))
         if not as_json:
             since = facts[-1]["from [s]"]
             anew = "" if found.since.state is not None else ", without a checkpoint"
             say(f"{path} is finished now; it went on from t = {since:.6g} s{anew}")
+    unsound = any(one["outcome"].startswith(UNSOUND) for one in facts)
     if as_json:
-        show_json({"runs": facts})
+        show_json({"runs": facts, "exit code": int(unsound)})
+    if unsound:
+        raise SystemExit(1)
+
+
+def _outcome(path: Path) -> str:
+    with Record(path) as record:
+        return record.outcome.partition(":")[0]
 
 
 def _records(result: Path) -> list[Path]:

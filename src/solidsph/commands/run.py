@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,9 +10,17 @@ import attrs
 import click
 from rich.markup import escape
 
-from solidsph.commands.console import ProgressObserver, err, progress, say, show_json, show_table
+from solidsph.commands.console import (
+    ProgressObserver,
+    err,
+    facts,
+    progress,
+    say,
+    show_json,
+    show_table,
+)
 from solidsph.commands.target import name_of, resolve
-from solidsph.errors import SceneError
+from solidsph.errors import SceneError, UnsoundError
 from solidsph.interfaces.case import Case, Measurement
 from solidsph.results.layout import RECORD_SUFFIXES
 from solidsph.scene import Scene
@@ -42,14 +50,18 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path, dir_okay=False),
     help="Write the scene to this file instead of running it.",
 )
-@click.option("--watch", is_flag=True, help="Look for signs of failure at every output.")
+@click.option(
+    "--watch/--no-watch",
+    default=None,
+    help="Look for signs of failure at outputs: a scene is watched unless it is not to be.",
+)
 @click.option(
     "--roll-back",
     "roll_backs",
     type=click.IntRange(min=0),
     default=0,
     metavar="N",
-    help="With --watch: go back to the last sound output and halve the step, up to N times.",
+    help="On a failure: go back to the last sound output and halve the step, up to N times.",
 )
 @click.option(
     "--receipts",
@@ -78,7 +90,7 @@ def run(
     output: Path | None,
     overwrite: bool,
     write: Path | None,
-    watch: bool,
+    watch: bool | None,
     roll_backs: int,
     receipts: bool,
     receipts_of: tuple[str, ...],
@@ -89,7 +101,7 @@ def run(
     """Run a scene file, a scene from the standard input (-) or a case, and record it."""
     wanted = resolve(target, settings)
     if write is not None:
-        _write(wanted, write)
+        _write(wanted, write, as_json=as_json)
         return
     folder = output or Path("results") / name_of(target)
     shown = not (as_json or quiet)
@@ -114,12 +126,12 @@ def run(
             target, wanted, folder, wanted_receipts, ahead=ahead, shown=shown, as_json=as_json
         )
         return
-    if roll_backs and not watch:
+    if roll_backs and watch is False:
         raise SceneError("--roll-back needs --watch, which finds the last sound output")
-    if watch and wanted.statics is not None:
+    if (watch or roll_backs) and wanted.statics is not None:
         raise SceneError("--watch is for motions; an equilibrium is tested by itself")
     ahead(wanted)
-    watched = roll_backs if watch else None
+    watched = None if watch is False or wanted.statics is not None else roll_backs
     path = folder if folder.suffix in RECORD_SUFFIXES else folder / "record.h5"
     _make_way(path, overwrite=overwrite)
     _run_scene(target, wanted, path, wanted_receipts, watched=watched, shown=shown, as_json=as_json)
@@ -146,13 +158,19 @@ def _unchecked(scene: Scene) -> None:
     pass
 
 
-def _write(wanted: Scene | Case, path: Path) -> None:
+def _write(wanted: Scene | Case, path: Path, *, as_json: bool) -> None:
+    written: list[str] = []
     scenes = wanted.scenes() if isinstance(wanted, Case) else {"": wanted}
     for name, scene in scenes.items():
         own = path if len(scenes) == 1 else path.with_stem(f"{path.stem}-{name}")
         own.parent.mkdir(parents=True, exist_ok=True)
         own.write_text(scene.to_toml(), encoding="utf-8")
-        say(f"wrote {own}")
+        written.append(str(own))
+    if as_json:
+        show_json({"outcome": "written", "exit code": 0, "files": written})
+        return
+    for file in written:
+        say(f"wrote {file}")
 
 
 def _run_scene(
@@ -166,32 +184,42 @@ def _run_scene(
     as_json: bool,
 ) -> None:
     from solidsph.advice import advised
-    from solidsph.carry_out import carry_out
     from solidsph.commands import prediction as told
     from solidsph.commands.receipted import of_scene, show_receipts
     from solidsph.commands.warned import warn
     from solidsph.costs.process import peak_memory
 
+    known = facts()
+    known |= {"scene": target, "record": str(path), "warnings": []}
     simulation, build = told.built(scene)
     advice = advised(simulation)
+    known["warnings"] += [one.line for one in advice]
     if not as_json:
         warn({"": advice})
     prediction = told.of_run(simulation, build)
     if shown and prediction is not None and prediction.seconds > told.LONG:
         say(told.announcement(prediction))
+    unsound: UnsoundError | None = None
     with progress(shown) as display:
         observers = [ProgressObserver(display, name_of(target), simulation)] if display else []
-        if watched is None:
-            result = carry_out(simulation, record=path, observers=observers)
-        else:
-            from solidsph.watch import run_watched
+        try:
+            if watched is None:
+                result = simulation.run(record=path, observers=observers)
+            else:
+                from solidsph.watch import run_watched
 
-            result = run_watched(
-                simulation, record=path, roll_backs=watched, observers=observers, told=_Once()
-            )
+                heard = _Once(known["warnings"])
+                result = run_watched(
+                    simulation, record=path, roll_backs=watched, observers=observers, told=heard
+                )
+        except UnsoundError as cause:
+            # What it came to is shown, and then that it is not to be used.
+            if cause.result is None:
+                raise
+            unsound, result = cause, cause.result
     history, notes = result.final, result.notes  # not from the file, which others may replace
     memory = peak_memory()
-    facts: dict[str, Any] = {
+    effort: dict[str, Any] = {
         "particles": simulation.particles.count,
         "pairs": simulation.dynamics.internal.pair_count,
         **({} if prediction is None else told.work_done(prediction.work, result.effort)),
@@ -202,38 +230,49 @@ def _run_scene(
         **told.scored(prediction, result.seconds, memory),
     }
     found = None if receipts_of is None else of_scene(simulation, result.state, receipts_of)
-    if as_json:
-        noted = {"notes": list(notes)} if notes else {}
-        warned = {"warnings": [one.line for one in advice]} if advice else {}
-        receipted = {} if found is None else {"receipts": attrs.asdict(found)}
-        named = {"scene": target, "record": str(path)}
-        show_json({**named, **facts, **warned, **noted, "final": history, **receipted})
+    known |= {**effort, "notes": list(notes), "final": history}
+    known |= {} if found is None else {"receipts": attrs.asdict(found)}
+    if unsound is None and as_json:
+        show_json({**known, "outcome": "finished", "exit code": 0})
         return
-    show_table(target, ["", "value"], [[key, value] for key, value in facts.items()])
+    if not as_json:
+        _show_scene(target, path, effort, history, notes)
+        if found is not None:
+            show_receipts(found, receipts_of or ())
+    if unsound is not None:
+        raise unsound
+
+
+def _show_scene(
+    target: str,
+    path: Path,
+    effort: Mapping[str, Any],
+    history: Mapping[str, float],
+    notes: Sequence[str],
+) -> None:
+    show_table(target, ["", "value"], [[key, value] for key, value in effort.items()])
     show_table("at the end", ["quantity", "value"], [[k, v] for k, v in history.items()])
     for note in notes:
         say(f"note: {note}")
-    if found is not None:
-        show_receipts(found, receipts_of or ())
     say(f"record: {path} (ParaView opens it; so does: solidsph plot {path})")
 
 
 class _Once:
     """Tells what a watchdog finds, the first time of each remedy."""
 
-    def __init__(self) -> None:
+    def __init__(self, warnings: list[str]) -> None:
         self._told: set[str] = set()
+        self._warnings = warnings  # to which it is added
 
     def __call__(self, time: float, finding: Finding) -> None:
         if finding.remedy not in self._told:
             self._told.add(finding.remedy)
-            err.print(
-                escape(
-                    f"watchdog, {finding.grade.value} at t = {time:.6g} s: {finding.cause} at "
-                    f"particle {finding.particle}; try {finding.remedy}"
-                ),
-                soft_wrap=True,
+            text = (
+                f"watchdog, {finding.grade.value} at t = {time:.6g} s: {finding.cause} at "
+                f"particle {finding.particle}; try {finding.remedy}"
             )
+            self._warnings.append(text)
+            err.print(escape(text), soft_wrap=True)
 
 
 def _run_case(
@@ -252,6 +291,8 @@ def _run_case(
     from solidsph.commands.warned import warn
     from solidsph.studies.case_run import run_case
 
+    known = facts()
+    known |= {"case": target, "warnings": {}}
     advice: dict[str, Sequence[Advice]] = {}
     case_predictions: dict[str, Prediction | None] = {}
     compiled: set[Compilation] = set()
@@ -262,6 +303,8 @@ def _run_case(
             compiled.update(told.compilations(case_predictions[name]))
             before = {one.name for several in advice.values() for one in several}
             advice[name] = advised(simulation)
+            if advice[name]:
+                known["warnings"][name] = [one.line for one in advice[name]]
             if not as_json:  # each warning once a case, at the first scene that it is about
                 warn({name: [one for one in advice[name] if one.name not in before]})
             return [ProgressObserver(display, name, simulation)] if display else []
@@ -272,10 +315,11 @@ def _run_case(
     if as_json:
         show_json(
             {
-                "case": target,
+                **known,
+                "outcome": "as predicted" if result.passed else "not as predicted",
+                "exit code": 0 if result.passed else 1,
                 "passed": result.passed,
                 "peak memory [bytes]": result.peak_memory,
-                "warnings": {name: [one.line for one in a] for name, a in advice.items() if a},
                 "predicted": told.sums(result.runs, predictions),
                 "measurements": [_row(m) for m in result.measurements],
                 "runs": [

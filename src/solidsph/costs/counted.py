@@ -20,14 +20,10 @@ from solidsph.interfaces.condition import (
     StressCondition,
 )
 from solidsph.interfaces.declared import (
-    LinearExtension,
     MismatchForce,
     PairForce,
     PointwiseForce,
-    ScheduledForce,
-    ScheduledMotion,
 )
-from solidsph.interfaces.integrator import PointwiseIntegrator
 from solidsph.mismatch import MismatchOperator, MismatchProducts
 from solidsph.scene import StaticsScene
 from solidsph.simulation import Simulation
@@ -44,7 +40,7 @@ def counted(simulation: Simulation) -> Work:
     """The work of a run of `simulation`, without running it."""
     particles, internal = simulation.particles, simulation.dynamics.internal
     d, n = particles.dimension, particles.count
-    compiled = compiles_steps(simulation)
+    compiled = simulation.compiles_steps
     statics = simulation.scene.statics
     tally = (*internal.tally, *_of_loads(simulation, compiled=compiled))
     if statics is not None:
@@ -83,24 +79,6 @@ def record_bytes(particles: int, dimension: int, outputs: int, fields: int = 0) 
     # Reference data: four vectors, three numbers, two small ones and the grid of single points.
     constant = 3 * 3 + 3 + 1 + 2
     return 8 * particles * (evolving + constant)
-
-
-def compiles_steps(simulation: Simulation) -> bool:
-    """Whether whole steps are compiled: all parts are of declared kinds, as far as types tell."""
-    dynamics, tally = simulation.dynamics, simulation.dynamics.internal.tally
-    stresses = [c for c in simulation.conditions if isinstance(c, StressCondition)]
-    return (
-        all(part.way in _COMPILED for part in tally)
-        and isinstance(simulation.integrator, PointwiseIntegrator)
-        and all(isinstance(load, DECLARED_LOADS) for load in dynamics.loads)
-        and all(isinstance(one, (ScheduledMotion, LinearExtension)) for one in dynamics.motions)
-        and all(isinstance(one, LinearExtension) for one in stresses)
-        and (not stresses or len(simulation.setting.bodies) == 1)
-    )
-
-
-DECLARED_LOADS = (ScheduledForce, PointwiseForce, PairForce, MismatchForce)
-"""Kinds of load that loops can be compiled of, and whose costs are known by count."""
 
 
 def _of_loads(simulation: Simulation, *, compiled: bool) -> Iterator[Tally]:

@@ -9,9 +9,9 @@ from functools import partial
 import attrs
 import numpy as np
 
-from solidsph.costs.counted import DECLARED_LOADS
 from solidsph.costs.work import Loop, Work
 from solidsph.engines.tally import Way
+from solidsph.interfaces.declared import DECLARED_LOADS
 from solidsph.simulation import Simulation
 
 _COMPILED = (Way.STENCILS, Way.ROWS)

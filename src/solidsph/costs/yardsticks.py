@@ -10,9 +10,6 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 # What a run imports, and nothing but it before the memory is looked at.
-import solidsph.carry_out
-import solidsph.commands.run
-import solidsph.results.recorder  # noqa: F401
 from solidsph.costs.calibration import Calibration, best
 from solidsph.costs.process import peak_memory
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar
@@ -115,9 +116,21 @@ class InternalForces(ABC):
         return (Tally(Way.UNKNOWN, self.pair_count, 0, own, own),)
 
     @property
+    def precision(self) -> float:
+        """Of the numbers that forces are sums of: the least that makes a difference beside 1."""
+        return sys.float_info.epsilon
+
+    @property
     def bytes(self) -> int:
         """Memory of the arrays kept between evaluations."""
         return sum(part.held for part in self.tally)
+
+    def compiles_steps(self, dynamics: Dynamics, integrator: Integrator) -> bool:
+        """Whether the time loop compiles whole steps, as far as the kinds of the parts tell.
+
+        Nothing is compiled to say so; costs, `explain` and the time loop all ask here.
+        """
+        return False
 
     def time_loop(self, dynamics: Dynamics, integrator: Integrator, step_size: float) -> TimeLoop:
         """How steps under these forces are carried out; an engine may have a way of its own."""

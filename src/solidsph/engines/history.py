@@ -102,6 +102,10 @@ class HistoryForces(InternalForces):
     def tally(self) -> Sequence[Tally]:
         return self.sums.tally
 
+    @property
+    def precision(self) -> float:
+        return self.sums.precision
+
     def forces(self, time: float, displacements: Array) -> Array:
         return self.advance(time, 0.0, displacements, {})[0]
 

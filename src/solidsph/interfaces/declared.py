@@ -222,3 +222,7 @@ class MismatchForce(ForceCondition):
     def stiffness(self, displacements: Array, time: float) -> csr_array:
         """Minus the derivative of the force, (d n, d n), particle by particle."""
         return csr_array(kron(self.matrix, np.eye(displacements.shape[1]), format="csr"))
+
+
+DECLARED_LOADS = (ScheduledForce, PointwiseForce, PairForce, MismatchForce)
+"""Kinds of load that loops can be compiled of, and whose costs are known by count."""

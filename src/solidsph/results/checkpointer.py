@@ -16,6 +16,7 @@ from solidsph.particles import State
 from solidsph.results.checkpoint import Checkpoint, checkpoint_path, write_checkpoint
 from solidsph.results.circumstances import circumstances
 from solidsph.results.recorder import scene_text
+from solidsph.session import is_over
 
 if TYPE_CHECKING:
     from solidsph.arrays import Array
@@ -74,7 +75,7 @@ class Checkpointer:
         try:
             self._write(simulation)
         except RecordError:
-            if outcome == "finished":
+            if is_over(outcome):
                 raise
             # Otherwise what stopped the run is what is to be told.
 

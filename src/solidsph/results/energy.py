@@ -38,6 +38,17 @@ def dissipated_energy(observation: Observation) -> float | None:
     return None if lost is None else float(observation.particles.volumes @ lost)
 
 
+def total_energy(observation: Observation) -> float:
+    """Of the bodies: kinetic, strain, and what their materials have dissipated so far [J]."""
+    lost = dissipated_energy(observation) or 0.0
+    return kinetic_energy(observation) + strain_energy(observation) + lost
+
+
+def residual(observation: Observation, initial: float) -> float:
+    """What no account explains of the change since the start, where there was `initial` [J]."""
+    return total_energy(observation) - initial - sum(observation.state.work.values())
+
+
 def ledger(
     observation: Observation, initial: float, conditions: Sequence[Condition] = ()
 ) -> Mapping[str, float]:
@@ -53,7 +64,7 @@ def ledger(
         STRAIN: strain,
         **({} if lost is None else {DISSIPATED: lost}),
         **{f"work of {name} [J]": value for name, value in work.items()},
-        RESIDUAL: kinetic + strain + (lost or 0.0) - initial - sum(work.values()),
+        RESIDUAL: residual(observation, initial),
         **_by_body(observation, conditions),
     }
 

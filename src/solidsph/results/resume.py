@@ -9,7 +9,6 @@ from pathlib import Path
 import attrs
 
 from solidsph.builder import Builder
-from solidsph.carry_out import carry_out
 from solidsph.errors import RecordError
 from solidsph.files import relative_to
 from solidsph.results.checkpoint import Checkpoint, checkpoint_path, read_checkpoint
@@ -20,7 +19,7 @@ from solidsph.results.same import check_same_output, check_same_particles
 from solidsph.results.sole_writer import check_no_writer
 from solidsph.resumption import Resumption
 from solidsph.scene import MOST_STEPS, Scene
-from solidsph.session import FINISHED
+from solidsph.session import is_over
 from solidsph.simulation import Result, Simulation
 
 # Of a step: an end that is missed by less is met.
@@ -37,7 +36,7 @@ class Pending:
 
     def carry_out(self, observers: Sequence[object] = ()) -> Result:
         """Go on to the end; the record is then what one run without a break would have left."""
-        return carry_out(self.simulation, record=self.path, observers=observers, since=self.since)
+        return self.simulation.run(record=self.path, observers=observers, since=self.since)
 
 
 def resume(
@@ -66,7 +65,7 @@ def resume(
     """
     found = pending(Path(path), simulation=simulation, until=until, force=force)
     if found is None:
-        raise RecordError(f"the run in {path} is finished; give `until` to extend it")
+        raise RecordError(f"the run in {path} is over; give `until` to extend it")
     return found.carry_out(observers)
 
 
@@ -77,10 +76,10 @@ def pending(
     until: float | None = None,
     force: bool = False,
 ) -> Pending | None:
-    """As `resume`, but only made ready; None if the run is finished."""
+    """As `resume`, but only made ready; None if the run is over."""
     check_no_writer(path)
     with Record(path) as record, relative_to(Path(record.folder) if record.folder else None):
-        if record.outcome == FINISHED and until is None:
+        if is_over(record.outcome) and until is None:
             return None
         checkpoint = _checkpoint(record)
         if simulation is not None and scene_text(simulation) != record.scene:

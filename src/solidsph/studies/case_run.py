@@ -12,10 +12,9 @@ import attrs
 import numpy as np
 
 from solidsph.builder import Builder
-from solidsph.carry_out import carry_out
 from solidsph.costs.counted import counted
 from solidsph.costs.process import peak_memory
-from solidsph.errors import ConvergenceError, DivergedError
+from solidsph.errors import ConvergenceError, DivergedError, UnsoundError
 from solidsph.interfaces.case import Case, Curves, Measurement
 from solidsph.results.record import Record
 from solidsph.results.sole_writer import sole_writer
@@ -103,8 +102,8 @@ def run_scenes(
 ) -> Sequence[SceneRun]:
     """Run every scene of `case` and record it in `folder`.
 
-    A scene that diverges, or finds no equilibrium, does not end the case: what it recorded is
-    measured, because for some combinations of parts to diverge is the result.
+    A scene that diverges, is unsound or finds no equilibrium does not end the case: what it
+    recorded is measured, because for some combinations of parts to diverge is the result.
     """
     runs = []
     for name, scene in case.scenes().items():
@@ -115,8 +114,8 @@ def run_scenes(
         effort: Mapping[str, Any] = {}
         observers = begin(name, simulation)
         try:
-            effort = carry_out(simulation, record=path, observers=observers).effort
-        except (DivergedError, ConvergenceError) as cause:
+            effort = simulation.run(record=path, observers=observers).effort
+        except (DivergedError, UnsoundError, ConvergenceError) as cause:
             if not path.exists():  # it failed before there was anything to measure
                 raise
             outcome = _told(cause)
@@ -155,7 +154,9 @@ def _written(path: Path, curves: Curves) -> Path:
     return path
 
 
-def _told(cause: DivergedError | ConvergenceError) -> str:
+def _told(cause: DivergedError | UnsoundError | ConvergenceError) -> str:
+    if isinstance(cause, UnsoundError):
+        return f"unsound: {cause}"
     if isinstance(cause, DivergedError):
         return f"diverged at step {cause.step}: {cause.cause}"
     return f"no equilibrium beyond load factor {cause.load_factor:g}: {cause.cause}"

@@ -20,9 +20,8 @@ import numpy as np
 
 from solidsph.arrays import Array
 from solidsph.builder import Builder
-from solidsph.carry_out import carry_out
 from solidsph.costs.shares import without
-from solidsph.errors import BuildError, ConvergenceError, DivergedError, SceneError
+from solidsph.errors import BuildError, ConvergenceError, DivergedError, SceneError, UnsoundError
 from solidsph.interfaces.case import Case
 from solidsph.interfaces.shape import Shape
 from solidsph.particles import State
@@ -257,9 +256,11 @@ def _coarsening(scene: Scene, small: Scene) -> float:
 def _carried_out(simulation: Simulation, path: Path, of: Sequence[str]) -> _Run:
     outcome = FINISHED
     try:
-        carry_out(simulation, record=path)
+        simulation.run(record=path)
     except DivergedError as cause:
         outcome = f"diverges at t = {cause.time:.3g} s: {cause.cause}"
+    except UnsoundError as cause:
+        outcome = f"is unsound: its energies miss by {cause.part:.3g}"
     except ConvergenceError as cause:
         outcome = f"finds no equilibrium beyond load factor {cause.load_factor:g}"
     if not path.exists():

@@ -20,6 +20,7 @@ from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.condition import (
     Condition,
     ExtensionCondition,
+    FieldCondition,
     ForceCondition,
     MotionCondition,
     Observation,
@@ -27,7 +28,8 @@ from solidsph.interfaces.condition import (
 )
 from solidsph.results.energy import kinetic_energy, ledger, strain_energy
 from solidsph.simulation import Simulation
-from solidsph.testing.check import Check, Verdict, at_most, check, not_promised
+from solidsph.testing.check import Check, Verdict, at_most, check, not_promised, worst
+from solidsph.testing.derived import overridden
 from solidsph.testing.samples import DIMENSIONS, made_once
 
 _LABEL = "handler"
@@ -272,6 +274,22 @@ def report(handler: BoundaryHandler) -> Verdict:
 
 
 @check
+def fields(handler: BoundaryHandler) -> Verdict:
+    """Fields that it shows are finite numbers, vectors or tensors of all particles, "quantity
+    [unit]", the same ones at all times."""
+    return worst([field_verdict(one.simulation, one.conditions) for one in _samples(handler)])
+
+
+@check
+def derived(handler: BoundaryHandler) -> Verdict:
+    """What a declared kind derives from its arrays and its formula is not said otherwise by a
+    method, which a compiled loop does not call."""
+    problems = [overridden(one) for sample in _samples(handler) for one in sample.conditions]
+    problem = next(filter(None, problems), "")
+    return Verdict(not problem, problem or "nothing is overridden")
+
+
+@check
 def energy_account(handler: BoundaryHandler) -> Verdict:
     """What the body gains is the work of the handler's account, where forces have an energy."""
     errors = [residual(sample.simulation) for sample in _samples(handler) if sample.adjoint]
@@ -290,6 +308,8 @@ CHECKS: tuple[Check, ...] = (
     stresses,
     forces,
     report,
+    fields,
+    derived,
     energy_account,
 )
 
@@ -349,6 +369,26 @@ def force_problem(simulation: Simulation, condition: ForceCondition, u: Array) -
         "the same question got another answer": not np.array_equal(f, again),
     }
     return "; ".join(problem for problem, present in problems.items() if present)
+
+
+def field_verdict(simulation: Simulation, conditions: Sequence[Condition]) -> Verdict:
+    """Whether the fields of `conditions` are such as a record can hold."""
+    shown = [one for one in conditions if isinstance(one, FieldCondition)]
+    if not shown:
+        return not_promised("it shows no field")
+    n, d = simulation.particles.positions.shape
+    names: list[set[str]] = []
+    for observation in _observed(simulation):
+        found = {name: a for one in shown for name, a in one.fields(observation).items()}
+        for name, values in found.items():
+            if not (name.endswith("]") and " [" in name):
+                return Verdict(False, f"field {name!r}")
+            if np.shape(values) not in ((n,), (n, d), (n, d, d)) or not np.all(np.isfinite(values)):
+                return Verdict(False, f"{name} {np.shape(values)} of {n} particles, or not finite")
+        names.append(set(found))
+    if any(one != names[0] for one in names):
+        return Verdict(False, f"{sorted(names[0])}, then others")
+    return Verdict(True, ", ".join(sorted(names[0])) or "none")
 
 
 def report_problem(label: str, reports: Sequence[Any]) -> str:

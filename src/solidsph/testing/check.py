@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from functools import wraps
 from inspect import getdoc
 from typing import Any, TypeAlias, TypeVar
 
 import attrs
+
+from solidsph.first_use import PartWarning
 
 Part = TypeVar("Part")
 
@@ -20,6 +23,7 @@ class CheckResult:
     passed: bool
     measured: str
     required: str
+    checked: bool = True  # False: the part does not promise it, and nothing was asked of it
 
 
 Check: TypeAlias = Callable[[Any], CheckResult]
@@ -32,6 +36,7 @@ class Verdict:
 
     passed: bool
     measured: str
+    checked: bool = True
 
 
 def check(measure: Callable[[Part], Verdict]) -> Callable[[Part], CheckResult]:
@@ -45,10 +50,13 @@ def check(measure: Callable[[Part], Verdict]) -> Callable[[Part], CheckResult]:
     @wraps(measure)
     def checked(part: Part) -> CheckResult:
         try:
-            verdict = measure(part)
+            with warnings.catch_warnings():
+                # What the first use of a part asks, the kit asks too, and tells as a result.
+                warnings.simplefilter("ignore", PartWarning)
+                verdict = measure(part)
         except Exception as cause:
             verdict = Verdict(False, f"{type(cause).__name__}: {cause}")
-        return CheckResult(name, verdict.passed, verdict.measured, required)
+        return CheckResult(name, verdict.passed, verdict.measured, required, verdict.checked)
 
     return checked
 
@@ -64,8 +72,8 @@ def more_than(value: float, limit: float) -> Verdict:
 
 
 def not_promised(reason: str) -> Verdict:
-    """Passed: the part declares that it does not promise this."""
-    return Verdict(True, f"not promised: {reason}")
+    """Not failed, and not checked: the part declares that it does not promise this."""
+    return Verdict(True, f"not promised: {reason}", checked=False)
 
 
 def worst(verdicts: list[Verdict]) -> Verdict:

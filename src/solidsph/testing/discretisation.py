@@ -15,10 +15,13 @@ from scipy.spatial import cKDTree
 from solidsph.arrays import Array
 from solidsph.errors import SceneError
 from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.shape import Shape
+from solidsph.neighbours import neighbour_pairs
 from solidsph.particles import Particles
 from solidsph.parts import construct
-from solidsph.testing.check import Check, Verdict, at_most, check
+from solidsph.smoothing import smoothing_kernel
+from solidsph.testing.check import Check, Verdict, at_most, check, not_promised
 from solidsph.testing.samples import made_once
 
 SPACING = 0.1  # [m]
@@ -45,6 +48,9 @@ _AREAS = 1e-10
 
 # So far outside, in spacings, a particle is still on the boundary.
 _ON_BOUNDARY = 1e-6
+
+# Of the sums [spacings], so small that some supports are whole.
+_COVER = 2.2
 
 
 @attrs.frozen(eq=False)
@@ -108,6 +114,9 @@ def arrays(discretisation: Discretisation) -> Verdict:
         real = ~p.ghosts
         if not real.any() or min(p.volumes[real].min(), p.spacings.min()) <= 0.0:
             return Verdict(False, f"{sample.name}: least volume {p.volumes.min():.1e}")
+        off = np.abs(p.spacings / SPACING - 1.0).max()
+        if off > 0.5:
+            return Verdict(False, f"{sample.name}: spacings are off the asked one by {off:.0%}")
     return Verdict(True, "one finite row each, positive")
 
 
@@ -121,6 +130,39 @@ def volumes(discretisation: Discretisation) -> Verdict:
             total = sample.particles.volumes[~sample.particles.ghosts].sum()
             errors.append(abs(float(total) / known - 1.0))
     return at_most(max(errors), _ROUNDING)
+
+
+@check
+def middle(discretisation: Discretisation) -> Verdict:
+    """Volumes are where the body is: their centre of mass is the shape's, within a tenth of a
+    spacing."""
+    errors = []
+    for sample in _samples(discretisation):
+        p, surface = sample.particles, sample.shape.surface(0.2 * SPACING)
+        # The integral of x_i over the shape, by the divergence theorem, is that of x_i^2 n_i / 2.
+        first = 0.5 * np.sum(surface.points**2 * surface.area_vectors, axis=0)
+        flux = np.vdot(surface.points, surface.area_vectors) / sample.shape.dimension
+        real = ~p.ghosts
+        found = p.volumes[real] @ p.positions[real] / p.volumes[real].sum()
+        errors.append(float(np.abs(found - first / flux).max()) / SPACING)
+    return at_most(max(errors), 0.1)
+
+
+@check
+def sums(discretisation: Discretisation) -> Verdict:
+    """The weights in sums make the kernel's mass where supports are whole: 1 on the mean, within a
+    tenth."""
+    kernel: Kernel = construct("kernels", "modified-mollifier")
+    errors = []
+    for sample in _samples(discretisation):
+        p, radius = sample.particles, _COVER * SPACING
+        pairs = neighbour_pairs(p.positions, radius)
+        W = smoothing_kernel(kernel, p.dimension, radius)
+        found = pairs.row_sums(W.value(pairs.distances) * p.cells[pairs.columns])
+        deep = sample.shape.signed_distance(p.positions) < -radius
+        whole = found[deep & ~p.ghosts]
+        errors += [abs(float(whole.mean()) - 1.0)] if len(whole) else []
+    return at_most(max(errors), 0.1) if errors else not_promised("no support is whole")
 
 
 @check
@@ -220,6 +262,8 @@ CHECKS: tuple[Check, ...] = (
     represents_a_shape,
     arrays,
     volumes,
+    middle,
+    sums,
     inside,
     spacing,
     closed_surface,

@@ -17,14 +17,16 @@ from solidsph.arrays import Array
 from solidsph.builder import Builder
 from solidsph.engines.engine import InternalForces
 from solidsph.errors import BuildError, SceneError
-from solidsph.interfaces.condition import ForceCondition
+from solidsph.interfaces.condition import ForceCondition, Observation, StoringCondition
 from solidsph.interfaces.effect import Effect
 from solidsph.simulation import Simulation
-from solidsph.testing.boundary import force_problem, report_problem, residual
-from solidsph.testing.check import Check, Verdict, at_most, check, more_than, not_promised
+from solidsph.testing.boundary import field_verdict, force_problem, report_problem, residual
+from solidsph.testing.check import Check, Verdict, at_most, check, more_than, not_promised, worst
+from solidsph.testing.derived import overridden
 from solidsph.testing.samples import DIMENSIONS, made_once
 
 _LABEL = "effect"
+_ENERGY = f"{_LABEL} energy [J]"
 _CELLS = {1: (12,), 2: (7, 6), 3: (4, 4, 3)}
 _SPACING = 0.1  # [m]
 _COVER = 2.5
@@ -232,7 +234,8 @@ def energy_account(effect: Effect) -> Verdict:
 
 @check
 def stored_energy(effect: Effect) -> Verdict:
-    """An energy that it reports is what its force derives from; what it damps, it only takes."""
+    """An energy that it stores, or reports, is what its force derives from; what it damps, it only
+    takes."""
     told: list[str] = []
     for sample in _samples(effect):
         simulation = sample.simulation
@@ -244,6 +247,9 @@ def stored_energy(effect: Effect) -> Verdict:
                 return Verdict(False, f"it damps, but gives {power:.1e} W")
             told.append("takes energy")
         u = sample.smooth()
+        problem = _energy_problem(sample, u)
+        if problem:
+            return Verdict(False, problem)
         if _energy(sample, u) is None:
             continue
         du = sample.smooth()
@@ -306,6 +312,21 @@ def nothing_when_absent(effect: Effect) -> Verdict:
     return Verdict(True, "the same bits, no account")
 
 
+@check
+def fields(effect: Effect) -> Verdict:
+    """Fields that it shows are finite numbers, vectors or tensors of all particles, "quantity
+    [unit]", the same ones at all times."""
+    return worst([field_verdict(one.simulation, [one.condition]) for one in _samples(effect)])
+
+
+@check
+def derived(effect: Effect) -> Verdict:
+    """What a declared kind derives from its arrays and its formula is not said otherwise by a
+    method, which a compiled loop does not call."""
+    problem = next(filter(None, (overridden(one.condition) for one in _samples(effect))), "")
+    return Verdict(not problem, problem or "nothing is overridden")
+
+
 # The first comes first: later, what it looks for may have happened.
 CHECKS: tuple[Check, ...] = (
     nothing_when_absent,
@@ -318,15 +339,41 @@ CHECKS: tuple[Check, ...] = (
     damping_rate,
     stiffness_rate,
     report,
+    fields,
+    derived,
 )
 
 
 def _energy(sample: _Sample, u: Array) -> float | None:
-    """What the effect reports as its energy at displacements u (n, d), if it does [J]."""
+    """What the effect stores, or else reports as its energy, at displacements u (n, d) [J]."""
+    observation = _observed(sample, u)
+    if isinstance(sample.condition, StoringCondition):
+        return float(np.sum(sample.condition.energies(observation)))
+    return sample.condition.report(observation).get(_ENERGY)
+
+
+def _energy_problem(sample: _Sample, u: Array) -> str:
+    """What is wrong with the energies as such; nothing if all is well or there are none."""
+    if not isinstance(sample.condition, StoringCondition):
+        return ""
+    observation = _observed(sample, u)
+    energies = sample.condition.energies(observation)
+    count = sample.simulation.particles.count
+    if np.shape(energies) != (count,) or not np.all(np.isfinite(energies)):
+        return f"energies {np.shape(energies)} for {count} particles, or not finite"
+    told = sample.condition.report(observation).get(_ENERGY)
+    total = float(np.sum(energies))
+    if told is not None and abs(told - total) > 1e-9 * abs(total):
+        return f"it reports {told:.6g} J, and stores {total:.6g} J"
+    return ""
+
+
+def _observed(sample: _Sample, u: Array) -> Observation:
     simulation = sample.simulation
-    state = attrs.evolve(simulation.start(), positions=sample.positions + u)
-    columns = sample.condition.report(simulation.dynamics.observe(state))
-    return columns.get(f"{_LABEL} energy [J]")
+    state = attrs.evolve(
+        simulation.start(), positions=sample.positions + u, memory=dict(sample.memory)
+    )
+    return simulation.dynamics.observe(state)
 
 
 def _bounded(

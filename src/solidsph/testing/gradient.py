@@ -108,7 +108,31 @@ def shape(gradient: Gradient) -> Verdict:
     return Verdict(True, "(m, d), finite")
 
 
-CHECKS: tuple[Check, ...] = (exact_degree, no_higher_degree, inverse_length, shape)
+@check
+def leaves_its_input(gradient: Gradient) -> Verdict:
+    """Kernel gradients and volumes are left as they were, and the same ones give the same weights
+    again."""
+    for d, rng in seeded():
+        X = scattered(rng, _CELLS[d], _SPACING)
+        pairs = neighbour_pairs(X, _COVER * _SPACING)
+        W = smoothing_kernel(construct("kernels", _KERNEL), d, _COVER * _SPACING)
+        slopes, volumes = W.gradient(pairs.offsets, pairs.distances), np.full(len(X), _SPACING**d)
+        before = slopes.copy(), volumes.copy()
+        first = gradient.weights(pairs, slopes, volumes)
+        if not (np.array_equal(before[0], slopes) and np.array_equal(before[1], volumes)):
+            return Verdict(False, f"{d}D: they were changed in place")
+        if not np.array_equal(first, gradient.weights(pairs, slopes, volumes)):
+            return Verdict(False, f"{d}D: the same question got another answer")
+    return Verdict(True, "untouched")
+
+
+CHECKS: tuple[Check, ...] = (
+    exact_degree,
+    no_higher_degree,
+    inverse_length,
+    shape,
+    leaves_its_input,
+)
 
 
 def _powers(dimension: int, degree: int) -> list[tuple[int, ...]]:

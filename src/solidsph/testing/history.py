@@ -259,7 +259,35 @@ def pointwise_history(material: HistoryMaterial) -> Verdict:
     return at_most(max(errors), _SOLVED)
 
 
+@_of_history
+def shown_variables(material: HistoryMaterial) -> Verdict:
+    """What records are to show are names among the internal variables, each with its unit."""
+    names = list(material.initial_history(3))
+    missing = [one for one in material.shown if one not in names]
+    bare = [one for one in material.shown if not (" [" in one and one.endswith("]"))]
+    told = f"{missing} not among {names}" if missing else f"{bare} without a unit"
+    return Verdict(not missing and not bare, told if missing or bare else ", ".join(material.shown))
+
+
+@_of_history
+def leaves_its_history(material: HistoryMaterial) -> Verdict:
+    """A step leaves the history before it as it was: what is tried may be tried again."""
+    for d, rng in seeded():
+        path = _Path(d, rng)
+        follower = _led(material, path, _DURATIONS[1], 10)
+        given = tuple(np.array(one) for one in follower.history)  # which can be written to
+        F = path.at(1.0)
+        material.advance(F, given, 1e-3, material.params)
+        material.stress(F, given, material.params)
+        pairs = zip(given, follower.history, strict=True)
+        if not all(np.array_equal(a, b) for a, b in pairs):
+            return Verdict(False, f"{d}D: it was changed in place")
+    return Verdict(True, "untouched")
+
+
 CHECKS: tuple[Check, ...] = (
+    shown_variables,
+    leaves_its_history,
     virgin_state,
     stress_with_history,
     dissipation,

@@ -16,6 +16,7 @@ from solidsph.interfaces.condition import ForceCondition, MotionCondition, Obser
 from solidsph.interfaces.integrator import Integrator
 from solidsph.particles import Particles, State
 from solidsph.testing.check import Check, Verdict, at_most, check, more_than
+from solidsph.testing.derived import overridden
 
 _MASS = 2.0  # [kg]
 _FREQUENCY = 3.0  # omega [rad/s]
@@ -246,7 +247,16 @@ def bookkeeping(integrator: Integrator) -> Verdict:
     return Verdict(not found, "; ".join(found) or "as required")
 
 
+@check
+def derived(integrator: Integrator) -> Verdict:
+    """What two formulas say of a step is not said otherwise by a method, which a compiled loop does
+    not call."""
+    problem = overridden(integrator)
+    return Verdict(not problem, problem or "nothing is overridden")
+
+
 CHECKS: tuple[Check, ...] = (
+    derived,
     order,
     order_with_damping,
     stable_below_limit,

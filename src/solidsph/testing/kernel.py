@@ -42,6 +42,22 @@ def smoothed_mass(kernel: Kernel, dimension: int, support_radius: float) -> floa
 
 
 @check
+def knots(kernel: Kernel) -> Verdict:
+    """Knots lie inside, 0 < q < 1, and between them the profile is smooth, so that few points of
+    quadrature see all of its mass."""
+    wrong = [q for q in kernel.knots if not 0.0 < q < 1.0]
+    if wrong:
+        return Verdict(False, f"knots {wrong} are not inside")
+    ends = _ends(kernel)
+    errors = []
+    for d in DIMENSIONS:
+        coarse, fine = (_gauss(kernel, d, ends, count) for count in (40, 320))
+        errors.append(abs(coarse / fine - 1.0))
+    # What decays like exp(-1 / (1 - q)) at its edge, as mollifiers do, leaves 1e-11.
+    return at_most(max(errors), 1e-9)
+
+
+@check
 def mass(kernel: Kernel) -> Verdict:
     """The mass of W is 1 minus the declared loss, in 1, 2 and 3D."""
     errors = [
@@ -214,6 +230,7 @@ def transform(kernel: Kernel) -> Verdict:
 
 
 CHECKS: tuple[Check, ...] = (
+    knots,
     mass,
     gradient_moment,
     moments,
@@ -260,6 +277,14 @@ def _shells(f: Callable[[float], float], dimension: int, ends: list[float]) -> f
         )[0]
         for a, b in pairwise(ends)
     )
+
+
+def _gauss(kernel: Kernel, dimension: int, ends: list[float], count: int) -> float:
+    """Mass of the profile by so many points between two ends."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    q = np.concatenate([a + 0.5 * (b - a) * (nodes + 1.0) for a, b in pairwise(ends)])
+    w = np.concatenate([0.5 * (b - a) * weights for a, b in pairwise(ends)])
+    return float(np.sum(w * _profile(kernel, q) * q ** (dimension - 1)))
 
 
 def _times_slope(W: SmoothingKernel, r: float) -> float:

@@ -239,7 +239,25 @@ def pointwise(material: Material) -> Verdict:
     return at_most(max(errors) / _stiffness(material), _ROUNDING)
 
 
+@check
+def leaves_its_input(material: Material) -> Verdict:
+    """Energy, stress and tangent leave F and its change as they were, and the same F has the same
+    answer again."""
+    for d, rng in seeded():
+        F, dF = random_deformation_gradients(rng, d, _COUNT), _directions(rng, d)
+        before = F.copy(), dF.copy()
+        first = _energy(material, F), _stress(material, F), _tangent(material, F, dF)
+        if not (np.array_equal(before[0], F) and np.array_equal(before[1], dF)):
+            return Verdict(False, f"{d}D: F was changed in place")
+        _stress(material, 1.1 * F)
+        again = _energy(material, F), _stress(material, F), _tangent(material, F, dF)
+        if not all(np.array_equal(a, b) for a, b in zip(first, again, strict=True)):
+            return Verdict(False, f"{d}D: the same F got another answer")
+    return Verdict(True, "untouched")
+
+
 CHECKS: tuple[Check, ...] = (
+    leaves_its_input,
     stress,
     tangent,
     symmetric_tangent,

@@ -7,6 +7,7 @@ route on which the distance is not used.
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from solidsph.arrays import Array
 from solidsph.interfaces.shape import Shape, Surface
@@ -15,6 +16,9 @@ from solidsph.testing.check import Check, Verdict, at_most, check, not_promised
 
 # Samples along the longest side: their spacing is the error that a sampled boundary may have.
 _ALONG = {1: 20, 2: 200, 3: 40}
+
+# Points along each axis where a volume is counted: of those beside the boundary half are wrong.
+_POINTS = {1: 2000, 2: 300, 3: 60}
 
 # A boundary sampled exactly, at whatever spacing: sums over some thousand samples.
 _ROUNDING = 1e-12
@@ -87,16 +91,19 @@ def closed_boundary(shape: Shape) -> Verdict:
 
 @check
 def volume(shape: Shape) -> Verdict:
-    """The volume, if known, is what the boundary encloses by the divergence theorem."""
-    known = shape.volume()
-    if known is None:
-        return not_promised("no closed form is known")
+    """The volume is what the boundary encloses by the divergence theorem; where no closed form is
+    known, that of the points inside."""
     surface = _sampled(shape)
+    known = shape.volume()
+    limit = _ALONG[shape.dimension] ** -2.0
+    if known is None:
+        # By the points of a lattice that are inside, where the distance is negative.
+        known, limit = _counted(shape), 4.0 / _POINTS[shape.dimension]
     # From the middle, where rounding is least.
     middle = 0.5 * np.sum(shape.bounds(), axis=0)
     flux = float(np.vdot(surface.points - middle, surface.area_vectors)) / shape.dimension
     # Samples in the middle of their part of a curved face err by the square of their spacing.
-    return at_most(abs(flux / known - 1.0), _ALONG[shape.dimension] ** -2.0)
+    return at_most(abs(flux / known - 1.0), limit)
 
 
 @check
@@ -119,6 +126,15 @@ def distance_near_boundary(shape: Shape) -> Verdict:
     ]
     # A curved face bends away by the square of the step.
     return at_most(float(np.quantile(np.maximum(*errors), 0.9)), 1e-2)
+
+
+@check
+def distance_elsewhere(shape: Shape) -> Verdict:
+    """Nowhere is the distance larger than that to the nearest sample of the boundary."""
+    probes, points = _around(shape), _sampled(shape).points
+    nearest = np.asarray(cKDTree(points).query(probes)[0])
+    beyond = np.abs(shape.signed_distance(probes)) - nearest
+    return at_most(float(beyond.max()) / _size(shape), _ROUNDING)
 
 
 @check
@@ -194,12 +210,25 @@ CHECKS: tuple[Check, ...] = (
     volume,
     on_boundary,
     distance_near_boundary,
+    distance_elsewhere,
     sign,
     distance_bound,
     convex_lines,
     sampling,
     named_faces,
 )
+
+
+def _counted(shape: Shape) -> float:
+    """Volume by the points of a lattice that are inside [m^d]."""
+    lower, upper = shape.bounds()
+    count = _POINTS[shape.dimension]
+    axes = [
+        a + (np.arange(count) + 0.5) / count * (b - a) for a, b in zip(lower, upper, strict=True)
+    ]
+    points = np.stack([one.ravel() for one in np.meshgrid(*axes, indexing="ij")], axis=1)
+    inside = np.mean(shape.signed_distance(points) < 0.0)
+    return float(inside * np.prod(upper - lower))
 
 
 def _crossing(shape: Shape) -> float:

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from solidsph.arrays import Array, Indices
 from solidsph.body import Body
 from solidsph.interfaces.condition import Observation
-from solidsph.watch.accounts import Accounts
+from solidsph.results.accounts import Accounts
 from solidsph.watch.symptom import Finding, Symptom, graded
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ _NEAR = 1.2
 class CollapsingNeighbours(Symptom):
     """Two nearest neighbours are at a small part of their first distance."""
 
-    warning: float = 0.25  # [-]
+    warning: float = 0.15  # [-]; metal that flows comes to 0.2
     failure: float = 0.03  # [-]
 
     def look(

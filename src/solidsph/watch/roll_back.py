@@ -9,7 +9,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from solidsph.errors import DivergedError
+from solidsph.errors import DivergedError, UnsoundError
 from solidsph.particles import State
 from solidsph.resumption import Resumption
 from solidsph.simulation import Result, Simulation
@@ -41,6 +41,7 @@ def run_watched(
 
     Raises:
         DivergedError: it failed once more than that; with the particle, the cause and a remedy.
+        UnsoundError: its energies did not add up once more than that.
     """
     path = Path(record)
     since: Resumption | None = None
@@ -50,7 +51,7 @@ def run_watched(
         watchdog = Watchdog(symptoms, picture=picture, told=told)
         try:
             return simulation.run(record=path, observers=[watchdog, *observers], since=since)
-        except DivergedError as failed:
+        except (DivergedError, UnsoundError) as failed:
             if len(notes) >= roll_backs:
                 raise
             simulation = simulation.halved()
@@ -58,13 +59,19 @@ def run_watched(
             back = 0.0 if good is None else good.state.time
             notes.append(
                 f"rolled back from t = {failed.time:.9g} s to t = {back:.9g} s, step halved to "
-                f"{simulation.step_size:.9g} s: {failed.cause} at particle {failed.particle}"
+                f"{simulation.step_size:.9g} s: {_told(failed)}"
             )
             if good is None:
                 since = Resumption(until=-inf, notes=tuple(notes))
             else:
                 state = restarted(simulation, good.state)
                 since = Resumption(state, good.kept, until=back, notes=tuple(notes))
+
+
+def _told(failed: DivergedError | UnsoundError) -> str:
+    if isinstance(failed, UnsoundError):
+        return f"the energies did not add up, by {failed.part:.3g} of what was in play"
+    return f"{failed.cause} at particle {failed.particle}"
 
 
 def restarted(simulation: Simulation, state: State) -> State:

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from solidsph.interfaces.condition import Observation
-from solidsph.watch.accounts import Accounts
+from solidsph.results.accounts import Accounts
 from solidsph.watch.symptom import Finding, Symptom, graded
 
 if TYPE_CHECKING:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import attrs
 
 from solidsph.interfaces.condition import Observation
-from solidsph.watch.accounts import Accounts
+from solidsph.results.accounts import Accounts
 
 if TYPE_CHECKING:
     from solidsph.simulation import Simulation
@@ -34,6 +34,10 @@ class Finding:
 
 class Symptom(ABC):
     """Looks at outputs for one sign; an implementation is a frozen set of limits."""
+
+    steps_between: ClassVar[int] = 0
+    """Steps between two looks at least, for a look that costs as much as some steps do; the last
+    output is looked at always."""
 
     @abstractmethod
     def look(

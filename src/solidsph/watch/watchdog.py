@@ -12,10 +12,10 @@ from solidsph.errors import DivergedError, RecordError
 from solidsph.hooks import implementation
 from solidsph.interfaces.condition import Observation
 from solidsph.particles import State
-from solidsph.watch.accounts import Accounts
+from solidsph.results.accounts import Accounts
+from solidsph.soundness import allowed, part_of_play
 from solidsph.watch.crowding import CollapsingNeighbours
 from solidsph.watch.hourglass import StoredBesides
-from solidsph.watch.residual import EnergyFromNowhere
 from solidsph.watch.speed import FasterThanSound
 from solidsph.watch.symptom import Finding, Grade, Symptom
 from solidsph.watch.volume import VanishingVolume
@@ -28,7 +28,6 @@ SYMPTOMS: Sequence[Symptom] = (
     VanishingVolume(),
     FasterThanSound(),
     CollapsingNeighbours(),
-    EnergyFromNowhere(),
     StoredBesides(),
 )
 """What is looked for unless something else is asked for."""
@@ -52,7 +51,8 @@ class Watchdog:
 
     Attributes:
         findings: time [s] and finding, of every output that had one.
-        good: the last output without any finding; or if there is none, without a failure.
+        good: the last output without any finding and whose energies add up; or if there is none,
+            without a failure.
 
     Args:
         symptoms: what to look for.
@@ -73,7 +73,8 @@ class Watchdog:
         self._picture = picture
         self._told = told
         self._accounts = Accounts()
-        self._is_clean = False  # whether `good` had no finding at all
+        self._looked: dict[Symptom, int] = {}  # the step of the last look
+        self._is_clean = False  # whether nothing at all was wrong with `good`
 
     @implementation
     def solidsph_resume(
@@ -88,7 +89,11 @@ class Watchdog:
     @implementation
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
         self._accounts.add(observation)
-        looks = (one.look(simulation, observation, self._accounts) for one in self._symptoms)
+        looks = (
+            one.look(simulation, observation, self._accounts)
+            for one in self._symptoms
+            if self._is_due(one, simulation, observation.state.step)
+        )
         found = [one for one in looks if one is not None]
         state = observation.state
         self.findings += [(state.time, one) for one in found]
@@ -97,10 +102,18 @@ class Watchdog:
         for one in found:
             if one.grade is Grade.FAILURE:
                 raise self._failed(simulation, observation, one)
-        if not found or not self._is_clean:
+        is_clean = not found and part_of_play(simulation, self._accounts) <= allowed(simulation)
+        if is_clean or not self._is_clean:
             kept: dict[str, Array] = {}
             simulation.manager.hook.solidsph_keep(simulation=simulation, kept=kept)
-            self.good, self._is_clean = Good(state, kept), not found
+            self.good, self._is_clean = Good(state, kept), is_clean
+
+    def _is_due(self, symptom: Symptom, simulation: Simulation, step: int) -> bool:
+        due = step - self._looked.get(symptom, 0) >= symptom.steps_between
+        if due or step == simulation.steps:
+            self._looked[symptom] = step
+            return True
+        return False
 
     @implementation
     def solidsph_keep(self, simulation: Simulation, kept: dict[str, Array]) -> None:

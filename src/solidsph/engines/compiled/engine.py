@@ -15,7 +15,7 @@ from solidsph.dynamics import Dynamics
 from solidsph.engines.compiled.blocks import STRIDE, group
 from solidsph.engines.compiled.chunks import weighted_chunks
 from solidsph.engines.compiled.history import CompiledLaw
-from solidsph.engines.compiled.loop import compiled_loop
+from solidsph.engines.compiled.loop import are_declared, compiled_loop
 from solidsph.engines.compiled.moving import MovingBody, moving_body
 from solidsph.engines.compiled.part import part_of_rows
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux, no_law
@@ -102,6 +102,11 @@ class CompiledBody:
     gradients: Passes  # without a law
     spread_pass: Any
     pair_count: int
+
+    @property
+    def precision(self) -> float:
+        """As of all forces."""
+        return float(np.finfo(self.u.dtype).eps)
 
     @property
     def bytes(self) -> int:
@@ -253,13 +258,26 @@ class CompiledForces(InternalForces):
     def tally(self) -> Sequence[Tally]:
         return tuple(own for part in self.parts for own in part.tally)
 
+    @property
+    def precision(self) -> float:
+        return max(part.precision for part in self.parts)
+
+    def compiles_steps(self, dynamics: Dynamics, integrator: Integrator) -> bool:
+        fixed = self._fixed
+        return len(fixed) == len(self.parts) and are_declared(
+            fixed, self.conditions, dynamics, integrator
+        )
+
+    @property
+    def _fixed(self) -> Sequence[CompiledBody]:
+        return [part for part in self.parts if isinstance(part, CompiledBody)]
+
     def time_loop(self, dynamics: Dynamics, integrator: Integrator, step_size: float) -> TimeLoop:
-        fixed = [part for part in self.parts if isinstance(part, CompiledBody)]
-        try:
-            if len(fixed) == len(self.parts):
-                return compiled_loop(fixed, self.conditions, dynamics, integrator, step_size)
-        except NotCompilableError:
-            pass
+        if self.compiles_steps(dynamics, integrator):
+            try:
+                return compiled_loop(self._fixed, self.conditions, dynamics, integrator, step_size)
+            except NotCompilableError:  # a formula does not compile, as its kind did not tell
+                pass
         return super().time_loop(dynamics, integrator, step_size)
 
     def forces(self, time: float, displacements: Array) -> Array:

@@ -25,7 +25,12 @@ from solidsph.engines.compiled.motions import (
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function
 from solidsph.engines.compiled.shares import thread_count
 from solidsph.interfaces.condition import ExtensionCondition, StressCondition
-from solidsph.interfaces.declared import ScheduledForce, ScheduledMotion
+from solidsph.interfaces.declared import (
+    DECLARED_LOADS,
+    LinearExtension,
+    ScheduledForce,
+    ScheduledMotion,
+)
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
 from solidsph.particles import State
 from solidsph.time_loop import NOT_FINITE, StepError, TimeLoop
@@ -54,6 +59,26 @@ class _Moving(NamedTuple):
     total: Array  # force [N]
 
 
+def are_declared(
+    bodies: Sequence[CompiledBody],
+    conditions: Sequence[StressCondition],
+    dynamics: Dynamics,
+    integrator: Integrator,
+) -> bool:
+    """Whether everything in a step is of a kind that this loop knows; then only a formula that
+    does not compile can be in its way."""
+    labels = [c.label for c in (*dynamics.loads, *dynamics.motions)]
+    fused = not conditions and all(body.fused for body in bodies)
+    alone = len(bodies) == 1 and all(isinstance(one, LinearExtension) for one in conditions)
+    return (
+        isinstance(integrator, PointwiseIntegrator)
+        and (fused or alone)
+        and all(isinstance(load, DECLARED_LOADS) for load in dynamics.loads)
+        and all(labels.count(load.label) == 1 for load in dynamics.loads)
+        and all(isinstance(one, (ScheduledMotion, LinearExtension)) for one in dynamics.motions)
+    )
+
+
 def compiled_loop(
     bodies: Sequence[CompiledBody],
     conditions: Sequence[StressCondition],
@@ -68,9 +93,6 @@ def compiled_loop(
     """
     if not isinstance(integrator, PointwiseIntegrator):
         raise NotCompilableError(f"integrator {type(integrator).__name__} is not pointwise")
-    labels = [c.label for c in (*dynamics.loads, *dynamics.motions)]
-    if any(labels.count(load.label) > 1 for load in dynamics.loads):
-        raise NotCompilableError("several conditions share the account of a load")
     particles = dynamics.particles
     d = particles.dimension
     threads = thread_count(_PER_PARTICLE * particles.count)  # of what is done particle by particle

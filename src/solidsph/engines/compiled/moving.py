@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from functools import cache
-from typing import Any, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -53,6 +54,8 @@ class MovingBody:
     _values: Array = attrs.field(init=False)  # (k,) W of near pairs
     _slopes: Array = attrs.field(init=False)  # (k,) W'(r) / r of near pairs
     _place: _Place | None = attrs.field(init=False, default=None)
+
+    precision: ClassVar[float] = sys.float_info.epsilon
 
     def __attrs_post_init__(self) -> None:
         particles = self.body.particles

@@ -1,0 +1,184 @@
+"""First use: cheap properties of parts that are not our own, asked once before a scene runs.
+
+The conformance kits ask all there is to ask, and take seconds; these take milliseconds.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solidsph import handed_back
+from solidsph.blame import described
+from solidsph.errors import BuildError
+from solidsph.interfaces.condition import ForceCondition, StoringCondition
+from solidsph.registry import entry_of, singular
+
+if TYPE_CHECKING:
+    from solidsph.simulation import Simulation
+
+# Of a kit, by the names of its checks: those that need no scene of their own.
+_QUICK: Mapping[str, Sequence[str]] = {
+    "kernels": ("slope", "not_negative", "falling", "smooth_centre"),
+    "materials": ("stress", "tangent", "natural_state", "wave_speed", "virgin_state"),
+    "divergences": ("momentum", "adjoint"),
+    "gradients": ("exact_degree",),
+    "integrators": ("bookkeeping", "imposed_motion"),
+}
+
+# Of a change of energy: differences over a thousandth of a spacing err by about their square.
+_DIFFERENT = 1e-3
+
+_SMALL = 1e-3  # of a spacing
+
+_asked: dict[tuple[str, str], tuple[str, ...]] = {}
+"""By kind and part: what was found in this process."""
+
+
+class PartWarning(UserWarning):
+    """A part does not keep a promise of its interface."""
+
+
+def ask(simulation: Simulation, parts: Sequence[tuple[str, Any]]) -> None:
+    """Warn of every promise that one of `parts`, kind and part, is seen not to keep.
+
+    Raises:
+        BuildError: what a part hands back cannot be used at all.
+    """
+    found: list[str] = []
+    for kind, part in parts:
+        key = kind, repr(part)
+        if key not in _asked:
+            _asked[key] = tuple(_quick(kind, part))
+        found += _asked[key]
+    foreign = [part for kind, part in parts if kind == "effects"]
+    for label, effect in simulation.effects.items():
+        if any(effect is one for one in foreign):
+            found += _of_effect(simulation, label, effect)
+    _check_forces(simulation, parts)
+    for one in found:
+        warnings.warn(one, PartWarning, stacklevel=2)
+
+
+def _quick(kind: str, part: Any) -> Iterator[str]:
+    if kind not in _QUICK:
+        return
+    from solidsph.testing import checks  # brings the kits with it
+
+    results = [one(part) for one in checks(kind) if one.__name__ in _QUICK[kind]]
+    failed = [one for one in results if not one.passed]
+    if failed:
+        measured = "; ".join(f"{one.name}: {one.measured}" for one in failed)
+        yield _told(kind, part, measured, "; ".join(one.required for one in failed))
+
+
+def _told(kind: str, part: Any, measured: str, required: str) -> str:
+    who = described(entry_of(kind, part))
+    return (
+        f"{who} does not keep a promise of its interface: {measured}. Required: {required}. The "
+        f"result is in doubt; correct the {singular(kind)} (solidsph check tests all of it)"
+    )
+
+
+def _of_effect(simulation: Simulation, label: str, effect: Any) -> Iterator[str]:
+    """Its energy, and the rates that it declares, along one random motion of this scene."""
+    (condition,) = [load for load in simulation.dynamics.loads if load.label == label]
+    particles, masses = simulation.particles, simulation.dynamics.masses
+    rng = np.random.default_rng(0)
+    state = simulation.initial
+    X, real = state.positions, ~particles.ghosts[:, None]
+    du = np.where(real, rng.normal(size=X.shape), 0.0) * particles.spacings.min()
+    still, memory = np.zeros_like(X), state.memory
+
+    def force(u: Any, v: Any) -> Any:
+        out = np.zeros_like(X)
+        out[condition.particles] = condition.advance(0.0, 0.0, X + u, v, memory)[0]
+        return out
+
+    wrong: list[str] = []
+    if isinstance(condition, StoringCondition):
+        wrong += _of_energy(simulation, condition, effect, force, du)
+    h = _SMALL
+    norm = float(np.sum(masses[:, None] * du**2))
+    for name, declared, change in (
+        (
+            "stiffness_rate",
+            effect.stiffness_rate(simulation.setting.bodies) ** 2,
+            (force(-h * du, still) - force(h * du, still)) / (2.0 * h),
+        ),
+        (
+            "damping_rate",
+            effect.damping_rate(simulation.setting.bodies),
+            (force(still, -h * du) - force(still, h * du)) / (2.0 * h),
+        ),
+    ):
+        # A mean over frequencies squared, or rates: the largest is no smaller.
+        found = float(np.sum(du * change)) / norm
+        if found > 1.01 * declared + 1e-9 * (2.0 / simulation.step_size) ** 2:
+            power = 0.5 if name == "stiffness_rate" else 1.0
+            wrong.append(
+                f"{name} is {declared**power:.4g} 1/s, and a motion has {found**power:.4g} 1/s at "
+                "least by the effect alone"
+            )
+    if wrong:
+        required = "what it stores is minus its work, and no motion is faster than it declares"
+        yield _told("effects", effect, f"label {label!r}: {'; '.join(wrong)}", required)
+
+
+def _of_energy(
+    simulation: Simulation,
+    condition: Any,
+    effect: Any,
+    force: Callable[[Any, Any], Any],
+    du: Any,
+) -> Iterator[str]:
+    import attrs
+
+    X = simulation.initial.positions
+    u, d = 0.01 * du[::-1], _SMALL * du
+
+    def energies(u: Any) -> Any:
+        state = attrs.evolve(simulation.initial, positions=X + u)
+        return condition.energies(simulation.dynamics.observe(state))
+
+    def stored(u: Any) -> float:
+        return float(np.sum(energies(u)))
+
+    if np.shape(energies(u)) != (len(X),):
+        raise BuildError(
+            [
+                f"{described(entry_of('effects', effect))}, label {condition.label!r}: `energies` "
+                f"have the shape {np.shape(energies(u))}; {(len(X),)} is expected"
+            ]
+        )
+    f = force(u, np.zeros_like(X))
+    change, work = stored(u + d) - stored(u - d), 2.0 * float(np.vdot(f, d))
+    scale = 2.0 * float(np.abs(f * d).sum())
+    if abs(change + work) > _DIFFERENT * scale:
+        yield (
+            f"what it stores changes by {change:.4g} J along a motion in which its force does "
+            f"{work:.4g} J of work"
+        )
+
+
+def _check_forces(simulation: Simulation, parts: Sequence[tuple[str, Any]]) -> None:
+    """That forces of foreign parts have their shape: others may fit by broadcasting."""
+    modules = {type(part).__module__ for kind, part in parts if kind in ("effects", "boundaries")}
+    wrong = force_problems(simulation, modules)
+    if wrong:
+        raise BuildError(wrong)
+
+
+def force_problems(simulation: Simulation, modules: set[str]) -> list[str]:
+    """What is wrong with the forces of conditions whose classes are of `modules`."""
+    state, d = simulation.initial, simulation.particles.dimension
+    found = []
+    for load in simulation.dynamics.loads:
+        if type(load).__module__ in modules and isinstance(load, ForceCondition):
+            with np.errstate(all="ignore"):
+                f = load.advance(0.0, 0.0, state.positions, state.velocities, state.memory)[0]
+            found.append(handed_back.force(load, f, d))
+    return [one for one in found if one]
