@@ -11,6 +11,7 @@ import pytest
 
 from solidsph import BuildError, Record, RecordError, Scene, Simulation, resume
 from solidsph.results import recorder
+from solidsph.results.digest import Reference
 from solidsph.results.repair import repaired
 from solidsph_builtin.discretisations import _checks
 from tests.fuzzing import campaign, tried, within
@@ -218,13 +219,22 @@ def test_a_truncated_record_goes_on(tmp_path: Path, records: dict[str, bytes]) -
         assert np.array_equal(record.positions[:], other.positions[:])
 
 
-def test_no_scene_in_a_record_runs_code(tmp_path: Path, records: dict[str, bytes]) -> None:
+def test_no_scene_in_a_record_runs_code(
+    tmp_path: Path, records: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not even where somebody has made its digest right again."""
     path = tmp_path / "run.h5"
+    path.write_bytes(records["killed"])
+    with Record(path) as record:
+        right = record._reference().digest()
     old = b"1e3*min(t/0.005, 1)"
     new = b"__import__('os')   "
     assert len(old) == len(new)
     assert records["killed"].count(old) == 1
     path.write_bytes(records["killed"].replace(old, new))
+    with pytest.raises(RecordError, match="not those that were written"):
+        resume(path)
+    monkeypatch.setattr(Reference, "digest", lambda self: right)
     with pytest.raises(BuildError, match="is not allowed"):
         resume(path)
 
