@@ -123,6 +123,7 @@ def test_dirichlet_reports_its_miss_in_a_run(kind: type) -> None:
         )
         .boundary("clamp", where="right", label="wall")
         .boundary("ghost-extension", where="right-ghosts")
+        .energy_tolerance("off")  # the plain divergence has no energy near a surface
         .duration(5e-3)
         .build()
     )
@@ -252,6 +253,8 @@ def test_half_a_body_with_a_plane_of_symmetry_moves_like_the_whole(
             .material("neo-hookean", **SOFT)
             .formulation("total-lagrangian", gradient="difference", divergence=divergence)
             .boundary("traction", where="right", traction={"x": 2e4, "y": 1e4})
+            # The plain divergence has no energy near a surface.
+            .energy_tolerance("off" if divergence == "plain" else 0.01)
             .duration(0.02)
         )
         if half:
