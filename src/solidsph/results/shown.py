@@ -7,8 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from solidsph import handed_back
 from solidsph.arrays import Array
-from solidsph.errors import RecordError
+from solidsph.errors import PluginError, RecordError
 from solidsph.interfaces.condition import (
     Condition,
     FieldCondition,
@@ -29,10 +30,15 @@ def history(
 
     Raises:
         RecordError: two would have one name.
+        PluginError: a report is no mapping of numbers.
     """
     columns = dict(ledger(observation, initial, conditions))
     for condition in conditions:
-        for name, value in condition.report(observation).items():
+        reported = condition.report(observation)
+        wrong = handed_back.columns(condition.label, reported)
+        if wrong:
+            raise PluginError(f"{wrong}. This is a fault of the part with that label")
+        for name, value in reported.items():
             if name in columns:
                 raise RecordError(
                     f"{condition.label!r} reports {name!r}, which the history holds already; give "
