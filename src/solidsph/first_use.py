@@ -37,7 +37,7 @@ _DIFFERENT = 1e-3
 _MOVED = 1e-2  # displacements at which energies are compared, in spacings
 _SMALL = 1e-5  # differences, in spacings: far less, so that a force may be of any power of them
 
-_UNNOTICED = 3e-5  # of the frequency whose period is the step
+_OF_STEP = 0.02  # of the highest frequency that the step bears
 
 _asked: dict[tuple[str, type, str], tuple[str, ...]] = {}
 """By kind, class and part: what was found in this process. A class that is defined anew, as one
@@ -54,6 +54,13 @@ def ask(simulation: Simulation, parts: Sequence[tuple[str, Any]]) -> None:
     Raises:
         BuildError: what a part hands back cannot be used at all.
     """
+    with np.errstate(all="ignore"):  # as in steps
+        found = _found(simulation, parts)
+    for one in found:
+        warnings.warn(one, PartWarning, stacklevel=2)
+
+
+def _found(simulation: Simulation, parts: Sequence[tuple[str, Any]]) -> list[str]:
     _check_forces(simulation, parts)
     found: list[str] = []
     for kind, part in parts:
@@ -65,8 +72,7 @@ def ask(simulation: Simulation, parts: Sequence[tuple[str, Any]]) -> None:
     for label, effect in simulation.effects.items():
         if any(effect is one for one in foreign):
             found += _of_effect(simulation, label, effect)
-    for one in found:
-        warnings.warn(one, PartWarning, stacklevel=2)
+    return found
 
 
 def _quick(kind: str, part: Any) -> Iterator[str]:
@@ -130,8 +136,8 @@ def _of_effect(simulation: Simulation, label: str, effect: Any) -> Iterator[str]
         # A mean over frequencies squared, or rates: the largest is no smaller.
         found = float(np.sum(du * change)) / norm
         power = 0.5 if name == "stiffness_rate" else 1.0
-        # What no step of this size could notice may be rounding of large forces.
-        unnoticed = (_UNNOTICED * 2.0 / simulation.step_size) ** (1.0 / power)
+        # What is small beside the fastest motion of the step makes no difference to it.
+        unnoticed = (_OF_STEP * 2.0 / simulation.step_size) ** (1.0 / power)
         if found > 1.01 * declared + unnoticed:
             wrong.append(
                 f"{name} is {declared**power:.4g} 1/s, and a motion has {found**power:.4g} 1/s at "
@@ -194,12 +200,11 @@ def force_problems(simulation: Simulation, modules: set[str]) -> list[str]:
     found = []
     for load in simulation.dynamics.loads:
         if type(load).__module__ in modules and isinstance(load, ForceCondition):
-            with np.errstate(all="ignore"):
-                x, v, h = state.positions, state.velocities, simulation.step_size
-                f, kept = load.advance(0.0, 0.0, x, v, state.memory)
+            x, v, h = state.positions, state.velocities, simulation.step_size
+            f, kept = load.advance(0.0, 0.0, x, v, state.memory)
+            wrong = handed_back.force(load, f, d) or handed_back.kept(load, kept)
+            if not wrong:
+                f, kept = load.advance(h, h, x, v, {**state.memory, **kept})
                 wrong = handed_back.force(load, f, d) or handed_back.kept(load, kept)
-                if not wrong:
-                    f, kept = load.advance(h, h, x, v, {**state.memory, **kept})
-                    wrong = handed_back.force(load, f, d) or handed_back.kept(load, kept)
             found.append(wrong)
     return [one for one in found if one]
