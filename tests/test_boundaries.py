@@ -275,6 +275,19 @@ def test_half_a_body_with_a_plane_of_symmetry_moves_like_the_whole(
     assert np.abs(u_half[real] - u_whole[partner]).max() < 1e-10 * scale
 
 
+def test_planes_with_particles_and_ghosts_report_their_reaction_once() -> None:
+    """What holds the particles on a plane and what moves its ghosts share one account."""
+    lattice = {"type": "lattice", "on_boundary": True, "ghosts": 3}
+    builder = box(2, 8, discretisation={**lattice, "ghost_faces": ["left", "bottom"]})
+    builder.boundary("symmetry", axis="x").boundary("symmetry", axis="y")
+    simulation = builder.boundary("traction", where="right", traction={"x": 1e3}).build()
+    observation = simulation.dynamics.observe(simulation.start())
+    columns = [name for one in simulation.conditions for name in one.report(observation)]
+    assert columns.count("symmetry reaction x [N]") == 1
+    assert columns.count("symmetry' reaction y [N]") == 1
+    assert len(columns) == len(set(columns))
+
+
 def test_symmetry_needs_something_to_act_on() -> None:
     setting = box(2).build().setting
     with pytest.raises(SceneError, match="no particle lies on the plane"):

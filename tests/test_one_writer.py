@@ -17,7 +17,7 @@ from solidsph import BusyError, Record, RecordError, Scene, Simulation, resume
 from solidsph.cli import cli
 from solidsph.hooks import implementation
 from solidsph.results.checkpoint import checkpoint_path
-from solidsph.results.left import left_at
+from solidsph.results.left import Left, left_at
 from solidsph.results.sole_writer import check_no_writer, sole_writer
 from tests.resuming import Stop, assert_same_record
 from tests.scenes import SCENE_TOML, box
@@ -250,6 +250,51 @@ def test_what_is_no_record_is_never_replaced(tmp_path: Path, kind: str) -> None:
     assert "not" in refusal(lambda: moving().run(record=path))
     assert path.stat().st_mode == mode
     assert before is None or path.read_bytes() == before
+
+
+@pytest.mark.parametrize("kind", ["a link", "a link to nothing", "a pipe", "a folder"])
+def test_what_is_no_lock_is_neither_followed_nor_waited_for(tmp_path: Path, kind: str) -> None:
+    """A link in the lock's place once led to a file of the user's, which was emptied."""
+    path, lock, notes = tmp_path / "run.h5", tmp_path / ".run.h5.lock", tmp_path / "notes"
+    if kind == "a link":
+        notes.write_text("mine")
+    if kind == "a pipe":
+        os.mkfifo(lock)
+    elif kind == "a folder":
+        lock.mkdir()
+    else:
+        lock.symlink_to(notes)
+    for act in (lambda: moving().run(record=path), lambda: check_no_writer(path)):
+        assert "is not a regular file" in refusal(act)
+    assert (notes.read_text() if kind == "a link" else notes.exists()) == (
+        "mine" if kind == "a link" else False
+    )
+    assert lock.is_symlink() or not lock.is_file()
+
+
+def test_a_link_goes_on_from_the_checkpoint_of_its_record(tmp_path: Path) -> None:
+    real, link = tmp_path / "real" / "run.h5", tmp_path / "link.h5"
+    with pytest.raises(KeyboardInterrupt):
+        moving().run(record=real, observers=[Stop(4)])
+    link.symlink_to(real)
+    heard = Counting()
+    resume(link, observers=[heard])
+    assert heard.count == 2  # the fourth, before whose checkpoint it was stopped, and the fifth
+    assert sorted(one.name for one in real.parent.iterdir()) == ["run.checkpoint", "run.h5"]
+    assert not checkpoint_path(link).is_relative_to(link)
+    moving().run(record=tmp_path / "whole.h5")
+    assert_same_record(tmp_path / "whole.h5", real)
+
+
+def test_records_of_two_suffixes_have_a_checkpoint_each(tmp_path: Path) -> None:
+    names = ("run.h5", "run.vtkhdf", "other.h5", "run.h5.vtkhdf")
+    assert len({checkpoint_path(tmp_path / name) for name in names}) == len(names)
+
+
+def test_an_unsound_run_did_not_end_early(tmp_path: Path) -> None:
+    left = Left(tmp_path / "run.h5", "unsound: the energies do not add up", 5, 0.25)
+    assert left.told() == "an unsound run up to t = 0.25 s"
+    assert not left.can_go_on
 
 
 def test_a_link_stays_and_a_file_without_a_byte_is_nothing(tmp_path: Path) -> None:

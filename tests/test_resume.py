@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import importlib
 import io
 import json
 import os
@@ -575,16 +576,30 @@ def test_a_material_that_answers_otherwise_is_refused(
     resume(path, force=True)
 
 
+@pytest.mark.parametrize("changed", ["spring.py", "_law.py", "laws/deep.py"])
 def test_code_that_changed_under_one_version_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str
 ) -> None:
-    path, copy = tmp_path / "run.h5", tmp_path / "copy.py"
-    stopped(path)
-    module = sys.modules[registry.load("integrators", "velocity-verlet").__module__]
-    copy.write_text(Path(module.__file__).read_text() + "# changed\n")
-    monkeypatch.setattr(module, "__file__", str(copy))
-    assert_refused(path, r"code of solidsph_builtin.* was \w+, is \w+")
-    resume(path, force=True)
+    """In the module of a part, or in one that it calls."""
+    package = tmp_path / "springs_of_mine"
+    (package / "laws").mkdir(parents=True)
+    (package / "__init__.py").touch()
+    (package / "_law.py").write_text("FACTOR = 1.0\n")
+    (package / "laws" / "deep.py").write_text("FACTOR = 1.0\n")
+    (package / "spring.py").write_text(
+        "from solidsph_builtin.integrators.velocity_verlet import VelocityVerlet\n"
+        "class Mine(VelocityVerlet):\n    pass\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    for name in [one for one in sys.modules if one.startswith("springs_of_mine")]:
+        monkeypatch.delitem(sys.modules, name)
+    mine = importlib.import_module("springs_of_mine.spring").Mine()
+    path = tmp_path / "run.h5"
+    own = stopped(path, box(1, 12).initial(velocity={"x": "3*sin(2*X)"}).integrator(mine))
+    with (package / changed).open("a") as file:
+        file.write("# changed\n")
+    assert_refused(path, r"code of springs_of_mine was \w+, is \w+", simulation=own)
+    resume(path, force=True, simulation=own)
 
 
 # From the end
@@ -660,6 +675,12 @@ def test_an_end_that_never_comes_is_refused(tmp_path: Path) -> None:
         ({"halvings": lambda n: 10**9}, "damaged"),
         ({"step_size": lambda h: 0.0}, "damaged"),
         ({"circumstances": lambda c: {"numpy": 3}}, "damaged"),
+        *(
+            ({"kept": lambda k, name=name, wrong=wrong: {**k, name: wrong}}, "delete it and resume")
+            for name in ("soundness", "soundness rises")
+            for wrong in (np.array(1.0), np.empty(0), np.ones((1, 4)), np.ones((2, 2, 2)))
+        ),
+        ({"kept": lambda k: {"soundness": k["soundness"]}}, "how the energy residual"),
     ],
 )
 def test_a_forged_checkpoint_is_refused(

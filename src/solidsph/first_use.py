@@ -15,6 +15,7 @@ from solidsph import handed_back
 from solidsph.blame import described
 from solidsph.errors import BuildError
 from solidsph.interfaces.condition import ForceCondition, StoringCondition
+from solidsph.particles import read_only
 from solidsph.registry import entry_of, singular
 
 if TYPE_CHECKING:
@@ -29,15 +30,18 @@ _QUICK: Mapping[str, Sequence[str]] = {
     "integrators": ("bookkeeping", "imposed_motion"),
 }
 
-# Of a change of energy: differences over a thousandth of a spacing err by about their square.
+# Of a change of energy. Differences over a thousandth of the displacement err by its square, 1e-6,
+# and by as much where a thousandth of the particles comes to touch something within them.
 _DIFFERENT = 1e-3
 
-_SMALL = 1e-3  # of a spacing
+_MOVED = 1e-2  # displacements at which energies are compared, in spacings
+_SMALL = 1e-5  # differences, in spacings: far less, so that a force may be of any power of them
 
 _OF_STEP = 0.02  # of the highest frequency that the step bears
 
-_asked: dict[tuple[str, str], tuple[str, ...]] = {}
-"""By kind and part: what was found in this process."""
+_asked: dict[tuple[str, type, str], tuple[str, ...]] = {}
+"""By kind, class and part: what was found in this process. A class that is defined anew, as one
+does in a notebook, is another class."""
 
 
 class PartWarning(UserWarning):
@@ -57,9 +61,10 @@ def ask(simulation: Simulation, parts: Sequence[tuple[str, Any]]) -> None:
 
 
 def _found(simulation: Simulation, parts: Sequence[tuple[str, Any]]) -> list[str]:
+    _check_forces(simulation, parts)
     found: list[str] = []
     for kind, part in parts:
-        key = kind, repr(part)
+        key = kind, type(part), repr(part)
         if key not in _asked:
             _asked[key] = tuple(_quick(kind, part))
         found += _asked[key]
@@ -67,7 +72,6 @@ def _found(simulation: Simulation, parts: Sequence[tuple[str, Any]]) -> list[str
     for label, effect in simulation.effects.items():
         if any(effect is one for one in foreign):
             found += _of_effect(simulation, label, effect)
-    _check_forces(simulation, parts)
     return found
 
 
@@ -98,17 +102,23 @@ def _of_effect(simulation: Simulation, label: str, effect: Any) -> Iterator[str]
     rng = np.random.default_rng(0)
     state = simulation.initial
     X, real = state.positions, ~particles.ghosts[:, None]
-    du = np.where(real, rng.normal(size=X.shape), 0.0) * particles.spacings.min()
+    moved, du = (
+        np.where(real, rng.normal(size=X.shape), 0.0) * particles.spacings.min() for _ in "ud"
+    )
     still, memory = np.zeros_like(X), state.memory
 
-    def force(u: Any, v: Any) -> Any:
+    def force(u: Any, v: Any, time: float = 0.0) -> Any:
         out = np.zeros_like(X)
-        out[condition.particles] = condition.advance(0.0, 0.0, X + u, v, memory)[0]
+        out[condition.particles] = condition.advance(time, 0.0, X + u, v, memory)[0]
         return out
 
     wrong: list[str] = []
     if isinstance(condition, StoringCondition):
-        wrong += _of_energy(simulation, condition, effect, force, du)
+        end = simulation.steps * simulation.step_size
+        for time in (0.0, end):
+            wrong += _of_energy(simulation, condition, effect, force, time, _MOVED * moved, du)
+            if wrong:
+                break
     h = _SMALL
     norm = float(np.sum(masses[:, None] * du**2))
     for name, declared, change in (
@@ -127,7 +137,8 @@ def _of_effect(simulation: Simulation, label: str, effect: Any) -> Iterator[str]
         found = float(np.sum(du * change)) / norm
         power = 0.5 if name == "stiffness_rate" else 1.0
         # What is small beside the fastest motion of the step makes no difference to it.
-        if found > 1.01 * declared + (_OF_STEP * 2.0 / simulation.step_size) ** (1.0 / power):
+        unnoticed = (_OF_STEP * 2.0 / simulation.step_size) ** (1.0 / power)
+        if found > 1.01 * declared + unnoticed:
             wrong.append(
                 f"{name} is {declared**power:.4g} 1/s, and a motion has {found**power:.4g} 1/s at "
                 "least by the effect alone"
@@ -141,16 +152,17 @@ def _of_energy(
     simulation: Simulation,
     condition: Any,
     effect: Any,
-    force: Callable[[Any, Any], Any],
+    force: Callable[[Any, Any, float], Any],
+    time: float,
+    u: Any,
     du: Any,
 ) -> Iterator[str]:
     import attrs
 
-    X = simulation.initial.positions
-    u, d = 0.01 * du[::-1], _SMALL * du
+    X, d = simulation.initial.positions, _SMALL * du
 
     def energies(u: Any) -> Any:
-        state = attrs.evolve(simulation.initial, positions=X + u)
+        state = attrs.evolve(simulation.initial, time=time, positions=X + u)
         return condition.energies(simulation.dynamics.observe(state))
 
     def stored(u: Any) -> float:
@@ -163,7 +175,7 @@ def _of_energy(
                 f"have the shape {np.shape(energies(u))}; {(len(X),)} is expected"
             ]
         )
-    f = force(u, np.zeros_like(X))
+    f = force(u, np.zeros_like(X), time)
     change, work = stored(u + d) - stored(u - d), 2.0 * float(np.vdot(f, d))
     scale = 2.0 * float(np.abs(f * d).sum())
     if abs(change + work) > _DIFFERENT * scale:
@@ -183,10 +195,16 @@ def _check_forces(simulation: Simulation, parts: Sequence[tuple[str, Any]]) -> N
 
 def force_problems(simulation: Simulation, modules: set[str]) -> list[str]:
     """What is wrong with the forces of conditions whose classes are of `modules`."""
-    state, d = simulation.initial, simulation.particles.dimension
+    # One that writes to what it is given is told so here, before it changes a motion.
+    state, d = read_only(simulation.initial), simulation.particles.dimension
     found = []
     for load in simulation.dynamics.loads:
         if type(load).__module__ in modules and isinstance(load, ForceCondition):
-            f = load.advance(0.0, 0.0, state.positions, state.velocities, state.memory)[0]
-            found.append(handed_back.force(load, f, d))
+            x, v, h = state.positions, state.velocities, simulation.step_size
+            f, kept = load.advance(0.0, 0.0, x, v, state.memory)
+            wrong = handed_back.force(load, f, d) or handed_back.kept(load, kept)
+            if not wrong:
+                f, kept = load.advance(h, h, x, v, {**state.memory, **kept})
+                wrong = handed_back.force(load, f, d) or handed_back.kept(load, kept)
+            found.append(wrong)
     return [one for one in found if one]

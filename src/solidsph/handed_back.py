@@ -110,8 +110,21 @@ def force(found: ForceCondition, force: Any, dimension: int) -> str:
     expected = (len(found.particles), dimension)
     if np.shape(force) != expected:
         return f"{found.label!r}: forces have the shape {np.shape(force)}; {expected} is expected"
+    if np.asarray(force).dtype.kind not in "fiu":
+        return f"{found.label!r}: forces are {np.asarray(force).dtype}; real numbers are expected"
     if not np.all(np.isfinite(force)):
         return f"{found.label!r}: a force is not finite"
+    return ""
+
+
+def kept(found: ForceCondition, kept: Any) -> str:
+    """What is wrong with what is to be remembered of a step; nothing if all is well."""
+    if not isinstance(kept, Mapping):
+        return f"{found.label!r}: `advance` returned {kept!r}; a mapping of arrays is expected"
+    for name in kept:
+        # Another name might be somebody else's, and one would read what the other left.
+        if not isinstance(name, str) or not name.startswith(found.label):
+            return f"{found.label!r} remembers {name!r}; a name that begins with its label is due"
     return ""
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solidsph.errors import DivergedError, UnsoundError
+from solidsph.errors import DivergedError, RecordError, UnsoundError
 from solidsph.hooks import implementation
 from solidsph.interfaces.condition import Observation
 from solidsph.interfaces.formulation import Configuration
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from solidsph.particles import State
     from solidsph.simulation import Simulation
 
-_KEPT = "soundness"
+_KEPT, _RISES = "soundness", "soundness rises"
 
 # A quarter of the energy in play at the default tolerance, a hundredth: see `Soundness`.
 _SWINGS = 25.0
@@ -79,14 +79,19 @@ class Soundness:
         if self._part >= before >= _LOST:
             self.judge(simulation)
 
-    @implementation
+    @implementation(tryfirst=True)  # what it cannot use is told before the record is taken over
     def solidsph_resume(
         self, simulation: Simulation, observation: Observation, kept: Mapping[str, Array]
     ) -> None:
         if _KEPT in kept:
-            self._accounts = Accounts.taken(kept[_KEPT][:-1])
+            self._accounts = Accounts.taken(np.atleast_1d(kept[_KEPT])[:-1])
             self._first = float(kept[_KEPT][-1])
-            self._rises = kept[f"{_KEPT} rises"]
+            self._rises = kept.get(_RISES, np.empty(0))
+            if self._rises.ndim != 2 or self._rises.shape[1] != 3:
+                raise RecordError(
+                    "the checkpoint does not hold how the energy residual of its run rose; delete "
+                    "it and resume again: the run is then carried out from its first state"
+                )
         else:  # nobody judged until here
             self._accounts.add(observation)
             self._first = _swing(simulation, observation)
@@ -94,7 +99,7 @@ class Soundness:
     @implementation
     def solidsph_keep(self, simulation: Simulation, kept: dict[str, Array]) -> None:
         kept[_KEPT] = np.append(self._accounts.kept(), self._first)
-        kept[f"{_KEPT} rises"] = self._rises
+        kept[_RISES] = self._rises
 
     def judge(self, simulation: Simulation) -> None:
         """Called at the end of the run.

@@ -72,6 +72,7 @@ class Symmetry(BoundaryHandler):
                     images=interpolation(particles, images),
                     # Beyond a corner of two planes a ghost is mirrored in both.
                     signs=np.where(np.abs(X - images) > _on_plane_tolerance(setting), -1.0, 1.0),
+                    reports=not conditions,
                 )
             )
         return conditions
@@ -101,6 +102,7 @@ class Mirror(LinearExtension):
     shape: tuple[int, ...]  # (n, d)
     images: csr_array  # (k, n)
     signs: Array  # (k, d) the diagonals of R
+    reports: bool  # the reaction of the plane, unless the particles on it do
 
     @property
     def displacement(self) -> csr_array:
@@ -111,4 +113,4 @@ class Mirror(LinearExtension):
         return self.images
 
     def report(self, observation: Observation) -> Mapping[str, float]:
-        return reaction(observation, self.label)
+        return reaction(observation, self.label) if self.reports else {}

@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 
 from solidsph.arrays import Array
+from solidsph.errors import RecordError
 from solidsph.interfaces.condition import Observation
 from solidsph.results.energy import residual, total_energy
 
@@ -32,5 +33,14 @@ class Accounts:
 
     @classmethod
     def taken(cls, kept: Array) -> Accounts:
-        """From such an array."""
+        """From such an array.
+
+        Raises:
+            RecordError: it is none.
+        """
+        if kept.shape != (len(attrs.fields(cls)),):
+            raise RecordError(
+                "the checkpoint does not hold the energies of its run; delete it and resume again: "
+                "the run is then carried out from its first state"
+            )
         return cls(*kept.tolist())

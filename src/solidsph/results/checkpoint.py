@@ -57,8 +57,10 @@ class Checkpoint:
 
 
 def checkpoint_path(record: Path) -> Path:
-    """Where the checkpoint of a record is."""
-    return record.with_name(f"{record.stem}.checkpoint")
+    """Where the checkpoint of a record is: beside the file itself, where the path is a link."""
+    real = Path(os.path.realpath(record))
+    # Records of two suffixes may have one stem.
+    return real.with_name(f"{real.stem if real.suffix == '.h5' else real.name}.checkpoint")
 
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:

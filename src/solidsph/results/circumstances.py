@@ -43,12 +43,30 @@ def is_part(name: str) -> bool:
 
 
 def _codes(used: Sequence[PluginUsed]) -> Iterator[tuple[str, str]]:
-    """Digest of the code of every module that a part is in: its version may not tell a change."""
-    for module in dict.fromkeys(part.target.partition(":")[0] for part in used):
-        file = getattr(sys.modules.get(module), "__file__", None)
-        if file is not None:
-            with suppress(OSError):
-                yield module, hashlib.blake2b(Path(file).read_bytes(), digest_size=8).hexdigest()
+    """Digest of the code of every package that a part is in, or of its module where that is in
+    none: its version may not tell a change, and what a part calls may be in another module."""
+    for name in dict.fromkeys(_package(part.target.partition(":")[0]) for part in used):
+        file = getattr(sys.modules.get(name), "__file__", None)
+        if file is None:
+            continue
+        is_package = hasattr(sys.modules[name], "__path__")
+        files = sorted(Path(file).parent.rglob("*.py")) if is_package else [Path(file)]
+        found = hashlib.blake2b(digest_size=8)
+        with suppress(OSError):
+            for one in files:
+                found.update(hashlib.blake2b(one.read_bytes()).digest())
+            yield name, found.hexdigest()
+
+
+def _package(module: str) -> str:
+    """The outermost package that a module is in, but for those that several distributions share;
+    the module itself if there is none."""
+    names = module.split(".")
+    for count in range(1, len(names)):
+        above = ".".join(names[:count])
+        if getattr(sys.modules.get(above), "__file__", None) is not None:
+            return above
+    return module
 
 
 def named_parts(used: Sequence[PluginUsed]) -> Mapping[str, str]:

@@ -10,7 +10,7 @@ from solidsph.errors import RecordError
 from solidsph.results.layout import RUNNING
 from solidsph.results.record import NotARecordError, Record, check_is_record
 from solidsph.results.record_writer import check_free
-from solidsph.session import FINISHED, INTERRUPTED
+from solidsph.session import FINISHED, INTERRUPTED, is_over
 
 # Outcomes of runs that would come to the same end again.
 _ENDED = (FINISHED, "diverged", "unsound", "ConvergenceError")
@@ -39,6 +39,8 @@ class Left:
             return f"an interrupted run up to t = {self.until:.6g} s"
         if self.outcome == FINISHED:
             return f"a finished run up to t = {self.until:.6g} s"
+        if is_over(self.outcome):
+            return f"an unsound run up to t = {self.until:.6g} s"
         return f"a run up to t = {self.until:.6g} s that ended early ({self.outcome.split(':')[0]})"
 
 

@@ -125,10 +125,11 @@ def _of_arrays(name: str, then: Any, now: Any, scale: float, exactly: bool) -> I
     allowed = 0.0 if exactly else _ROUNDING * max(scale, float(largest))
     wrong = apart.reshape(len(apart), -1).max(axis=1, initial=0.0) > allowed
     if wrong.any():
-        row = int(np.argmax(wrong))
+        row, largest_apart = int(np.argmax(wrong)), float(apart.max())
         yield (
             f"{name} differ for {int(wrong.sum())} of {len(wrong)}, first for {row}: "
-            f"{_short(one[row])} in the record, {_short(other[row])} now"
+            f"{_short(one[row])} in the record, {_short(other[row])} now; at most "
+            f"{largest_apart:.3g} apart"
         )
 
 

@@ -105,4 +105,6 @@ def _names(shown: object, at_rest: Observation) -> Sequence[str]:
 
 
 def _clash(what: str, one: str, other: str) -> str:
+    if one == other:  # which no label can mend
+        return f"{one} gives a record the {what} twice, which is a fault of that part"
     return f"{one} and {other} would both give a record the {what}; give {other} another label"

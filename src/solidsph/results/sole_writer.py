@@ -33,6 +33,7 @@ def sole_writer(path: Path) -> Iterator[None]:
         RecordError: another one does; it names that one. Or the folder cannot be written.
     """
     lock = _lock_of(path)
+    _check_lock(lock)
     try:
         lock.parent.mkdir(parents=True, exist_ok=True)
         handle = _locked(lock)
@@ -56,6 +57,7 @@ def check_no_writer(path: Path) -> None:
         RecordError: one is; it names that one.
     """
     lock = _lock_of(path)
+    _check_lock(lock)
     if fcntl is None or not lock.exists():
         return
     with suppress(FileNotFoundError, PermissionError), lock.open("rb") as file:
@@ -72,6 +74,16 @@ def _lock_of(path: Path) -> Path:
     return real.with_name(f".{real.name}.lock")
 
 
+def _check_lock(lock: Path) -> None:
+    """That nothing else has its name: a link would lead to a file that is somebody's own, and a
+    pipe would keep `open` waiting."""
+    if lock.is_symlink() or (lock.exists() and not lock.is_file()):
+        raise RecordError(
+            f"{lock} is not a regular file, and has the name of the one by which a run keeps "
+            "others from its record; move it away, or choose another place for the record"
+        )
+
+
 def _locked(lock: Path) -> int:
     """The lock file, open and locked.
 
@@ -79,7 +91,7 @@ def _locked(lock: Path) -> int:
         BlockingIOError: somebody else has locked it.
     """
     while True:
-        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
         try:
             if fcntl is not None:
                 try:

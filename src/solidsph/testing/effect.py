@@ -36,6 +36,8 @@ _FORMS = ("total-lagrangian", "updated-lagrangian")
 _MATERIAL = {"youngs_modulus": 1e6, "poissons_ratio": 0.3, "density": 1000.0}
 _SPEED = 37.0  # of its confined wave [m/s]
 
+_TIME = 1e-3  # at which forces and energies are asked [s]
+
 # After so many, whatever remembers has something to remember.
 _FIRST_STEPS = 4
 
@@ -70,7 +72,7 @@ class _Sample:
         waves, phases = self.rng.normal(size=(d, d)), self.rng.uniform(0.0, 2.0 * np.pi, d)
         return np.asarray(0.02 * length * np.sin(self.positions @ waves * 3.0 / length + phases))
 
-    def forces(self, positions: Array, velocities: Array, time: float = 1e-3) -> Array:
+    def forces(self, positions: Array, velocities: Array, time: float = _TIME) -> Array:
         """On all particles, (n, d) [N]."""
         found = np.zeros_like(positions)
         force, _ = self.condition.advance(time, 0.0, positions, velocities, self.memory)
@@ -371,7 +373,7 @@ def _energy_problem(sample: _Sample, u: Array) -> str:
 def _observed(sample: _Sample, u: Array) -> Observation:
     simulation = sample.simulation
     state = attrs.evolve(
-        simulation.start(), positions=sample.positions + u, memory=dict(sample.memory)
+        simulation.start(), time=_TIME, positions=sample.positions + u, memory=dict(sample.memory)
     )
     return simulation.dynamics.observe(state)
 

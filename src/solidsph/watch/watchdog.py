@@ -76,7 +76,7 @@ class Watchdog:
         self._looked: dict[Symptom, int] = {}  # the step of the last look
         self._is_clean = False  # whether nothing at all was wrong with `good`
 
-    @implementation
+    @implementation(tryfirst=True)  # what it cannot use is told before the record is taken over
     def solidsph_resume(
         self, simulation: Simulation, observation: Observation, kept: Mapping[str, Array]
     ) -> None:
