@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from tests.waiting import HANG
+
 # In a process of its own: what it starts must not be taken along into other tests. Threads are
 # asked for from the first operation on, so that a small scene has them.
 CODE = """
@@ -58,7 +60,7 @@ def test_a_fork_says_so(way: str) -> None:
         capture_output=True,
         text=True,
         check=False,
-        timeout=600,
+        timeout=HANG,
         env={"NUMBA_NUM_THREADS": "2", "PATH": "", "PYTHONPATH": "."},
     )
     assert expected in child.stdout, child.stderr
@@ -75,7 +77,7 @@ def test_a_fork_before_any_thread_runs() -> None:
         capture_output=True,
         text=True,
         check=False,
-        timeout=600,
+        timeout=HANG,
         env={"NUMBA_NUM_THREADS": "2", "PATH": "", "PYTHONPATH": "."},
     )
     assert "['ran']" in child.stdout, child.stderr

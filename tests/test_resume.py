@@ -455,8 +455,9 @@ def test_checkpoints_take_a_hundredth_of_the_time(
     simulation = moving(box(1)).duration(0.1).outputs(40).build()
     simulation.run(record=tmp_path / "run.h5", observers=[clock])
     assert clock.outputs == 41
-    # Writing is thought to take 0.02 s, so the first comes after 2 s; the others after 12.5 s.
-    assert clock.written_at == [3, 16, 29]
+    # Writing is thought to take 0.02 s, so the first comes after 2 s; the others after 12.5 s, and
+    # the last at the end, from which `--until` goes on.
+    assert clock.written_at == [3, 16, 29, 41]
 
 
 # What the record does not hold

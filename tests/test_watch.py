@@ -100,7 +100,7 @@ def test_speed_is_against_the_body(part: float, grade: object) -> None:
 
 
 @pytest.mark.parametrize(
-    ("left", "grade"), [(0.3, None), (0.2, Grade.WARNING), (0.01, Grade.FAILURE)]
+    ("left", "grade"), [(0.2, None), (0.1, Grade.WARNING), (0.01, Grade.FAILURE)]
 )
 def test_neighbours(left: float, grade: Grade | None) -> None:
     bar = box(1, 20)
@@ -339,7 +339,7 @@ def test_the_command(tmp_path: Path) -> None:
     assert "watchdog, failure at t = " in done.stderr or "diverged" in done.stderr
     assert "Traceback" not in done.stderr
     assert (tmp_path / "out/record-watchdog.png").exists()
-    for words in (["upwinding", "--watch"], [str(scene), "--roll-back", "1"]):
+    for words in (["upwinding", "--watch"], [str(scene), "--no-watch", "--roll-back", "1"]):
         refused = run(*words)
         assert refused.returncode == 2
         assert refused.stderr.startswith("error: --")
