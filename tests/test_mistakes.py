@@ -11,13 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import solidsph.cover
 from solidsph import Scene, Simulation, cli
 from solidsph.builder import Builder
 from solidsph.commands.target import resolve
 from solidsph.costs import fits
+from solidsph.costs.estimated import estimated
 from solidsph.errors import BuildError, SceneError
 from solidsph.parts import construct
 from solidsph.problems import MOST_OF_A_KIND, Problems
+from solidsph_builtin.shapes import _outline
 from tests.scenes import SCENE_TOML, box
 
 
@@ -279,6 +282,44 @@ def test_an_outline_that_crosses_itself_is_found(count: int) -> None:
                 "vertices": [*round_about, (1.5 * middle).tolist(), (0.9 * middle).tolist()],
             },
         )
+
+
+def test_of_a_tangled_outline_not_all_crossings_are_looked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Of 3000 edges at random, 4.5 million pairs, about every fourth crosses: it takes the first
+    # of many lots to find one.
+    looked: list[int] = []
+    cross = _outline._cross
+    monkeypatch.setattr(_outline, "_AT_ONCE", 10_000)
+    monkeypatch.setattr(_outline, "_cross", lambda a, b: looked.append(len(a)) or cross(a, b))
+    vertices = np.random.default_rng(1).uniform(size=(3000, 2)).tolist()
+    with pytest.raises(SceneError, match=r"edge-\d+ meets edge-\d+"):
+        construct("shapes", {"type": "polygon", "vertices": vertices})
+    assert sum(looked) < 5 * 2 * 10_000
+
+
+def test_the_cover_of_a_scene_is_found_once_whatever_its_bodies(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[float] = []
+    held = solidsph.cover.held
+    monkeypatch.setattr(solidsph.cover, "held", lambda *one: asked.append(one[2]) or held(*one))
+
+    def times(bodies: int) -> int:
+        scene = Builder().material(
+            "neo-hookean", youngs_modulus=1e6, poissons_ratio=0.3, density=1e3
+        )
+        for k in range(bodies):
+            scene.body(
+                f"b{k}", shape={"type": "interval", "length": 1.0, "origin": 2.0 * k}, spacing=0.1
+            )
+        asked.clear()
+        estimated(scene.duration(1e-3).scene())
+        scene.build()
+        return len(asked)
+
+    assert times(5) == times(1)
 
 
 # Memory

@@ -18,7 +18,6 @@ import pluggy
 from solidsph import compatibility, handed_back, registry
 from solidsph.blame import described
 from solidsph.body import Body
-from solidsph.cover import cover_of
 from solidsph.dynamics import Dynamics
 from solidsph.engines.history import HistoryFields, remembering
 from solidsph.errors import BuildError, SceneError
@@ -84,6 +83,7 @@ class Assembly:
         particles, tag_conditions = problems.settled(placed)
         effects = parts.effects
         kernel = problems.settled(parts.kernel)
+        cover = problems.settled(parts.cover)
         formulation = problems.settled(parts.formulation)
         problems.add(compatibility.apart(parts.shapes, parts.sets))
         bodies = [
@@ -95,6 +95,7 @@ class Assembly:
                 own,
                 parts.materials[name],
                 kernel,
+                cover,
                 formulation,
             )
             for name, own in parts.sets.items()
@@ -226,9 +227,10 @@ class Assembly:
         own: Particles,
         material: Material,
         kernel: Kernel,
+        cover: float,
         formulation: Formulation,
     ) -> Body:
-        radius = cover_of(self._scene) * float(own.spacings.max())
+        radius = cover * float(own.spacings.max())
         body = Body(
             name=name,
             shape=shape,
