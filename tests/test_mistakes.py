@@ -70,6 +70,49 @@ def test_all_mistakes_are_one_message(mistakes: tuple[tuple[tuple[str, str], str
     assert message.count("\n  - ") == len(mistakes)  # and nothing that follows from another
 
 
+@pytest.mark.parametrize(
+    ("extra", "told"),
+    [
+        ('[[effect]]\ntype = "body-force"\nacceleration = {y = "-9.81*foo"}', "unknown name 'foo'"),
+        ('[[effect]]\ntype = "body-force"\nacceleration = {y = -9.81, q = 1}', "component 'q'"),
+        ('[[initial]]\nvelocity = {x = "sin("}', "'sin(' cannot be read"),
+        ('[[boundary]]\ntype = "pressure"\nwhere = "top"\npressure = "1 +"', "'1 +' cannot be"),
+        (
+            '[[boundary]]\ntype = "traction"\nwhere = "top"\ntraction = {x = "u", y = "v"}',
+            "unknown name 'v'",
+        ),
+        (
+            '[[boundary]]\ntype = "traction"\nwhere = "top"\ntraction = {x = nan}',
+            "expected a finite number, got nan",
+        ),
+        (
+            '[[effect]]\ntype = "heat"\nconductivity = 1\nheat_capacity = 1\nsource = "Q"',
+            "unknown name 'Q'",
+        ),
+    ],
+)
+def test_formulas_that_cannot_be_read_are_told_with_all_else(extra: str, told: str) -> None:
+    # Formulas are needed long after materials; still, nobody should have to come twice.
+    message = message_of(
+        changed(UNKNOWN_MATERIAL[0], TAG[0], ("[integrator]", f"{extra}\n[integrator]"))
+    )
+    for one in (UNKNOWN_MATERIAL[1], TAG[1], told):
+        assert one in message
+    assert message.count(told) == 1
+
+
+def test_all_wrong_values_of_a_material_are_told() -> None:
+    message = message_of(
+        changed(
+            ("youngs_modulus = 1e6", "youngs_modulus = 0"),
+            ("poissons_ratio = 0.3", "poissons_ratio = 0.5"),
+            ("density = 1000.0", "density = -1"),
+        )
+    )
+    for name in ("youngs_modulus", "poissons_ratio", "density"):
+        assert f"{name} must" in message
+
+
 def test_a_mistyped_key_is_not_missing_as_well() -> None:
     message = message_of(changed(("spacing = 0.125", "spacng = 0.125"), ("density", "densty")))
     assert "did you mean 'spacing'" in message
@@ -132,6 +175,7 @@ def test_many_mistyped_names_are_one_short_message() -> None:
         b"\xef\xbb\xbf" + SCENE_TOML.encode(),
         SCENE_TOML.replace("\n", "\r\n").encode(),
         b"\xef\xbb\xbf" + SCENE_TOML.replace("\n", "\r\n").encode(),
+        SCENE_TOML.replace("\n", "\r").encode(),
     ],
 )
 def test_a_scene_as_other_editors_write_it(data: bytes, tmp_path: Path) -> None:
