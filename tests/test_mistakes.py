@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import solidsph.cover
-from solidsph import Scene, Simulation, cli
+from solidsph import Scene, Simulation, cli, compatibility
 from solidsph.builder import Builder
 from solidsph.commands.target import resolve
 from solidsph.costs import fits
@@ -364,6 +364,21 @@ def test_the_cover_of_a_scene_is_found_once_whatever_its_bodies(
         return len(asked)
 
     assert times(5) == times(1)
+
+
+def test_of_many_bodies_in_one_place_few_pairs_are_looked_at(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    looked: list[object] = []
+    overlap = compatibility.overlap
+    monkeypatch.setattr(compatibility, "overlap", lambda *one: looked.append(one) or overlap(*one))
+    scene = Builder().material("neo-hookean", youngs_modulus=1e6, poissons_ratio=0.3, density=1e3)
+    for k in range(30):  # 435 pairs
+        scene.body(f"b{k}", shape={"type": "box", "lengths": [1.0, 1.0]}, spacing=0.5)
+    with pytest.raises(BuildError) as caught:
+        scene.duration(1e-3).build()
+    assert str(caught.value).count("are in one place") == MOST_OF_A_KIND == len(looked)
+    assert "425 more pairs of bodies" in str(caught.value)
 
 
 # Memory
