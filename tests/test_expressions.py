@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -65,6 +67,37 @@ def test_anything_else_is_refused(text: str) -> None:
 def test_unknown_name_has_the_nearest_match() -> None:
     with pytest.raises(SceneError, match=r"unknown name 'tt'; did you mean 't'\?"):
         Expression.parse("2*tt", ("X", "t"))
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        ("(t > 1) and 5e3", "5000.0"),  # in Python 5e3; as a condition it would be 1
+        ("X > 0 or 0.5", "0.5"),
+        ("tip and X", "X"),
+        ("tip and X - 0.5", "X - 0.5"),
+        ("1e3*(not t)", "t"),
+        ("where(X, 1, 2)", "X"),
+        ("where(X > 0 and t, 1, 2)", "t"),
+    ],
+)
+def test_a_number_is_no_condition(text: str, number: str) -> None:
+    with pytest.raises(SceneError, match=re.escape(f"{number!r} is a number")):
+        Expression.parse(text, ("X", "t", "tip"), ("tip",))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("tip and (X > 0)*(X < 1)", (X > 0) & (X < 1)),  # as NumPy's users write "and"
+        ("where((X > 0) + (X > 1), 5, 0)", np.where(X > 0, 5.0, 0.0)),
+        ("not max(tip, X > 0)", np.zeros(7, dtype=bool)),
+        ("where(tip, X, 0)", X),
+    ],
+)
+def test_what_counts_comparisons_may_be_a_condition(text: str, expected: np.ndarray) -> None:
+    values = {"X": X, "t": 0.5, "tip": np.ones(7, dtype=bool)}
+    assert np.array_equal(Expression.parse(text, tuple(values), ("tip",))(values), expected)
 
 
 def test_powers_overflow_instead_of_growing_without_end() -> None:

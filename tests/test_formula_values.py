@@ -159,7 +159,8 @@ FORMULAS = [
 
 @pytest.mark.parametrize("text", FORMULAS)
 def test_a_motion_that_ends_with_the_run_is_carried_out(text: str) -> None:
-    simulation = slowing(x=text).build()
+    # Roots have no bounded velocity at their ends, so in no number of steps do energies add up.
+    simulation = slowing(x=text).energy_tolerance("off").build()
     assert simulation.run().state.step == simulation.steps
 
 

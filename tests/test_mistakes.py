@@ -11,13 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solidsph import Scene, Simulation, cli
+import solidsph.cover
+from solidsph import Scene, Simulation, cli, compatibility
 from solidsph.builder import Builder
 from solidsph.commands.target import resolve
 from solidsph.costs import fits
+from solidsph.costs.estimated import estimated
 from solidsph.errors import BuildError, SceneError
 from solidsph.parts import construct
 from solidsph.problems import MOST_OF_A_KIND, Problems
+from solidsph_builtin.shapes import _outline
 from tests.scenes import SCENE_TOML, box
 
 
@@ -65,6 +68,49 @@ def test_all_mistakes_are_one_message(mistakes: tuple[tuple[tuple[str, str], str
     for _, expected in mistakes:
         assert message.count(expected) == 1
     assert message.count("\n  - ") == len(mistakes)  # and nothing that follows from another
+
+
+@pytest.mark.parametrize(
+    ("extra", "told"),
+    [
+        ('[[effect]]\ntype = "body-force"\nacceleration = {y = "-9.81*foo"}', "unknown name 'foo'"),
+        ('[[effect]]\ntype = "body-force"\nacceleration = {y = -9.81, q = 1}', "component 'q'"),
+        ('[[initial]]\nvelocity = {x = "sin("}', "'sin(' cannot be read"),
+        ('[[boundary]]\ntype = "pressure"\nwhere = "top"\npressure = "1 +"', "'1 +' cannot be"),
+        (
+            '[[boundary]]\ntype = "traction"\nwhere = "top"\ntraction = {x = "u", y = "v"}',
+            "unknown name 'v'",
+        ),
+        (
+            '[[boundary]]\ntype = "traction"\nwhere = "top"\ntraction = {x = nan}',
+            "expected a finite number, got nan",
+        ),
+        (
+            '[[effect]]\ntype = "heat"\nconductivity = 1\nheat_capacity = 1\nsource = "Q"',
+            "unknown name 'Q'",
+        ),
+    ],
+)
+def test_formulas_that_cannot_be_read_are_told_with_all_else(extra: str, told: str) -> None:
+    # Formulas are needed long after materials; still, nobody should have to come twice.
+    message = message_of(
+        changed(UNKNOWN_MATERIAL[0], TAG[0], ("[integrator]", f"{extra}\n[integrator]"))
+    )
+    for one in (UNKNOWN_MATERIAL[1], TAG[1], told):
+        assert one in message
+    assert message.count(told) == 1
+
+
+def test_all_wrong_values_of_a_material_are_told() -> None:
+    message = message_of(
+        changed(
+            ("youngs_modulus = 1e6", "youngs_modulus = 0"),
+            ("poissons_ratio = 0.3", "poissons_ratio = 0.5"),
+            ("density = 1000.0", "density = -1"),
+        )
+    )
+    for name in ("youngs_modulus", "poissons_ratio", "density"):
+        assert f"{name} must" in message
 
 
 def test_a_mistyped_key_is_not_missing_as_well() -> None:
@@ -129,6 +175,7 @@ def test_many_mistyped_names_are_one_short_message() -> None:
         b"\xef\xbb\xbf" + SCENE_TOML.encode(),
         SCENE_TOML.replace("\n", "\r\n").encode(),
         b"\xef\xbb\xbf" + SCENE_TOML.replace("\n", "\r\n").encode(),
+        SCENE_TOML.replace("\n", "\r").encode(),
     ],
 )
 def test_a_scene_as_other_editors_write_it(data: bytes, tmp_path: Path) -> None:
@@ -279,6 +326,59 @@ def test_an_outline_that_crosses_itself_is_found(count: int) -> None:
                 "vertices": [*round_about, (1.5 * middle).tolist(), (0.9 * middle).tolist()],
             },
         )
+
+
+def test_of_a_tangled_outline_not_all_crossings_are_looked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Of 3000 edges at random, 4.5 million pairs, about every fourth crosses: it takes the first
+    # of many lots to find one.
+    looked: list[int] = []
+    cross = _outline._cross
+    monkeypatch.setattr(_outline, "_AT_ONCE", 10_000)
+    monkeypatch.setattr(_outline, "_cross", lambda a, b: looked.append(len(a)) or cross(a, b))
+    vertices = np.random.default_rng(1).uniform(size=(3000, 2)).tolist()
+    with pytest.raises(SceneError, match=r"edge-\d+ meets edge-\d+"):
+        construct("shapes", {"type": "polygon", "vertices": vertices})
+    assert sum(looked) < 5 * 2 * 10_000
+
+
+def test_the_cover_of_a_scene_is_found_once_whatever_its_bodies(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[float] = []
+    held = solidsph.cover.held
+    monkeypatch.setattr(solidsph.cover, "held", lambda *one: asked.append(one[2]) or held(*one))
+
+    def times(bodies: int) -> int:
+        scene = Builder().material(
+            "neo-hookean", youngs_modulus=1e6, poissons_ratio=0.3, density=1e3
+        )
+        for k in range(bodies):
+            scene.body(
+                f"b{k}", shape={"type": "interval", "length": 1.0, "origin": 2.0 * k}, spacing=0.1
+            )
+        asked.clear()
+        estimated(scene.duration(1e-3).scene())
+        scene.build()
+        return len(asked)
+
+    assert times(5) == times(1)
+
+
+def test_of_many_bodies_in_one_place_few_pairs_are_looked_at(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    looked: list[object] = []
+    overlap = compatibility.overlap
+    monkeypatch.setattr(compatibility, "overlap", lambda *one: looked.append(one) or overlap(*one))
+    scene = Builder().material("neo-hookean", youngs_modulus=1e6, poissons_ratio=0.3, density=1e3)
+    for k in range(30):  # 435 pairs
+        scene.body(f"b{k}", shape={"type": "box", "lengths": [1.0, 1.0]}, spacing=0.5)
+    with pytest.raises(BuildError) as caught:
+        scene.duration(1e-3).build()
+    assert str(caught.value).count("are in one place") == MOST_OF_A_KIND == len(looked)
+    assert "425 more pairs of bodies" in str(caught.value)
 
 
 # Memory

@@ -571,3 +571,44 @@ def test_damping_shortens_the_critical_step() -> None:
     damped = critical_step(box(1).effect("mass-damping", rate=1e3).build())
     assert damped.highest_frequency == pytest.approx(free.highest_frequency, rel=1e-6)
     assert damped.step == pytest.approx(2.0 / (free.highest_frequency + 1e3), rel=1e-6)
+
+
+# --- Small loads ---------------------------------------------------------------------------------
+
+
+def steel(traction: float, material: str = "neo-hookean") -> Simulation:
+    """A bar of 1 x 0.2 m, pulled along its length."""
+    return (
+        Simulation.builder()
+        .body("bar", shape={"type": "box", "lengths": [1.0, 0.2]}, spacing=0.05)
+        .material(material, youngs_modulus=2e11, poissons_ratio=0.0, density=7850.0)
+        .formulation("total-lagrangian")
+        .boundary("clamp", where="left")
+        .boundary("traction", where="right", traction={"x": traction})
+        .duration(1.0)
+        .build()
+    )
+
+
+@pytest.mark.parametrize("material", ["neo-hookean", "linear-elastic"])
+@pytest.mark.parametrize("traction", [1.0, 1e3])
+def test_a_unit_load_on_steel_is_in_equilibrium(material: str, traction: float) -> None:
+    simulation = steel(traction, material)
+    found = equilibrium(simulation)
+    # The force is that of 0.2 m; what rounding leaves of it is told, and at most 1e-4.
+    reaction = sum(found.state.applied["clamp left"][:, 0])
+    assert found.residual < 1e-4
+    assert reaction == pytest.approx(-0.2 * traction, rel=1e-4)
+    # Displacements are in proportion to so small a load, 5e-6 of the modulus at most. Positions
+    # round at 1e-16 m, and 1 Pa moves the end by 5e-12 m.
+    much = steel(1e6, material)
+    ends = [
+        float(np.mean(displacements(one, state)[one.particles.tags["right"], 0]))
+        for one, state in ((simulation, found.state), (much, equilibrium(much).state))
+    ]
+    assert ends[0] / traction == pytest.approx(ends[1] / 1e6, rel=1e-4)
+
+
+def test_a_load_that_positions_cannot_hold_is_told() -> None:
+    with pytest.raises(ConvergenceError, match="less than positions can hold"):
+        equilibrium(steel(1e-6))

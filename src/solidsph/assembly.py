@@ -18,7 +18,6 @@ import pluggy
 from solidsph import compatibility, handed_back, registry
 from solidsph.blame import described
 from solidsph.body import Body
-from solidsph.cover import cover_of
 from solidsph.dynamics import Dynamics
 from solidsph.engines.history import HistoryFields, remembering
 from solidsph.errors import BuildError, SceneError
@@ -79,11 +78,12 @@ class Assembly:
         scene, problems = self._scene, self._problems
         parts = self._making.parts()
         placed = self._placed(parts)
-        self._stop_if_any(None if placed is None else placed[0])
+        self._stop_if_any(parts, None if placed is None else placed[0])
 
         particles, tag_conditions = problems.settled(placed)
         effects = parts.effects
         kernel = problems.settled(parts.kernel)
+        cover = problems.settled(parts.cover)
         formulation = problems.settled(parts.formulation)
         problems.add(compatibility.apart(parts.shapes, parts.sets))
         bodies = [
@@ -95,18 +95,19 @@ class Assembly:
                 own,
                 parts.materials[name],
                 kernel,
+                cover,
                 formulation,
             )
             for name, own in parts.sets.items()
         ]
-        self._stop_if_any(particles)
+        self._stop_if_any(parts, particles)
 
         made = [problems.settled(body) for body in bodies]
         scheme = problems.settled(parts.integrator)
         problems.attempt(self._check_constants, scheme, effects, made)
-        self._stop_if_any(particles)
+        self._stop_if_any(parts, particles)
         step = problems.attempt(self._step_size, scheme, effects, made)
-        self._stop_if_any(particles)
+        self._stop_if_any(parts, particles)
         steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
         setting = Setting(
             particles=particles,
@@ -171,9 +172,11 @@ class Assembly:
 
     def problems(self, *, places: bool) -> Sequence[str]:
         """What is wrong with the scene's words, their values and, if asked for, its places."""
-        placed = self._placed(self._making.parts())
+        parts = self._making.parts()
+        placed = self._placed(parts)
         if places and placed is not None:
             self._look_for(placed[0])
+        self._read_formulas(parts)
         return self._problems.found
 
     def _check_constants(
@@ -198,11 +201,33 @@ class Assembly:
             return None
         return self._tagged(Particles.joined(sets))
 
-    def _stop_if_any(self, placed: Particles | None) -> None:
-        """Stop if there are problems; those of places, which are found later, are told too."""
-        if self._problems.found and placed is not None:
-            self._look_for(placed)
+    def _stop_if_any(self, parts: Parts, placed: Particles | None) -> None:
+        """Stop if there are problems; those found later, of places and formulas, are told too."""
+        if self._problems.found:
+            if placed is not None:
+                self._look_for(placed)
+            self._read_formulas(parts)
         self._problems.stop_if_any()
+
+    def _read_formulas(self, parts: Parts) -> None:
+        """Note formulas of parts and initial values that cannot be read."""
+        fields: list[tuple[object, str]] = []
+        for label, part in (*parts.handlers.items(), *parts.effects.items()):
+            fields += [
+                (getattr(part, field.name), f"{label}: {field.name}")
+                for field in attrs.fields(type(part))
+                if "Component" in str(field.type)  # annotations are text here
+            ]
+        for entry in self._scene.initial:
+            fields += [
+                (entry.displacement, "initial: displacement"),
+                (entry.velocity, "initial: velocity"),
+            ]
+        for value, what in fields:
+            if isinstance(value, Mapping):
+                self._problems.attempt(VectorField.of, value, what)
+            elif isinstance(value, (str, int, float)):
+                self._problems.attempt(VectorField.of, {"x": value}, what)
 
     def _look_for(self, particles: Particles) -> None:
         """Note places of boundaries, effects and initial values that match no particle."""
@@ -226,9 +251,10 @@ class Assembly:
         own: Particles,
         material: Material,
         kernel: Kernel,
+        cover: float,
         formulation: Formulation,
     ) -> Body:
-        radius = cover_of(self._scene) * float(own.spacings.max())
+        radius = cover * float(own.spacings.max())
         body = Body(
             name=name,
             shape=shape,

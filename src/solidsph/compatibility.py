@@ -24,6 +24,7 @@ from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.shape import Shape
 from solidsph.overlap import overlap
 from solidsph.particles import Particles
+from solidsph.problems import MOST_OF_A_KIND
 from solidsph.scene import OFF, Scene
 from solidsph.where import AXES, EVERYWHERE, variable
 
@@ -200,24 +201,35 @@ def dimensions(shapes: Mapping[str, Shape], cover: float | None) -> Iterator[str
 
 
 def apart(shapes: Mapping[str, Shape], sets: Mapping[str, Particles]) -> Iterator[str]:
-    """No two bodies in one place."""
+    """No two bodies in one place; beyond the first pairs that are, no others are looked at."""
     names = list(shapes)
     boxes = np.array([shape.bounds() for shape in shapes.values()])  # (b, 2, d)
     spacings = np.array([float(sets[name].spacings.min()) for name in names])
+    told, passed_over = 0, 0
     for k, name in enumerate(names[:-1]):
         rest = boxes[k + 1 :]
         common = np.minimum(rest[:, 1], boxes[k, 1]) - np.maximum(rest[:, 0], boxes[k, 0])
-        for other in k + 1 + np.flatnonzero(np.all(common > 0.0, axis=1)):
+        near = k + 1 + np.flatnonzero(np.all(common > 0.0, axis=1))
+        if told == MOST_OF_A_KIND:
+            passed_over += len(near)
+            continue
+        for number, other in enumerate(near, 1):
             spacing = min(spacings[k], spacings[other])
             found = overlap(shapes[name], shapes[names[other]], _TOUCHING * spacing)
             if found is not None:
                 place = ", ".join(f"{x:.4g}" for x in found.place)
+                told += 1
                 yield (
                     f"bodies {name!r} and {names[other]!r} are in one place: they overlap by "
                     f"{found.depth:.3g} m ({found.depth / spacing:.2g} spacings) around "
                     f"({place}); move one, or cut it out with a 'difference'. To press bodies "
                     "together, let them touch, and move one by an initial displacement"
                 )
+            if told == MOST_OF_A_KIND:
+                passed_over += len(near) - number
+                break
+    if passed_over:
+        yield f"{passed_over} more pairs of bodies, whose boxes overlap, were not looked at"
 
 
 def motions(held_by: Sequence[MotionCondition], particles: Particles) -> Iterator[str]:

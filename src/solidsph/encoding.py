@@ -8,12 +8,15 @@ import codecs
 def decoded(data: bytes) -> str:
     """Text in UTF-8, with or without the byte order mark that some programs put first.
 
+    Line ends of any system become "\\n".
+
     Raises:
         ValueError: it is in another encoding, or no text.
     """
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or 0 in data:
         raise ValueError("it is in UTF-16, or no text at all; save it as text in UTF-8")
     try:
-        return data.decode("utf-8-sig")
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError as cause:
         raise ValueError(f"it is not in UTF-8 ({cause}); save it so") from None
+    return text.replace("\r\n", "\n").replace("\r", "\n")

@@ -5,6 +5,7 @@ permitted ones, so a scene file can never run code.
 
 A comparison is true or false where a condition is wanted: by `and`, `or`, `not` and `where`. In
 arithmetic and in other functions it is the number 1.0 or 0.0, so that "(t > 1) + (t > 2)" counts.
+A number without any comparison is no condition: "(t > 1) and 5" would be 1, and is refused.
 """
 
 from __future__ import annotations
@@ -83,8 +84,15 @@ class Expression:
     _tree: ast.expr = attrs.field(eq=False, repr=False)
 
     @classmethod
-    def parse(cls, text: str, variables: Collection[str]) -> Expression:
+    def parse(
+        cls, text: str, variables: Collection[str], conditions: Collection[str] = ()
+    ) -> Expression:
         """Check `text` as a formula of `variables`.
+
+        Args:
+            text: the formula.
+            variables: the names that it may use.
+            conditions: those of them that are true or false; the others are numbers.
 
         Raises:
             SceneError: it is no formula, or names something unknown.
@@ -96,6 +104,7 @@ class Expression:
             _check(tree, text, tuple(variables))
             if _depth(tree) > MAX_DEPTH:
                 raise ValueError(f"nested more than {MAX_DEPTH} deep")
+            _check_conditions(tree, text, frozenset(conditions))
         except (SyntaxError, ValueError, RecursionError, MemoryError, Warning) as cause:
             why = cause.msg if isinstance(cause, SyntaxError) else cause
             raise SceneError(
@@ -176,6 +185,37 @@ def _check(node: ast.AST, text: str, variables: tuple[str, ...]) -> None:
                 _check(part, text, variables)
         case _:
             raise refuse(repr(ast.unparse(node)))
+
+
+def _check_conditions(tree: ast.AST, text: str, conditions: frozenset[str]) -> None:
+    """Raise SceneError where a mere number stands for a condition."""
+    for node in ast.walk(tree):
+        wanted: list[ast.expr] = []
+        match node:
+            case ast.BoolOp(values=wanted):
+                word = "and" if isinstance(node.op, ast.And) else "or"
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                wanted, word = [operand], "not"
+            case ast.Call(func=ast.Name(id="where"), args=[first, *_]):
+                wanted, word = [first], "where"
+        for part in wanted:
+            if not any(_is_condition(one, conditions) for one in ast.walk(part)):
+                raise SceneError(
+                    f"formula {text!r}: {ast.unparse(part)!r} is a number, and {word!r} takes "
+                    "conditions such as 'X > 0.1'; compare it, or multiply it by a comparison: "
+                    "'5*(t > 0.1)'"
+                )
+
+
+def _is_condition(node: ast.AST, conditions: frozenset[str]) -> bool:
+    match node:
+        case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
+            return True
+        case ast.Name(id=name):
+            return name in conditions
+        case ast.Attribute():
+            return ast.unparse(node) in conditions
+    return False
 
 
 def _is_double(number: float) -> bool:

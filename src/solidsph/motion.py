@@ -49,17 +49,24 @@ class VectorField:
         """From a scene's table such as {x = "0.1*t", y = 0}, in a scene up to `end` [s].
 
         Raises:
-            SceneError: an unknown component, or a formula that cannot be read.
+            SceneError: unknown components, or formulas that cannot be read: all of them are told.
         """
         if not isinstance(table, Mapping) or not table:
             raise SceneError(
                 f'{what} must be a table of components such as {{x = "0.1*X"}}, got {table!r}'
             )
         components: dict[int, Component] = {}
+        wrong: list[str] = []
         for name, value in table.items():
             if name not in _COMPONENT_NAMES:
-                raise SceneError(f"{what}: unknown component {name!r}; expected x, y or z")
-            components[_COMPONENT_NAMES.index(name)] = _checked(value, f"{what}.{name}")
+                wrong.append(f"{what}: unknown component {name!r}; expected x, y or z")
+                continue
+            try:
+                components[_COMPONENT_NAMES.index(name)] = _checked(value, f"{what}.{name}")
+            except SceneError as cause:
+                wrong.append(str(cause))
+        if wrong:
+            raise SceneError("; ".join(wrong))
         return cls(components, end, what)
 
     def check_without(self, names: Collection[str], why: str) -> None:

@@ -54,7 +54,7 @@ def text_of(path: Path) -> str:
     """
     try:
         if path.is_dir():
-            inside = sorted(one.name for one in path.glob("*.toml"))
+            inside = sorted(one.name for one in path.glob("*.toml") if one.is_file())
             hint = f"such as {str(path / inside[0])!r}" if inside else "of which it holds none"
             raise OSError(f"it is a folder; give a scene file, {hint}")
         if not path.exists():
@@ -68,7 +68,7 @@ def near(wanted: str, *others: str) -> str:
     """A hint at the scene files beside the one `wanted`, and the `others`, that are called much
     like it."""
     path = Path(wanted)
-    files = list(islice(path.parent.glob("*.toml"), _MOST_FILES))
+    files = [one for one in islice(path.parent.glob("*.toml"), _MOST_FILES) if one.is_file()]
     called = {name: str(file) for file in files for name in (file.name, file.stem)}
     called |= {name: name for name in others}
     found = dict.fromkeys(called[name] for name in get_close_matches(path.name, called, 6))

@@ -87,7 +87,7 @@ def holds(
         _check_names(particles, where)
     axes = AXES[: particles.dimension]
     try:
-        formula = Expression.parse(text, [*tags, *axes, *values, "t"])
+        formula = Expression.parse(text, [*tags, *axes, *values, "t"], [*tags, *values])
     except SceneError:
         _check_names(particles, where)
         raise

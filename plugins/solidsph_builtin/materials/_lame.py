@@ -12,19 +12,25 @@ def checked_lame(
     """Moduli (lambda, mu) [Pa] from Young's modulus [Pa] and Poisson's ratio [-].
 
     Raises:
-        SceneError: a constant is outside the range in which the law is stable.
+        SceneError: constants are outside the range in which the law is stable; all are told.
     """
+    wrong: list[str] = []
     for name, value, unit in (
         ("youngs_modulus", youngs_modulus, "Pa"),
         ("density", density, "kg/m^3"),
     ):
-        check_positive(f"material {material!r}", name, value, unit)
+        try:
+            check_positive(f"material {material!r}", name, value, unit)
+        except SceneError as cause:
+            wrong.append(str(cause))
     if not -1.0 < poissons_ratio < 0.5:
-        raise SceneError(
+        wrong.append(
             f"material {material!r}: poissons_ratio must lie between -1 and 0.5, both excluded, "
             f"got {poissons_ratio}; an incompressible solid needs a mixed formulation, take "
             "0.49 to come near it"
         )
+    if wrong:
+        raise SceneError("; ".join(wrong))
     mu = youngs_modulus / (2.0 * (1.0 + poissons_ratio))
     lam = 2.0 * mu * poissons_ratio / (1.0 - 2.0 * poissons_ratio)
     return lam, mu

@@ -93,10 +93,12 @@ class Outline:
 
 
 def first_crossing(starts: Array, ends: Array) -> tuple[int, int] | None:
-    """The first two edges that share a point other than the vertex between neighbours."""
+    """Two edges that share a point other than the vertex between neighbours.
+
+    The lowest of those that are found together: of a tangle not all pairs are looked at.
+    """
     edges, count = ends - starts, len(starts)
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
-    first: tuple[int, int] | None = None
     for one, two in _overlapping(low, high):
         i, j = np.minimum(one, two), np.maximum(one, two)
         # Two segments meet where their boxes overlap and each has its ends on both sides of the
@@ -113,9 +115,9 @@ def first_crossing(starts: Array, ends: Array) -> tuple[int, int] | None:
         folded = _cross(edges[i], edges[j]) == 0.0
         folded &= np.sum(edges[i] * edges[j], axis=1) < 0.0
         meets = np.where(neighbours, folded, meets)
-        pairs = list(zip(i[meets].tolist(), j[meets].tolist(), strict=True))
-        first = min([*pairs, *([first] if first is not None else [])], default=None)
-    return first
+        if meets.any():
+            return min(zip(i[meets].tolist(), j[meets].tolist(), strict=True))
+    return None
 
 
 def _overlapping(low: Array, high: Array) -> Iterator[tuple[Indices, Indices]]:

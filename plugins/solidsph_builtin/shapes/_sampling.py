@@ -28,9 +28,14 @@ def cells_along(length: float, spacing: float) -> int:
     return max(1, math.floor(length / spacing + 0.5 + 1e-9))
 
 
+def samples_along(length: float, spacing: float, per_cell: int) -> int:
+    """How many samples `length` [m] gets, `per_cell` for each cell of about `spacing` [m]."""
+    return per_cell * cells_along(length, spacing)
+
+
 def midpoints(length: float, spacing: float, per_cell: int) -> Array:
     """Centres of equal intervals that fill 0 to `length` [m], `per_cell` to each cell, (m,) [m]."""
-    count = per_cell * cells_along(length, spacing)
+    count = samples_along(length, spacing, per_cell)
     return np.arange(0.5, count) * (length / count)
 
 

@@ -13,7 +13,7 @@ from solidsph.arrays import Array
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph_builtin.shapes._checks import as_points, check_coordinates, refusal
 from solidsph_builtin.shapes._outline import Outline, first_crossing
-from solidsph_builtin.shapes._sampling import ON_LINE, joined, midpoints
+from solidsph_builtin.shapes._sampling import ON_LINE, samples_along
 
 
 def _as_ring(value: Any) -> Any:
@@ -87,16 +87,20 @@ class Polygon(Shape):
 
     def surface(self, spacing: float) -> Surface:
         """As in the interface; every edge has its exact length and normal."""
-        outward = np.sign(self._signed_area())
-        pieces = []
-        for i, (start, end) in enumerate(zip(*self._edges(), strict=True)):
-            edge = end - start
-            length = float(np.hypot(*edge))
-            along = midpoints(length, spacing, ON_LINE) / length
-            normal = outward * np.array([edge[1], -edge[0]])
-            area_vectors = np.tile(normal / along.size, (along.size, 1))
-            pieces.append((f"edge-{i}", start + along[:, np.newaxis] * edge, area_vectors))
-        return joined(pieces)
+        starts, ends = self._edges()
+        edges = ends - starts
+        lengths = np.hypot(*edges.T).tolist()
+        counts = np.array([samples_along(length, spacing, ON_LINE) for length in lengths])
+        owners = np.repeat(np.arange(len(edges)), counts)
+        within = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
+        along = (within + 0.5) / counts[owners]
+        normals = np.sign(self._signed_area()) * np.stack([edges[:, 1], -edges[:, 0]], axis=1)
+        names = [f"edge-{i}" for i in range(len(edges))]
+        return Surface(
+            points=starts[owners] + along[:, np.newaxis] * edges[owners],
+            area_vectors=(normals / counts[:, np.newaxis])[owners],
+            faces=tuple(names[i] for i in owners.tolist()),
+        )
 
     def volume(self) -> float:
         """Area [m^2]."""

@@ -59,7 +59,8 @@ def estimated(scene: Scene) -> Work:
     Raises:
         SceneError: a part is unknown, or its parameters are wrong.
     """
-    bodies = [_body(scene, body) for body in scene.bodies.values()]
+    cover = cover_of(scene)
+    bodies = [_body(scene, body, cover) for body in scene.bodies.values()]
     d = len(bodies[0].cells)
     formulation: Formulation = construct("formulations", scene.formulation)
     integrator: Integrator = construct("integrators", scene.integrator or DEFAULT_INTEGRATOR)
@@ -68,7 +69,7 @@ def estimated(scene: Scene) -> Work:
     pairs = round(sum(body.pairs for body in bodies))
     step = integrator.stability_limit / (2.0 / min(body.wave_time for body in bodies))
     size = scene.time_step or scene.time_step_factor * step
-    statics = None if scene.statics is None else _statics(scene, bodies, d)
+    statics = None if scene.statics is None else _statics(scene, bodies, d, cover)
     steps = max(1, ceil(scene.duration / size)) if statics is None else statics.load_steps
     outputs = (min(scene.outputs, steps) if statics is None else steps) + 1
     compiled = statics is None and _compiled(scene, n, steps)
@@ -98,12 +99,12 @@ def estimated(scene: Scene) -> Work:
         compilations=frozenset(_compilations(d, compiled=compiled, moving=moving)),
         statics=statics,
         counted=False,
-        cover=cover_of(scene),
+        cover=cover,
         motions=len(scene.boundaries),
     )
 
 
-def _body(scene: Scene, body: BodyScene) -> BodyEstimate:
+def _body(scene: Scene, body: BodyScene, cover: float) -> BodyEstimate:
     shape: Shape = construct("shapes", body.shape)
     wanted = body.material if body.material is not None else scene.material
     material: Material = construct("materials", wanted if wanted is not None else "")
@@ -114,7 +115,6 @@ def _body(scene: Scene, body: BodyScene) -> BodyEstimate:
     sides = np.maximum(1.0, (upper - lower) / h)
     lattice = _on_a_lattice(body)
     particles = max(1.0, volume / h**d)
-    cover = cover_of(scene)
     around = lattice_neighbours(cover, d) if lattice else ball(cover, d)
     cut = _surface(shape) / h ** (d - 1) * cut_off(cover, d) * around / ball(cover, d)
     share = min(1.0, particles / float(np.prod(sides)))
@@ -220,9 +220,9 @@ def _compilations(d: int, *, compiled: bool, moving: bool) -> Iterator[Compilati
         yield Compilation(piece, d, True)
 
 
-def _statics(scene: Scene, bodies: Sequence[BodyEstimate], d: int) -> StaticWork:
+def _statics(scene: Scene, bodies: Sequence[BodyEstimate], d: int, cover: float) -> StaticWork:
     assert scene.statics is not None
-    reach = 2.0 * cover_of(scene)
+    reach = 2.0 * cover
     factors = [dissected(body.cells, reach, d) for body in bodies]
     return StaticWork(
         load_steps=scene.statics.load_steps,

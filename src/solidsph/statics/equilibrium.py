@@ -29,9 +29,16 @@ _QUICK = 4
 # Rounding of a sum over neighbours, in units of a diagonal entry of K times the displacement.
 _ROUNDING = 4.0 * np.finfo(np.float64).eps
 
+# Where rounding leaves more of what is applied, an equilibrium is of no use.
+_MOST_ROUNDED = 1e-4
+
 _NOTHING_HOLDS = (
     "either nothing holds the body, or its gradients leave a pattern of motion without energy; "
     "clamp it in every direction, or add hourglass control"
+)
+_TOO_LITTLE = (
+    "what is applied deforms the body by less than positions can hold in double precision: apply "
+    "more, and scale the result down"
 )
 _PATH_ENDS = (
     "the load may exceed what the body can carry (a limit point): impose a displacement in its "
@@ -169,7 +176,8 @@ class _Newton:
     iterations: int = 0
     last: Factors | None = None
     singular_at_rest: bool = False
-    rounding: float = 0.0  # imbalance that is rounding alone [N]
+    rounding: float = 0.0  # imbalance that is rounding of displacements alone [N]
+    coarsest: float = 0.0  # that rounding of positions may leave, too [N]
 
     @classmethod
     def of(cls, simulation: Simulation, tolerance: float, max_iterations: int) -> _Newton:
@@ -198,12 +206,19 @@ class _Newton:
             return u, tuple(residuals)
         for _ in range(self.max_iterations):
             correction = self._correction(u, ahead, missing, forces, self.path.time(factor))
-            u, ahead = self._advanced(u, missing, factor, correction)
+            try:
+                u, ahead = self._advanced(u, missing, factor, correction)
+            except _LoadStepError:
+                if missing.any() or not self._rounded(forces):
+                    raise
+                return u, tuple(residuals)
             missing = self.path.placed(u, factor) - u
             forces = self.path.forces(u, factor)
             residuals.append(self._relative(forces))
             if not missing.any() and self._converged(forces):
                 return u, tuple(residuals)
+        if not missing.any() and self._rounded(forces):
+            return u, tuple(residuals)
         raise _LoadStepError(
             f"{self.max_iterations} iterations leave an imbalance of {residuals[-1]:.3g} of what "
             "is applied",
@@ -218,8 +233,10 @@ class _Newton:
         matrix = self.tangent.matrix(u, ahead, time)
         reduced = self.freedoms.reduced(matrix)
         self.iterations += 1
-        moved = np.abs(u[self.freedoms.free])
-        self.rounding = _ROUNDING * float(np.linalg.norm(reduced.diagonal() * moved))
+        free, diagonal = self.freedoms.free, reduced.diagonal()
+        x = self.path.simulation.particles.positions + u
+        self.rounding = _ROUNDING * float(np.linalg.norm(diagonal * np.abs(u[free])))
+        self.coarsest = _ROUNDING * float(np.linalg.norm(diagonal * np.abs(x[free])))
         try:
             factors = factorised(reduced, symmetric=self.symmetric)
         except SingularError as found:
@@ -253,7 +270,8 @@ class _Newton:
                         return trial, ahead
             length *= 0.5
         cause = "no part of Newton's step brings the forces nearer to balance"
-        raise _LoadStepError(cause, _PATH_ENDS, u)
+        imbalance = float(np.linalg.norm(self._imbalance(self.path.forces(u, factor))))
+        raise _LoadStepError(cause, _TOO_LITTLE if imbalance <= self.coarsest else _PATH_ENDS, u)
 
     def stable(self) -> bool | None:
         """Whether the last tangent was positive definite; None if nobody can tell."""
@@ -275,6 +293,15 @@ class _Newton:
     def _converged(self, forces: Forces) -> bool:
         allowed = max(self.tolerance * forces.scale, self.rounding)
         return bool(np.linalg.norm(self._imbalance(forces)) <= allowed)
+
+    def _rounded(self, forces: Forces) -> bool:
+        """Whether an imbalance that no step reduces is but rounding.
+
+        Under a small load positions do not hold all digits of the displacements: those of a metre
+        of steel that is pulled by 1 Pa are 5e-12 m, and positions end at 1e-16 m.
+        """
+        imbalance = float(np.linalg.norm(self._imbalance(forces)))
+        return imbalance <= min(self.coarsest, _MOST_ROUNDED * forces.scale)
 
     def _relative(self, forces: Forces) -> float:
         imbalance, scale = float(np.linalg.norm(self._imbalance(forces))), forces.scale
