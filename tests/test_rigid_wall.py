@@ -161,6 +161,55 @@ def test_what_cannot_be_is_refused_with_its_remedy(wall: Any, words: str) -> Non
         box(2).effect("rigid-wall", **{**FLOOR, **wall}).build()
 
 
+ON_BOUNDARY = {"type": "lattice", "on_boundary": True}
+JITTERED = {"type": "jittered-lattice", "amplitude": 0.25, "seed": 3}
+
+
+@pytest.mark.parametrize("discretisation", ["lattice", ON_BOUNDARY, "conforming-lattice", JITTERED])
+@pytest.mark.parametrize("height", [0.25, 0.34, 0.4, 0.45])
+def test_a_body_touches_where_its_surface_is(height: float, discretisation: Any) -> None:
+    """Flush with the wall nothing pushes, also where the spacing does not divide the body, so
+    that rows lie closer than a spacing (three in 0.25 m of 0.1 m). Pressed on, the wall pushes."""
+    simulation = (
+        Simulation.builder()
+        .body(
+            "block",
+            shape={"type": "box", "lengths": [1.0, height]},
+            spacing=0.1,
+            discretisation=discretisation,
+        )
+        .material("neo-hookean", youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
+        .effect("rigid-wall", **FLOOR)
+        .duration(0.01)
+        .build()
+    )
+    wall = simulation.conditions[0]
+    X = simulation.particles.positions
+
+    def pressure(moved: float) -> float:
+        return float(wall.forces(0.0, X - [0.0, moved], np.zeros_like(X))[:, 1].sum())  # type: ignore[attr-defined]
+
+    # Rounding of positions of a metre, by the modulus of 1.35 MPa over a spacing.
+    assert pressure(0.0) <= 1e-8
+    assert pressure(0.01) > 1e4
+
+
+def test_a_disc_touches_at_its_lowest_point() -> None:
+    """Where particles of its lowest row of a lattice are less than half a spacing deep."""
+    simulation = (
+        Simulation.builder()
+        .body("disc", shape={"type": "disc", "radius": 0.33, "centre": [0.0, 0.33]}, spacing=0.1)
+        .material("neo-hookean", youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
+        .effect("rigid-wall", **FLOOR)
+        .duration(0.01)
+        .build()
+    )
+    wall = simulation.conditions[0]
+    X = simulation.particles.positions
+    # Rounding, as above. Where rows are closer than a spacing, half of one is more than there is.
+    assert np.abs(wall.forces(0.0, X, np.zeros_like(X))).max() <= 1e-8  # type: ignore[attr-defined]
+
+
 def test_a_bar_thrown_at_a_wall_comes_back() -> None:
     """After 2 L / c with the opposite velocity, but for what the front sheds."""
     simulation: Simulation = (
