@@ -100,7 +100,7 @@ def test_speed_is_against_the_body(part: float, grade: object) -> None:
 
 
 @pytest.mark.parametrize(
-    ("left", "grade"), [(0.3, None), (0.2, Grade.WARNING), (0.01, Grade.FAILURE)]
+    ("left", "grade"), [(0.2, None), (0.1, Grade.WARNING), (0.01, Grade.FAILURE)]
 )
 def test_neighbours(left: float, grade: Grade | None) -> None:
     bar = box(1, 20)
@@ -109,6 +109,15 @@ def test_neighbours(left: float, grade: Grade | None) -> None:
     if finding:
         assert finding.particle == 6
         assert f"come to {left:.3g}" in finding.cause
+
+
+@pytest.mark.parametrize(
+    ("form", "remedy"), [("total", "hourglass-control"), ("updated", "the total Lagrangian form")]
+)
+def test_neighbours_are_helped_by_what_the_scene_lacks(form: str, remedy: str) -> None:
+    bar = box(1, 20).formulation(f"{form}-lagrangian")
+    finding = found(CollapsingNeighbours(), bar, displacements=moved(bar, 6, 0.99 * 0.05))
+    assert finding.remedy.startswith(remedy)
 
 
 def test_hourglass_share() -> None:
@@ -339,7 +348,7 @@ def test_the_command(tmp_path: Path) -> None:
     assert "watchdog, failure at t = " in done.stderr or "diverged" in done.stderr
     assert "Traceback" not in done.stderr
     assert (tmp_path / "out/record-watchdog.png").exists()
-    for words in (["upwinding", "--watch"], [str(scene), "--roll-back", "1"]):
+    for words in (["upwinding", "--watch"], [str(scene), "--no-watch", "--roll-back", "1"]):
         refused = run(*words)
         assert refused.returncode == 2
         assert refused.stderr.startswith("error: --")
