@@ -21,7 +21,7 @@ from solidsph.interfaces.condition import (
 )
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.motion import Component, VectorField
-from solidsph.parameters import as_number, check_positive, number
+from solidsph.parameters import check_positive, number, optional_number
 from solidsph.setting import Setting
 from solidsph.where import AXES, Where
 from solidsph_builtin.boundaries._reports import resultant
@@ -59,10 +59,7 @@ class RigidWall(Effect):
     where: Where = "all"
     friction: float = number(default=0.0)  # coefficient [-]
     strength: float = number(default=1.0)  # [-]
-    clearance: float | None = attrs.field(  # [spacings]; the depth below the surface if none
-        default=None,
-        converter=attrs.converters.optional(attrs.Converter(as_number, takes_field=True)),
-    )
+    clearance: float | None = optional_number()  # [spacings]; the depth below the surface if none
     displacement: Mapping[str, Component] | None = None  # such as {y = "-0.1*t"} [m]
 
     def __attrs_post_init__(self) -> None:
