@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from solidsph import BuildError, Record, SceneError, Simulation
+from solidsph.advice import advised
 from solidsph.builder import Builder
 from solidsph.statics import equilibrium
 from tests.scenes import box
@@ -192,6 +193,21 @@ def test_a_body_touches_where_its_surface_is(height: float, discretisation: Any)
     # Rounding of positions of a metre, by the modulus of 1.35 MPa over a spacing.
     assert pressure(0.0) <= 1e-8
     assert pressure(0.01) > 1e4
+
+
+@pytest.mark.parametrize(
+    ("gap", "heard"), [({"y": 0.0}, False), ({"y": -0.05}, False), ({"y": -100.0}, True)]
+)
+def test_a_body_that_falls_on_a_wall_is_held(gap: dict[str, float], heard: bool) -> None:
+    """It falls 20 m in 2 s: on a wall within that way, and on none that is further away."""
+    simulation = (
+        box(2, 5)
+        .effect("rigid-wall", point=gap, normal={"y": 1.0})
+        .effect("body-force", acceleration={"y": -10.0})
+        .duration(2.0)
+        .build()
+    )
+    assert ("unheld" in {one.name for one in advised(simulation)}) == heard
 
 
 def test_a_disc_touches_at_its_lowest_point() -> None:
