@@ -450,7 +450,7 @@ type = "contact"
     ),
     Flawed(
         "pressed-at-start",
-        "clearance = 0",
+        "no clearance",
         f"""
 title = "a block with particles on its lower side, on the ground"
 silence = ["unheld"]
@@ -467,6 +467,7 @@ acceleration = {{y = -9.81}}
 type = "rigid-wall"
 point = {{y = 0}}
 normal = {{y = 1}}
+clearance = 0.5
 """,
     ),
     Flawed(

@@ -107,6 +107,12 @@ def test_rollers_on_a_face_are_a_plane_of_symmetry_too() -> None:
     assert peak(built) == pytest.approx(peak(quarter(ON).build()), rel=1e-6)
 
 
+def test_a_plane_is_told_without_its_rounding() -> None:
+    """The rows of a lattice that conforms come to rest at 1e-20 m, and that is no place."""
+    for one in warnings(quarter("conforming-lattice").build()):
+        assert " = 0 m (" in one.found
+
+
 def test_no_false_alarm() -> None:
     """Cell-centred rollers, a clamp along all axes, held particles inside, quadratic gradients."""
     cells = sheet("lattice").boundary("clamp", where="left", axes=["x"])

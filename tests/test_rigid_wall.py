@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from solidsph import BuildError, Record, SceneError, Simulation
+from solidsph.advice import advised
 from solidsph.builder import Builder
 from solidsph.statics import equilibrium
 from tests.scenes import box
@@ -159,6 +160,70 @@ def test_newton_finds_a_block_at_rest_on_it() -> None:
 def test_what_cannot_be_is_refused_with_its_remedy(wall: Any, words: str) -> None:
     with pytest.raises((BuildError, SceneError), match=words):
         box(2).effect("rigid-wall", **{**FLOOR, **wall}).build()
+
+
+ON_BOUNDARY = {"type": "lattice", "on_boundary": True}
+JITTERED = {"type": "jittered-lattice", "amplitude": 0.25, "seed": 3}
+
+
+@pytest.mark.parametrize("discretisation", ["lattice", ON_BOUNDARY, "conforming-lattice", JITTERED])
+@pytest.mark.parametrize("height", [0.25, 0.34, 0.4, 0.45])
+def test_a_body_touches_where_its_surface_is(height: float, discretisation: Any) -> None:
+    """Flush with the wall nothing pushes, also where the spacing does not divide the body, so
+    that rows lie closer than a spacing (three in 0.25 m of 0.1 m). Pressed on, the wall pushes."""
+    simulation = (
+        Simulation.builder()
+        .body(
+            "block",
+            shape={"type": "box", "lengths": [1.0, height]},
+            spacing=0.1,
+            discretisation=discretisation,
+        )
+        .material("neo-hookean", youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
+        .effect("rigid-wall", **FLOOR)
+        .duration(0.01)
+        .build()
+    )
+    wall = simulation.conditions[0]
+    X = simulation.particles.positions
+
+    def pressure(moved: float) -> float:
+        return float(wall.forces(0.0, X - [0.0, moved], np.zeros_like(X))[:, 1].sum())  # type: ignore[attr-defined]
+
+    # Rounding of positions of a metre, by the modulus of 1.35 MPa over a spacing.
+    assert pressure(0.0) <= 1e-8
+    assert pressure(0.01) > 1e4
+
+
+@pytest.mark.parametrize(
+    ("gap", "heard"), [({"y": 0.0}, False), ({"y": -0.05}, False), ({"y": -100.0}, True)]
+)
+def test_a_body_that_falls_on_a_wall_is_held(gap: dict[str, float], heard: bool) -> None:
+    """It falls 20 m in 2 s: on a wall within that way, and on none that is further away."""
+    simulation = (
+        box(2, 5)
+        .effect("rigid-wall", point=gap, normal={"y": 1.0})
+        .effect("body-force", acceleration={"y": -10.0})
+        .duration(2.0)
+        .build()
+    )
+    assert ("unheld" in {one.name for one in advised(simulation)}) == heard
+
+
+def test_a_disc_touches_at_its_lowest_point() -> None:
+    """Where particles of its lowest row of a lattice are less than half a spacing deep."""
+    simulation = (
+        Simulation.builder()
+        .body("disc", shape={"type": "disc", "radius": 0.33, "centre": [0.0, 0.33]}, spacing=0.1)
+        .material("neo-hookean", youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
+        .effect("rigid-wall", **FLOOR)
+        .duration(0.01)
+        .build()
+    )
+    wall = simulation.conditions[0]
+    X = simulation.particles.positions
+    # Rounding, as above. Where rows are closer than a spacing, half of one is more than there is.
+    assert np.abs(wall.forces(0.0, X, np.zeros_like(X))).max() <= 1e-8  # type: ignore[attr-defined]
 
 
 def test_a_bar_thrown_at_a_wall_comes_back() -> None:

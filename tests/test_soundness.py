@@ -143,6 +143,40 @@ def test_sound_motions_are_left_in_peace(name: str) -> None:
     SOUND[name].engine("matrix").build().run()
 
 
+def light(traction: float, material: str = "neo-hookean") -> Builder:
+    return pulled(f"{traction}").material(material, **SOFT).engine("matrix")
+
+
+@pytest.mark.parametrize("material", ["neo-hookean", "saint-venant-kirchhoff", "linear-elastic"])
+@pytest.mark.parametrize("traction", [1e-9, 1e-6, 1e-3, 1e-2, 0.1, 1.0])
+def test_a_tiny_load_is_sound(traction: float, material: str) -> None:
+    """Strain energies are rounded to some 1e-16 of the modulus: more than there is in play."""
+    light(traction, material).build().run()
+
+
+def test_a_block_of_steel_under_its_weight_is_sound() -> None:
+    """5 cm strain by 2e-8, and their energy is 1e-15 of the modulus."""
+    (
+        Simulation.builder()
+        .body("block", shape={"type": "box", "lengths": [0.05, 0.05]}, spacing=0.005)
+        .material("neo-hookean", youngs_modulus=2e11, poissons_ratio=0.3, density=7800.0)
+        .boundary("clamp", where="bottom")
+        .effect("body-force", acceleration={"y": -9.81})
+        .duration(1e-4)
+        .outputs(20)
+        .engine("matrix")
+        .build()
+        .run()
+    )
+
+
+@pytest.mark.filterwarnings("ignore::solidsph.first_use.PartWarning")
+def test_a_small_load_that_goes_wrong_is_not_sound() -> None:
+    """Strains of 1e-5 are no rounding."""
+    with pytest.raises(UnsoundError):
+        lying().initial(velocity={"x": "1e-3*X"}).build().run()
+
+
 def test_an_equilibrium_is_not_judged_by_its_path() -> None:
     """One load step is one trapezium, which misses the work of a nonlinear law by much."""
     scene = pulled("4e5").statics(load_steps=1)

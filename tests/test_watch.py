@@ -111,6 +111,15 @@ def test_neighbours(left: float, grade: Grade | None) -> None:
         assert f"come to {left:.3g}" in finding.cause
 
 
+@pytest.mark.parametrize(
+    ("form", "remedy"), [("total", "hourglass-control"), ("updated", "the total Lagrangian form")]
+)
+def test_neighbours_are_helped_by_what_the_scene_lacks(form: str, remedy: str) -> None:
+    bar = box(1, 20).formulation(f"{form}-lagrangian")
+    finding = found(CollapsingNeighbours(), bar, displacements=moved(bar, 6, 0.99 * 0.05))
+    assert finding.remedy.startswith(remedy)
+
+
 def test_hourglass_share() -> None:
     """A zigzag, which the gradient of a lattice hardly sees."""
     bar = box(1, 20).effect("hourglass-control")

@@ -26,6 +26,17 @@ def number(**options: Any) -> Any:
     return attrs.field(converter=attrs.Converter(as_number, takes_field=True), **options)
 
 
+def optional_number(**options: Any) -> Any:
+    """The same, or None, which is the default."""
+
+    def converted(value: Any, field: attrs.Attribute[Any]) -> float | None:
+        return None if value is None else as_number(value, field)
+
+    return attrs.field(
+        default=None, converter=attrs.Converter(converted, takes_field=True), **options
+    )
+
+
 def check_positive(part: str, name: str, value: float, unit: str) -> None:
     """Raise SceneError unless `value` is positive and neither infinite nor absurdly large."""
     if not 1e-100 < value < 1e100:

@@ -21,7 +21,7 @@ from solidsph.interfaces.condition import (
 )
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.motion import Component, VectorField
-from solidsph.parameters import check_positive, number
+from solidsph.parameters import check_positive, number, optional_number
 from solidsph.setting import Setting
 from solidsph.where import AXES, Where
 from solidsph_builtin.boundaries._reports import resultant
@@ -36,13 +36,14 @@ _NAMES = ("x", "y", "z")
 @final
 @attrs.frozen
 class RigidWall(Effect):
-    """A particle nearer to the plane than `clearance` spacings is pushed back, as by a spring.
+    """A particle nearer to the plane than its `clearance` is pushed back, as by a spring.
 
     The normal points to the side where bodies are. With g the distance from the plane less the
     clearance, the energy is k min(g, 0)^2 / 2, and k = strength (lambda + 2 mu) V / s^2: the
-    wall yields as much as 1 / strength spacings of material. Particles at the centres of their
-    cells touch at half a spacing, the default; those of bodies with particles on their surface
-    at 0. A wall may move by formulas in t; what it gives is the work of its account.
+    wall yields as much as 1 / strength spacings of material. The clearance of a particle is its
+    depth below the surface of its body, and no more than half a spacing, so that a body touches
+    where its surface is, wherever its particles are, unless a number is given. A wall may move by
+    formulas in t; what it gives is the work of its account.
 
     Friction is Coulomb's law with a spring along the plane for each particle that touches, which
     gives way where it would pull with more than `friction` times the normal force, Cundall &
@@ -58,16 +59,17 @@ class RigidWall(Effect):
     where: Where = "all"
     friction: float = number(default=0.0)  # coefficient [-]
     strength: float = number(default=1.0)  # [-]
-    clearance: float = number(default=0.5)  # of particles that touch [spacings]
+    clearance: float | None = optional_number()  # [spacings]; the depth below the surface if none
     displacement: Mapping[str, Component] | None = None  # such as {y = "-0.1*t"} [m]
 
     def __attrs_post_init__(self) -> None:
         check_positive("rigid-wall", "strength", self.strength, "1 / spacings that it yields")
         for name, value in (("friction", self.friction), ("clearance", self.clearance)):
-            if not 0.0 <= value < 100.0:
+            if value is not None and not 0.0 <= value < 100.0:
                 raise SceneError(
                     f"rigid-wall: {name} must lie between 0 and 100, got {value}; friction is "
-                    "Coulomb's coefficient, clearance is in spacings, 0.5 or 0"
+                    "Coulomb's coefficient, clearance is in spacings; without one bodies touch "
+                    "where their surfaces are"
                 )
         for name in ("point", "normal"):
             _check_vector(name, getattr(self, name))
@@ -96,7 +98,7 @@ class RigidWall(Effect):
             reference=particles.positions,
             point=_vector("point", self.point, d),
             normal=normal / np.linalg.norm(normal),
-            clearances=self.clearance * s,
+            clearances=self._clearances(setting)[indices],
             springs=self.strength * moduli * V / s**2,
             friction=self.friction,
             field=field,
@@ -104,6 +106,16 @@ class RigidWall(Effect):
         )
         wall.motion(0.0, 0)  # a formula out of its domain shows now, not in mid-run
         return wall
+
+    def _clearances(self, setting: Setting) -> Array:
+        """Of all particles, (n,) [m]."""
+        particles = setting.particles
+        if self.clearance is not None:
+            return np.asarray(self.clearance * particles.spacings)
+        distances = [
+            body.shape.signed_distance(body.particles.positions) for body in setting.bodies
+        ]
+        return np.clip(-np.concatenate(distances), 0.0, 0.5 * particles.spacings)
 
     def arrays(self, setting: Setting) -> Mapping[str, int]:
         count = len(setting.select(self.where))

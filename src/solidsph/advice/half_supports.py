@@ -60,5 +60,6 @@ def _plane(one: SeenBody, held: Mask) -> tuple[str, float, int] | None:
         return None
     for way in (1.0, -1.0):
         if (way * real).min() >= -near:  # the body is on this side alone
-            return None if (way * ghosts < -near).any() else ("xyz"[axis], at, len(chosen))
+            place = 0.0 if abs(at) < near else at  # rounding is no place
+            return None if (way * ghosts < -near).any() else ("xyz"[axis], place, len(chosen))
     return None

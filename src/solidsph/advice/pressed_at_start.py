@@ -40,8 +40,8 @@ def pressed_at_start(seen: Seen) -> Iterator[Advice]:
                 f"{100.0 * strains[worst]:.2g} % of the modulus lambda + 2 mu, as where bodies "
                 "overlap or a wall cuts into one",
                 expected="no force before anything moves, as between faces that just touch",
-                remedy="move them apart; a wall needs clearance = 0 where particles are on the "
-                "surface; if bodies are meant to be pressed together, silence this",
+                remedy="move them apart, and give a wall no clearance, or a smaller one; if "
+                "bodies are meant to be pressed together, silence this",
             )
 
 

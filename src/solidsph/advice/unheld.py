@@ -19,11 +19,13 @@ def unheld(seen: Seen) -> Iterator[Advice]:
     if not seen.lacks(Need.MEETING):
         return
     for one in seen.bodies:
-        pull = np.where(one.held_axes, 0.0, _pull(seen, one))
+        pull = np.where(one.held_axes, 0.0, _pull(seen, one, 0.0))
         size = float(np.linalg.norm(pull))
         way = 0.5 * size * seen.scene.duration**2
         if size == 0.0 or (seen.moves and way <= _FAR * one.length):
             continue
+        if seen.moves and _pull(seen, one, way / size * pull) @ pull < 0.0:
+            continue  # a wall is in the way
         where = f"it will be {way:.3g} m away at the end" if seen.moves else "no equilibrium exists"
         yield Advice(
             found=f"nothing holds body {one.name!r} against what pulls it with "
@@ -33,14 +35,16 @@ def unheld(seen: Seen) -> Iterator[Advice]:
         )
 
 
-def _pull(seen: Seen, one: SeenBody) -> Array:
-    """Mean acceleration at the end of the duration, (d,) [m/s^2]."""
+def _pull(seen: Seen, one: SeenBody, moved: Array | float) -> Array:
+    """Mean acceleration at the end of the duration, were it `moved` [m], (d,) [m/s^2]."""
     simulation, extent = seen.simulation, one.body.extent
     masses = simulation.setting.masses[extent]
     pull = np.zeros(seen.dimension)
     rest = np.zeros_like(seen.velocities)
+    positions = simulation.initial.positions.copy()
+    positions[extent] += moved
     for load in simulation.dynamics.loads:
-        forces = load.forces(simulation.scene.duration, simulation.initial.positions, rest)
+        forces = load.forces(simulation.scene.duration, positions, rest)
         own = (load.particles >= extent.start) & (load.particles < extent.stop)
         pull += forces[own].sum(axis=0) / masses.sum()
     # What rounding leaves of forces that balance pulls nothing.

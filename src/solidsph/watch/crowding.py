@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from solidsph.arrays import Array, Indices
 from solidsph.body import Body
 from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.formulation import Configuration
 from solidsph.results.accounts import Accounts
 from solidsph.watch.symptom import Finding, Symptom, graded
 
@@ -51,9 +52,20 @@ class CollapsingNeighbours(Symptom):
             grade,
             found,
             f"a neighbour has come to {part:.3g} of its first distance",
-            "the total Lagrangian form, in which particles under tension do not attract each "
-            "other; a smaller step; artificial-viscosity where something strikes",
+            f"{_help(simulation, found)}; a smaller step; artificial-viscosity where something "
+            "strikes",
         )
+
+
+def _help(simulation: Simulation, particle: int) -> str:
+    """Against what brings particles of this body together."""
+    bodies = simulation.setting.bodies
+    body = next(one for one in bodies if one.extent.start <= particle < one.extent.stop)
+    if body.formulation.configuration is Configuration.CURRENT:
+        return (
+            "the total Lagrangian form, in which particles under tension do not attract each other"
+        )
+    return "hourglass-control, against motions that the gradient does not see"
 
 
 def _squares(positions: Array, a: Indices, b: Indices) -> Array:
