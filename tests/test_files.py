@@ -33,7 +33,7 @@ def with_points(file: Path | str) -> Builder:
 
 
 def refusal(act) -> str:
-    with within(SECONDS), pytest.raises(Exception, match=r"regular|bytes") as caught:
+    with within(SECONDS), pytest.raises(Exception, match=r"regular|bytes|a folder") as caught:
         act()
     return str(caught.value)
 
@@ -57,7 +57,7 @@ def test_what_is_no_regular_file_is_not_read(
     (tmp_path / "link").symlink_to(path)
     for one in (path, tmp_path / "link"):
         message = refusal(lambda one=one: READERS[reader](one))
-        assert f"it is {told}, not a regular file" in message
+        assert f"it is {told}" in message
         assert str(one) in message
 
 

@@ -303,7 +303,9 @@ def test_other_versions_and_plugins_are_refused_unless_forced(
         circumstances.metadata, "version", lambda name: "0.0.1" if name == "scipy" else real(name)
     )
     monkeypatch.setattr(
-        registry, "_entry", lambda kind, point, real=registry._entry: _renamed(real(kind, point))
+        registry,
+        "_entries",
+        lambda *key, real=registry._entries: tuple(_renamed(entry) for entry in real(*key)),
     )
     assert_refused(
         path, r"scipy was .*, is 0\.0\.1; .*kernel modified-mollifier was .*is solidsph 9\.9"

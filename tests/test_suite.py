@@ -132,7 +132,7 @@ def test_the_command(tmp_path: Path) -> None:
     surprised = solidsph("stability", "stretched-bar", *updated, cwd=tmp_path)
     assert surprised.returncode == 1
     verdict = json.loads(surprised.stdout)["trials"][0]
-    assert (verdict["grade"], verdict["as expected"]) == ("degraded", False)
+    assert (verdict["grade"], verdict["as expected"]) == ("failed", False)
     for wrong, message in (
         (("csm1",), "no hard settings"),
         (("stretched-bar", "--map"), "a map is of a scheme"),

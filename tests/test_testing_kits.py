@@ -27,16 +27,18 @@ from solidsph import (
     State,
     registry,
 )
-from solidsph.arrays import Array, Indices, Mask, Scalar, Tensor
+from solidsph.arrays import Array, Indices, Mask, Scalar, Tensor, Vector
 from solidsph.body import Body
 from solidsph.dynamics import Dynamics
 from solidsph.interfaces.condition import (
     Condition,
+    FieldCondition,
     ForceCondition,
     MotionCondition,
     Observation,
     StressCondition,
 )
+from solidsph.interfaces.declared import PointwiseForce, ScheduledForce
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.history import History
 from solidsph.interfaces.shape import Surface
@@ -50,6 +52,7 @@ from solidsph.tensors import (
     identity,
     product,
     scale,
+    scaled,
     small_strain,
     trace,
     transpose,
@@ -60,6 +63,7 @@ from solidsph_builtin.discretisations.lattice import Lattice
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 from solidsph_builtin.materials.viscoelastic import Viscoelastic
 from solidsph_builtin.shapes.box import Box
+from tests.test_lying_parts import LIES
 from tests.waiting import HANG
 
 # Kernels, each wrong in one respect
@@ -976,7 +980,41 @@ class PushesMoreAndMore(BoundaryHandler):
         return [Push(label, setting.select("left"))]
 
 
+class HeldWithFields(HeldInPlace, FieldCondition):
+    def fields(self, observation: Observation) -> dict[str, Array]:
+        return {"held [-]": np.full(len(self.held), np.nan)}
+
+
+class ShowsNoNumbers(GoodHandler):
+    condition = HeldWithFields
+
+
+@attrs.frozen(eq=False)
+class PushBySchedule(ScheduledForce):
+    """Declares a force that follows from time alone, and forms its own."""
+
+    label: str
+    particles: Indices
+    dimension: int
+
+    def schedule(self, times: Array) -> Array:
+        return np.zeros((1, len(self.particles), self.dimension))
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return np.ones((len(self.particles), self.dimension))
+
+    def report(self, observation: Observation) -> dict[str, float]:
+        return {}
+
+
+class PushesOtherwise(BoundaryHandler):
+    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+        return [PushBySchedule(label, setting.select("left"), setting.particles.dimension)]
+
+
 BOUNDARIES = [
+    (ShowsNoNumbers, {"fields"}),
+    (PushesOtherwise, {"derived"}),
     (BindsNothing, {"conditions"}),
     (HoldsOneMore, {"held only"}),
     (MovesOnTheSpot, {"rates", "energy account"}),
@@ -1097,7 +1135,41 @@ def _mended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(NeoHookean, "first_piola", staticmethod(neo_hookean_stress))
 
 
+class DragWithFields(Drag, FieldCondition):
+    def fields(self, observation: Observation) -> dict[str, Array]:
+        return {"drag [N]": np.zeros(len(self.particles) + 1)}
+
+
+class ShowsOneMore(GoodEffect):
+    condition = DragWithFields
+
+
+@attrs.frozen(eq=False)
+class OwnForces(PointwiseForce):
+    """Says by a formula what it does, and does something else."""
+
+    label: str
+    particles: Indices
+    values: Array
+
+    @staticmethod
+    def force(position: Vector, velocity: Vector, values: Vector) -> Vector:
+        return scaled(-values[0], velocity)
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return -0.5 * self.values * velocities[self.particles]
+
+    def report(self, observation: Observation) -> dict[str, float]:
+        return {}
+
+
+class DoesOtherwise(GoodEffect):
+    condition = OwnForces
+
+
 EFFECTS = [
+    (ShowsOneMore, {"fields"}),
+    (DoesOtherwise, {"derived"}),
     (OtherLabel, {"bound"}),
     (MovesParticles, {"forces", "energy account"}),
     (NegativeSize, {"arrays"}),
@@ -1158,6 +1230,7 @@ def test_a_broken_promise_is_found(kind: str, make: type[object], broken: set[st
 @pytest.mark.parametrize("kind", kits())
 def test_every_check_is_shown_to_fail_above(kind: str) -> None:
     shown = set().union(*(broken for _, broken in WRONG[kind]))
+    shown |= {check.replace("_", " ") for own, _, _, check in LIES.values() if own == kind}
     assert {check.__name__.replace("_", " ") for check in checks(kind)} == shown
 
 

@@ -115,7 +115,7 @@ def test_every_effect(effect: str) -> None:
 def test_others_go_step_by_step_with_compiled_forces(effect: str) -> None:
     by_engine = []
     for engine in ("compiled", "matrix"):
-        pressed = with_effect(effect, 2, 7).initial(velocity={"x": "-3*sin(2*X)"})
+        pressed = with_effect(effect, 2, 7).initial(velocity={"x": "3*sin(3*X)"})
         simulation = pressed.engine(engine).build()
         loop = simulation.time_loop()
         assert isinstance(loop, StepByStep)

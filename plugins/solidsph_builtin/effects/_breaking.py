@@ -11,10 +11,11 @@ import numpy as np
 from solidsph.arrays import Array, Mask
 from solidsph.body import Body
 from solidsph.engines.engine import InternalForces, StressFields
-from solidsph.engines.history import HistoryForces, Law
+from solidsph.engines.history import HistoryForces, Law, memory_name
 from solidsph.engines.matrix import MatrixForces, Operators, assembled, fixed_forces
 from solidsph.engines.tally import Tally
 from solidsph.interfaces.condition import StressCondition
+from solidsph.interfaces.history import HistoryMaterial
 from solidsph.neighbours import Pairs
 
 # A moment that is I in a full neighbourhood, and half of it at a flat surface: where its least
@@ -163,7 +164,28 @@ class BreakingForces(InternalForces):
                 kept[_RELEASED] = self._released(memory, displacements) + energies[0] - energies[1]
                 flags = after
         forces, histories = self._of(flags).advance(time, step, displacements, memory)
+        if histories:
+            released = kept.get(_RELEASED, self._released(memory, displacements))
+            kept[_RELEASED] = released - self._spared(flags, memory, histories)
         return forces, {**kept, **histories}
+
+    def _spared(
+        self, flags: Sequence[Array], memory: Mapping[str, Array], after: Mapping[str, Array]
+    ) -> Array:
+        """What laws count as dissipated in a step beyond the part that damage leaves, (n,) [J/m^3].
+
+        A law knows nothing of damage; its stress is scaled by 1 - D, and so is what it dissipates.
+        """
+        spared = np.zeros(sum(one.body.particles.count for one in self.bonds))
+        for law, one, own in zip(self.laws, self.bonds, flags, strict=True):
+            name, material = memory_name(law.body), law.body.material
+            if name in after and isinstance(material, HistoryMaterial):
+                lost = [
+                    material.dissipated(tuple(history.T))
+                    for history in (law.history_of(memory), after[name])
+                ]
+                spared[one.body.extent] = one.damage(own) * (lost[1] - lost[0])
+        return spared
 
     def fields(self, displacements: Array) -> StressFields:
         return self.observed(displacements, {})
