@@ -67,6 +67,7 @@ def test_a_fork_says_so(way: str) -> None:
     assert "refused" in child.stdout or expected == "ran"
 
 
+@pytest.mark.validation  # it compiles once more, in a process of its own
 def test_a_fork_before_any_thread_runs() -> None:
     """The usual case: workers are started, then each runs scenes of its own."""
     code = CODE.replace("MADE = built()", "MADE = None").format(

@@ -13,7 +13,7 @@ import numpy as np
 
 from solidsph import handed_back
 from solidsph.blame import described
-from solidsph.errors import BuildError
+from solidsph.errors import BuildError, PortableError
 from solidsph.interfaces.condition import ForceCondition, StoringCondition
 from solidsph.particles import read_only
 from solidsph.registry import entry_of, singular
@@ -44,7 +44,7 @@ _asked: dict[tuple[str, type, str], tuple[str, ...]] = {}
 does in a notebook, is another class."""
 
 
-class PartWarning(UserWarning):
+class PartWarning(PortableError, UserWarning):
     """A part does not keep a promise of its interface."""
 
 
