@@ -44,7 +44,7 @@ _asked: dict[tuple[str, type, str], tuple[str, ...]] = {}
 does in a notebook, is another class."""
 
 
-class PartWarning(PortableError, UserWarning):
+class PartWarning(PortableError, UserWarning):  # noqa: N818 (a warning, no error)
     """A part does not keep a promise of its interface."""
 
 
