@@ -49,6 +49,8 @@ EMPTY = (
     "where = 'X > 9' matches no particle",
 )
 STEP = ('type = "central-difference"', "time_step = 1.0"), "exceeds the CFL step"
+SPACING = ("spacing = 0.125", 'spacing = "fine"'), "body.block.spacing must be a number"
+SHAPE = ('type = "box"', 'type = "boxx"'), "unknown shape 'boxx'"
 NAME = ('title = "a block', 'engine = "steam"\ntitle = "a block'), "unknown engine 'steam'"
 
 
@@ -61,6 +63,7 @@ NAME = ('title = "a block', 'engine = "steam"\ntitle = "a block'), "unknown engi
         (TAG, EMPTY, KEY),
         (STEP, TAG),
         (EMPTY, EFFECT),
+        (SPACING, SHAPE, UNKNOWN_MATERIAL),
     ],
 )
 def test_all_mistakes_are_one_message(mistakes: tuple[tuple[tuple[str, str], str], ...]) -> None:

@@ -16,6 +16,7 @@ import attrs
 from solidsph.encoding import decoded
 from solidsph.errors import SceneError
 from solidsph.files import content
+from solidsph.parts import construct
 from solidsph.problems import Problems, listed
 from solidsph.scene import (
     BodyScene,
@@ -42,6 +43,11 @@ _SECTIONS = {
     "integrator": "[integrator]",
     "sleep": "[sleep]",
     "statics": "[statics]",
+}
+_PARTS_OF_A_BODY = {
+    "shape": "shapes",
+    "discretisation": "discretisations",
+    "material": "materials",
 }
 _SCALARS = ("title", "duration", "outputs", "engine", "energy_tolerance", "silence")
 
@@ -161,6 +167,10 @@ def _body(name: str, body: Any, problems: Problems) -> BodyScene | None:
     if "spacing" in known:
         known["spacing"] = problems.attempt(number, known["spacing"], f"{what}.spacing")
     if "shape" not in known or known.get("spacing") is None:
+        # There is no body then, but what it names may be wrong as well.
+        for key, kind in _PARTS_OF_A_BODY.items():
+            if key in known:
+                problems.attempt(construct, kind, known[key])
         return None
     return BodyScene(**known, tags={tag: at for tag, at in read.items() if at is not None})
 
