@@ -48,14 +48,9 @@ WAYS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "way",
-    ["os.fork", *(pytest.param(w, marks=pytest.mark.validation) for w in WAYS if w != "os.fork")],
-)
-def test_a_fork_says_so(way: str) -> None:
-    how, expected = WAYS[way]
-    code = CODE.format(how="MADE.run()\n" + how)
-    child = subprocess.run(
+def in_a_child(code: str) -> subprocess.CompletedProcess[str]:
+    """`code`, in a process of its own with two threads."""
+    return subprocess.run(
         [sys.executable, "-W", "ignore", "-c", code],
         capture_output=True,
         text=True,
@@ -63,6 +58,16 @@ def test_a_fork_says_so(way: str) -> None:
         timeout=HANG,
         env={"NUMBA_NUM_THREADS": "2", "PATH": "", "PYTHONPATH": "."},
     )
+
+
+@pytest.mark.parametrize(
+    "way",
+    ["os.fork", *(pytest.param(w, marks=pytest.mark.validation) for w in WAYS if w != "os.fork")],
+)
+def test_a_fork_says_so(way: str) -> None:
+    how, expected = WAYS[way]
+    code = CODE.format(how="MADE.run()\n" + how)
+    child = in_a_child(code)
     assert expected in child.stdout, child.stderr
     assert "refused" in child.stdout or expected == "ran"
 
@@ -73,12 +78,5 @@ def test_a_fork_before_any_thread_runs() -> None:
     code = CODE.replace("MADE = built()", "MADE = None").format(
         how='with mp.get_context("fork").Pool(1) as p: print(p.map(tell, [1]))'
     )
-    child = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", code],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=HANG,
-        env={"NUMBA_NUM_THREADS": "2", "PATH": "", "PYTHONPATH": "."},
-    )
+    child = in_a_child(code)
     assert "['ran']" in child.stdout, child.stderr
