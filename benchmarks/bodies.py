@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from solidsph.arrays import Array
-from solidsph.body import Body
-from solidsph.parts import construct
-from solidsph.smoothing import smoothing_kernel
+from solidsph.interfaces.body import Body
+from solidsph.interfaces.smoothing_kernel import smoothing_kernel
+from solidsph.maths.arrays import Array
+from solidsph.registry.construct import construct
 
 SPACING, COVER = 0.01, 2.6
 MATERIAL = {

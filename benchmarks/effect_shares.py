@@ -22,17 +22,18 @@ from typing import Any
 
 from table import Table
 
-from solidsph import Simulation, SolidsphError, registry
-from solidsph.builder import Builder
+from solidsph import Simulation, SolidsphError
 from solidsph.commands import prediction as told
 from solidsph.costs.shares import shares
+from solidsph.registry import registry
+from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.studies.receipts import measured_shares
 from solidsph.testing.examples import example_part
 
 ENGINES = ("matrix", "compiled")
 
 
-def block(engine: str, lengths: list[float], spacing: float = 0.01) -> Builder:
+def block(engine: str, lengths: list[float], spacing: float = 0.01) -> SceneBuilder:
     """A clamped block, thrown to the side."""
     return (
         Simulation.builder()
@@ -46,7 +47,7 @@ def block(engine: str, lengths: list[float], spacing: float = 0.01) -> Builder:
     )
 
 
-def touching(engine: str) -> Builder:
+def touching(engine: str) -> SceneBuilder:
     """That block, thrown against another."""
     right = {"type": "box", "lengths": [0.3, 0.4], "origin": [0.3, 0.0]}
     return (
@@ -56,7 +57,7 @@ def touching(engine: str) -> Builder:
     )
 
 
-def typical(name: str) -> Callable[[str], Builder]:
+def typical(name: str) -> Callable[[str], SceneBuilder]:
     """The block with the effect of that name and typical values."""
     return lambda engine: block(engine, [0.6, 0.4]).effect(
         example_part("effects", name), label="it"
@@ -64,7 +65,7 @@ def typical(name: str) -> Callable[[str], Builder]:
 
 
 # Where something else is called for: an effect's name, and the scene with it under the label "it".
-OWN: Mapping[str, Callable[[str], Builder]] = {
+OWN: Mapping[str, Callable[[str], SceneBuilder]] = {
     # Not in a few particles at a face, which nobody would notice.
     "body-force": lambda engine: block(engine, [0.6, 0.4]).effect(
         "body-force", acceleration={"y": -9.81}, label="it"

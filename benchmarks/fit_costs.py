@@ -28,13 +28,13 @@ import numpy as np
 from scipy.optimize import nnls
 
 from solidsph import Simulation
-from solidsph.builder import Builder
 from solidsph.costs import terms
 from solidsph.costs.calibration import Calibration, calibrated
 from solidsph.costs.counted import counted
 from solidsph.costs.process import memory_now, peak_memory
 from solidsph.costs.terms import Term, Yard
 from solidsph.costs.work import Work
+from solidsph.scene.scene_builder import SceneBuilder
 
 SPACING, STEP = 0.01, 2e-5
 VISCOSITY, HOURGLASS = {"type": "artificial-viscosity"}, {"type": "hourglass-control"}
@@ -62,7 +62,7 @@ class Specimen:
     threads: int = 1
     outputs: int = 20
 
-    def builder(self) -> Builder:
+    def builder(self) -> SceneBuilder:
         """The scene."""
         lengths = [SPACING * n for n in self.cells]
         shape = (

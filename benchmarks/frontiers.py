@@ -23,8 +23,8 @@ import numpy as np
 import scipy
 from table import Table
 
-from solidsph import registry
-from solidsph.interfaces.case import Case
+from solidsph.registry import registry
+from solidsph.studies.case import Case
 from solidsph.studies.cost import Means, frontier
 from solidsph.studies.frontier import Frontier
 from solidsph.studies.frontier_picture import draw_frontier

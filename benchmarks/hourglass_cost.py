@@ -16,7 +16,7 @@ from bodies import body as block
 
 from solidsph.engines.compiled.engine import CompiledEngine, CompiledForces
 from solidsph.engines.compiled.mismatch import MismatchSweeps
-from solidsph.mismatch import MismatchOperator, MismatchProducts
+from solidsph.interfaces.mismatch import MismatchOperator, MismatchProducts
 from solidsph_builtin.effects.hourglass_control import penalised
 
 REPEATS = 15

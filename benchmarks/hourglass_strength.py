@@ -19,9 +19,9 @@ import numpy as np
 from scipy.linalg import eigh
 
 from solidsph import Simulation
-from solidsph.arrays import Array
-from solidsph.builder import Builder
 from solidsph.errors import SolidsphError
+from solidsph.maths.arrays import Array
+from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.statics import equilibrium, frequencies, tangent
 from solidsph_builtin.effects.hourglass_control import HourglassControl
 
@@ -36,20 +36,22 @@ MARK = "<!-- What follows is written by benchmarks/hourglass_strength.py --write
 ROUGH = 0.5
 
 
-def scheme(builder: Builder, kernel: str, cover: float, gradient: str, strength: float) -> Builder:
+def scheme(
+    builder: SceneBuilder, kernel: str, cover: float, gradient: str, strength: float
+) -> SceneBuilder:
     builder = builder.kernel(kernel, cover=cover)
     builder = builder.formulation("total-lagrangian", gradient=gradient)
     return builder.effect("hourglass-control", strength=strength) if strength else builder
 
 
-def elastic(builder: Builder, nu: float) -> Builder:
+def elastic(builder: SceneBuilder, nu: float) -> SceneBuilder:
     return builder.material("neo-hookean", youngs_modulus=1e6, poissons_ratio=nu, density=1000.0)
 
 
 # Accuracy
 
 
-def beam(across: int, nu: float) -> Builder:
+def beam(across: int, nu: float) -> SceneBuilder:
     """The Turek-Hron beam, clamped at a straight edge, under its weight."""
     return (
         Simulation.builder()
@@ -70,7 +72,7 @@ def beam(across: int, nu: float) -> Builder:
     )
 
 
-def answers(builder: Builder) -> Array:
+def answers(builder: SceneBuilder) -> Array:
     """Deflection at rest [m] and first natural frequency [Hz]."""
     simulation = builder.build()
     (tip,) = simulation.particles.tagged("tip")
@@ -119,7 +121,7 @@ def accuracy() -> Iterator[str]:
 # Motions that the gradient does not see
 
 
-def box(d: int, cells: int, nu: float = 0.3) -> Builder:
+def box(d: int, cells: int, nu: float = 0.3) -> SceneBuilder:
     """A free box of unit length."""
     builder = Simulation.builder().body(
         "box", shape={"type": "box", "lengths": [1.0] * d}, spacing=1.0 / cells

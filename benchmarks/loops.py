@@ -9,11 +9,11 @@ import attrs
 import numba
 import numpy as np
 
-from solidsph.arrays import Array
-from solidsph.body import Body
 from solidsph.engines.compiled.engine import CompiledEngine, CompiledForces
-from solidsph.engines.engine import InternalForces
 from solidsph.engines.matrix import MatrixEngine, MatrixForces
+from solidsph.interfaces.body import Body
+from solidsph.interfaces.engine import InternalForces
+from solidsph.maths.arrays import Array
 
 
 @attrs.frozen(eq=False)

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from solidsph.arrays import Array
-from solidsph.body import Body
 from solidsph.engines.compiled.engine import CompiledEngine, CompiledForces
 from solidsph.engines.compiled.moving import MovingBody
 from solidsph.engines.matrix import MatrixEngine
-from solidsph.parts import construct
-from solidsph.smoothing import smoothing_kernel
+from solidsph.interfaces.body import Body
+from solidsph.interfaces.smoothing_kernel import smoothing_kernel
+from solidsph.maths.arrays import Array
+from solidsph.registry.construct import construct
 
 SPACING = 0.01
 A_STEP = 0.005  # of the fastest particle [spacings]

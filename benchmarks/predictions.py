@@ -26,16 +26,16 @@ from steps import bar, beam
 from table import Table
 
 from solidsph import Scene, Simulation
-from solidsph.builder import Builder
 from solidsph.commands import prediction as told
 from solidsph.costs.counted import counted
 from solidsph.costs.model import predicted
 from solidsph.costs.process import peak_memory
+from solidsph.scene.scene_builder import SceneBuilder
 
 SOFT = {"density": 1000.0, "youngs_modulus": 2e6, "poissons_ratio": 0.3}
 
 
-def block(lengths: list[float], spacing: float, **body: Any) -> Builder:
+def block(lengths: list[float], spacing: float, **body: Any) -> SceneBuilder:
     """A clamped block."""
     return (
         Simulation.builder()
@@ -46,7 +46,7 @@ def block(lengths: list[float], spacing: float, **body: Any) -> Builder:
     )
 
 
-def swinging(lengths: list[float], spacing: float, **body: Any) -> Builder:
+def swinging(lengths: list[float], spacing: float, **body: Any) -> SceneBuilder:
     """The same, thrown to the side."""
     return block(lengths, spacing, **body).initial(velocity={"y": "0.5*X"})
 
@@ -55,7 +55,7 @@ def jittered() -> dict[str, Any]:
     return {"type": "jittered-lattice", "amplitude": 0.2, "seed": 1}
 
 
-SCENES: Mapping[str, Callable[[], Builder]] = {
+SCENES: Mapping[str, Callable[[], SceneBuilder]] = {
     "1D bar, matrix": lambda: (
         bar().engine("matrix").integrator("central-difference").duration(2e-3).outputs(100)
     ),

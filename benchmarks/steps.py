@@ -12,7 +12,7 @@ from comparison import BLOCK
 from table import Table
 
 from solidsph import Simulation
-from solidsph.builder import Builder
+from solidsph.scene.scene_builder import SceneBuilder
 
 REPEATS = 5
 
@@ -21,13 +21,13 @@ REPEATS = 5
 class Scene:
     """Something to run."""
 
-    builder: Callable[[], Builder]
+    builder: Callable[[], SceneBuilder]
     time_step: float  # within the CFL step [s]
     steps: int  # by which the longer run is longer
     engines: tuple[str, ...]
 
 
-def bar() -> Builder:
+def bar() -> SceneBuilder:
     """A bar of 61 particles with a pulse: what a step costs when there is next to nothing in it."""
     return (
         Simulation.builder()
@@ -45,7 +45,7 @@ def bar() -> Builder:
     )
 
 
-def beam() -> Builder:
+def beam() -> SceneBuilder:
     """The Turek-Hron beam of the tests, 9 particles across."""
     return (
         Simulation.builder()
@@ -66,7 +66,7 @@ def beam() -> Builder:
     )
 
 
-def block() -> Builder:
+def block() -> SceneBuilder:
     """The block of the yardstick, clamped and given the velocity of a bending wave."""
     return (
         Simulation.builder()

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 from native import library, pointer
 
-from solidsph.arrays import Array
-from solidsph.body import Body
+from solidsph.interfaces.body import Body
+from solidsph.maths.arrays import Array
 
 
 def yardstick(body: Body) -> Callable[[Array, int], Array]:

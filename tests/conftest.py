@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from solidsph import registry
 from solidsph.costs import calibration
 from solidsph.costs.coefficients import REFERENCE
+from solidsph.registry import registry
 
 # Machines that run the tests are shared: a slow moment is not a failure. Examples stay random, so
 # that every run looks elsewhere; what fails is printed in a form that repeats it.

@@ -13,7 +13,6 @@ from solidsph.errors import (
     UnsoundError,
 )
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.interfaces.case import Case, Measurement
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.divergence import Divergence
 from solidsph.interfaces.effect import Effect
@@ -23,11 +22,13 @@ from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.material import Material
 from solidsph.interfaces.shape import Shape
-from solidsph.particles import Particles, State
+from solidsph.model.particles import Particles, State
 from solidsph.results.record import Record
-from solidsph.results.resume import resume
-from solidsph.scene import Scene
-from solidsph.simulation import Result, Simulation
+from solidsph.resumption import resume
+from solidsph.run.outcome import Result
+from solidsph.scene.scene import Scene
+from solidsph.simulation import Simulation
+from solidsph.studies.case import Case, Measurement
 
 carry_out = Simulation.run
 """The run as a function: `carry_out(simulation)`."""

@@ -7,10 +7,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from solidsph.simulation import Result
+from typing import Any
 
 
 class PortableError(Exception):
@@ -130,7 +127,7 @@ class UnsoundError(SolidsphError):
         tolerance: the scene's `energy_tolerance` [-].
         cause: what is likely to have done it.
         remedy: what to try.
-        result: what the run left behind all the same; None in another process.
+        result: the `Result` that the run left behind all the same; None in another process.
     """
 
     def __init__(self, *, time: float, part: float, tolerance: float, cause: str, remedy: str):
@@ -139,7 +136,7 @@ class UnsoundError(SolidsphError):
         self.tolerance = tolerance
         self.cause = cause
         self.remedy = remedy
-        self.result: Result | None = None
+        self.result: Any = None
         super().__init__(
             f"the energies of the run do not add up: from t = {time:.6g} s on the energy residual "
             f"is beyond energy_tolerance = {tolerance:g} of the energy in play, and reaches "
@@ -174,3 +171,7 @@ class ConvergenceError(SolidsphError):
             f"forces miss balance by {residual:.3g} of what is applied, most at particle "
             f"{particle}, where J = {volume_ratio:.6g}. Remedy: {remedy}"
         )
+
+
+class PartWarning(PortableError, UserWarning):  # noqa: N818 (a warning, no error)
+    """A part does not keep a promise of its interface."""

@@ -1,22 +1,182 @@
-"""Resumption: where an earlier run is gone on from."""
+"""Resuming: an earlier run is gone on with in its own record, bit for bit."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import inf
+from math import ceil
+from pathlib import Path
 
 import attrs
 
-from solidsph.arrays import Array
-from solidsph.particles import State
+from solidsph.errors import RecordError
+from solidsph.results.checkpoint import Checkpoint, checkpoint_path, read_checkpoint
+from solidsph.results.circumstances import circumstances, differences, is_part, named_parts
+from solidsph.results.record import Record
+from solidsph.results.recorder import COMPOSED, scene_text
+from solidsph.results.same import check_same_output, check_same_particles
+from solidsph.results.sole_writer import check_no_writer
+from solidsph.run.outcome import Result, is_over
+from solidsph.run.restart_point import Resumption
+from solidsph.scene.scene import Scene
+from solidsph.scene.scene_data import MOST_STEPS
+from solidsph.simulation import Simulation
+from solidsph.system.files import relative_to
+
+# Of a step: an end that is missed by less is met.
+_NEAR = 1e-6
 
 
 @attrs.frozen(eq=False)
-class Resumption:
-    """What a run takes over from an earlier one that was recorded in the same file."""
+class Pending:
+    """A run that is not over, made ready to go on."""
 
-    state: State | None = None  # an output to go on from; None: all is carried out again
-    kept: Mapping[str, Array] = attrs.field(factory=dict)  # what listeners had kept at `state`
-    until: float = inf  # the record's outputs up to this time stay [s]
-    notes: Sequence[str] = ()  # what happened to the run, one line each
-    repeats: bool = True  # whether outputs that are in the record must come out the same again
+    path: Path
+    simulation: Simulation
+    since: Resumption
+
+    def carry_out(self, observers: Sequence[object] = ()) -> Result:
+        """Go on to the end; the record is then what one run without a break would have left."""
+        return self.simulation.run(record=self.path, observers=observers, since=self.since)
+
+
+def resume(
+    path: Path | str,
+    *,
+    simulation: Simulation | None = None,
+    until: float | None = None,
+    force: bool = False,
+    observers: Sequence[object] = (),
+) -> Result:
+    """Go on with the run that was recorded at `path`, in the same record.
+
+    Args:
+        path: the record.
+        simulation: what was run; by default it is built from the scene in the record, which one
+            that was composed of Python objects does not have.
+        until: a later end than the scene's duration [s], rounded up to a whole step.
+        force: go on although versions, plugins or threads are not as they were: the bits may then
+            be others than those of one run without a break.
+        observers: as in `Simulation.run`.
+
+    Raises:
+        RecordError: the run is finished, the record or its checkpoint cannot be read or do not
+            belong together, another run is writing it, or something that decides the bits is not
+            as it was: a version, the particles that a file gives.
+    """
+    found = pending(Path(path), simulation=simulation, until=until, force=force)
+    if found is None:
+        raise RecordError(f"the run in {path} is over; give `until` to extend it")
+    return found.carry_out(observers)
+
+
+def pending(
+    path: Path,
+    *,
+    simulation: Simulation | None = None,
+    until: float | None = None,
+    force: bool = False,
+) -> Pending | None:
+    """As `resume`, but only made ready; None if the run is over."""
+    check_no_writer(path)
+    with Record(path) as record, relative_to(Path(record.folder) if record.folder else None):
+        if is_over(record.outcome) and until is None:
+            return None
+        checkpoint = _checkpoint(record)
+        if simulation is not None and scene_text(simulation) != record.scene:
+            raise RecordError(
+                f"the record {path} is of another scene than the one given; give the same, or "
+                "record into another file"
+            )
+        own = simulation or _built(record)
+        check_same_particles(record, own.particles, exactly=not force)
+        own = _as_before(own, checkpoint)
+        if not force:
+            _check_circumstances(record, checkpoint, own)
+        notes = list(record.notes)
+        if until is not None:
+            own = _extended(own, until)
+            notes.append(f"extended to t = {own.steps * own.step_size:.9g} s")
+        usable = checkpoint is not None and checkpoint.state.time in record.times
+        if checkpoint is not None and usable:
+            check_same_output(record, checkpoint, own, exactly=not force)
+        if checkpoint is None or not usable:
+            return Pending(path, own, Resumption(notes=notes, repeats=not force))
+        return Pending(
+            path, own, Resumption(checkpoint.state, checkpoint.kept, notes=notes, repeats=not force)
+        )
+
+
+def _checkpoint(record: Record) -> Checkpoint | None:
+    path = checkpoint_path(record.path)
+    if not path.exists():
+        return None
+    checkpoint = read_checkpoint(path)
+    if checkpoint.scene != record.scene:
+        raise RecordError(
+            f"the checkpoint {path} is of another scene than the record {record.path}; delete the "
+            "checkpoint and resume again: the run is then carried out from its first state"
+        )
+    return checkpoint
+
+
+def _built(record: Record) -> Simulation:
+    if record.scene.startswith(COMPOSED):
+        raise RecordError(
+            f"the scene of {record.path} was composed of Python objects and cannot be built from "
+            "its record; build it in Python again, then solidsph.resume(path, simulation=...)"
+        )
+    scene = Scene.from_toml(record.scene, f"the scene in {record.path}")
+    return Simulation.builder(scene).build()
+
+
+def _as_before(simulation: Simulation, checkpoint: Checkpoint | None) -> Simulation:
+    """With the step, and as many steps, as the run had."""
+    if checkpoint is None:
+        return simulation
+    for _ in range(checkpoint.halvings - simulation.halvings):
+        simulation = simulation.halved()
+    if simulation.step_size != checkpoint.step_size:
+        raise RecordError(
+            f"the run had a time step of {checkpoint.step_size:.9g} s, the scene now has one of "
+            f"{simulation.step_size:.9g} s; install the versions that it was begun with"
+        )
+    return simulation.extended(max(simulation.steps, checkpoint.steps))
+
+
+def _check_circumstances(
+    record: Record, checkpoint: Checkpoint | None, simulation: Simulation
+) -> None:
+    now = circumstances(simulation)
+    if checkpoint is not None:
+        then = checkpoint.circumstances
+    else:
+        then = _recorded(record)
+        now = {name: value for name, value in now.items() if name in then or is_part(name)}
+    found = differences(then, now)
+    if found:
+        raise RecordError(
+            f"the run in {record.path} cannot go on bit for bit: {'; '.join(found)}. Install what "
+            "it was begun with, or force it (--force) and accept other last digits"
+        )
+
+
+def _recorded(record: Record) -> Mapping[str, str]:
+    """Of the circumstances what a record without a checkpoint tells."""
+    software = {k: v for k, v in record.versions.items() if k not in ("h5py", "hdf5")}
+    return {**software, **named_parts(record.plugins)}
+
+
+def _extended(simulation: Simulation, until: float) -> Simulation:
+    end = simulation.steps * simulation.step_size
+    if simulation.scene.statics is not None:
+        raise RecordError("an equilibrium has no later end; leave `until` (--until) out")
+    if not end * (1.0 - _NEAR) <= until < float("inf"):
+        raise RecordError(
+            f"until = {until:.9g} s is before the end of the run, {end:.9g} s; give a later one"
+        )
+    if until / simulation.step_size > MOST_STEPS:
+        raise RecordError(
+            f"until = {until:.9g} s is {until / simulation.step_size:.3g} steps away, at most "
+            f"{MOST_STEPS:.0e} are allowed; give an earlier one"
+        )
+    return simulation.extended(max(simulation.steps, ceil(until / simulation.step_size - _NEAR)))

@@ -16,12 +16,12 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from solidsph.arrays import Array, Indices, Mask
 from solidsph.errors import SceneError
 from solidsph.interfaces.condition import ExtensionCondition, Observation
-from solidsph.motion import Component, VectorField
-from solidsph.setting import Setting
-from solidsph.where import Where
+from solidsph.interfaces.discrete_model import Setting
+from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.model.fields import Component, VectorField
+from solidsph.model.regions import Where
 from solidsph_builtin.boundaries._images import reflected
 from solidsph_builtin.boundaries._reports import COMPONENTS, reaction
 from solidsph_builtin.boundaries.ghost_extension import chosen_ghosts

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices
-from solidsph.particles import Particles
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.particles import Particles
 
 # A point this close to a particle, in spacings, is that particle.
 _SAME = 1e-6

@@ -8,13 +8,13 @@ from typing import final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Indices
 from solidsph.interfaces.condition import Observation
 from solidsph.interfaces.declared import ScheduledMotion
-from solidsph.motion import VectorField
-from solidsph.particles import Face
-from solidsph.setting import Setting
-from solidsph.where import Where
+from solidsph.interfaces.discrete_model import Setting
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.fields import VectorField
+from solidsph.model.particles import Face
+from solidsph.model.regions import Where
 from solidsph_builtin.boundaries._reports import reaction, stress_reaction
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.interfaces.condition import Observation
-from solidsph.particles import Face
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import Face
 
 COMPONENTS = ("x", "y", "z")
 

@@ -10,12 +10,12 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU
 
-from solidsph.arrays import Array, Indices
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.condition import Condition, Observation, StressCondition
-from solidsph.motion import Component, VectorField
-from solidsph.setting import Setting
-from solidsph.where import Where
+from solidsph.interfaces.discrete_model import Setting
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.fields import Component, VectorField
+from solidsph.model.regions import Where
 from solidsph_builtin.boundaries._dirichlet import factorised
 from solidsph_builtin.boundaries._images import interpolation
 from solidsph_builtin.boundaries._reports import COMPONENTS, asked_resultant

@@ -10,9 +10,9 @@ import attrs
 from solidsph.errors import SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.condition import Condition
-from solidsph.motion import VectorField
-from solidsph.setting import Setting
-from solidsph.where import Where
+from solidsph.interfaces.discrete_model import Setting
+from solidsph.model.fields import VectorField
+from solidsph.model.regions import Where
 from solidsph_builtin.boundaries._imposed import imposed_motion
 from solidsph_builtin.boundaries._reports import COMPONENTS
 

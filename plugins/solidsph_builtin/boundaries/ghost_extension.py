@@ -9,13 +9,13 @@ import attrs
 import numpy as np
 from scipy.sparse import csr_array
 
-from solidsph.arrays import Array, Indices
 from solidsph.errors import SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.condition import Condition, Observation
 from solidsph.interfaces.declared import LinearExtension
-from solidsph.setting import Setting
-from solidsph.where import Where
+from solidsph.interfaces.discrete_model import Setting
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.regions import Where
 from solidsph_builtin.boundaries._images import interpolation, reflected
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU
 
-from solidsph.arrays import Array
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.condition import Condition
-from solidsph.motion import Component
-from solidsph.setting import Setting
-from solidsph.where import Where
+from solidsph.interfaces.discrete_model import Setting
+from solidsph.maths.arrays import Array
+from solidsph.model.fields import Component
+from solidsph.model.regions import Where
 from solidsph_builtin.boundaries._dirichlet import (
     Solve,
     factorised,

@@ -10,14 +10,14 @@ import attrs
 import numpy as np
 from scipy.sparse import block_diag, csr_array, diags_array, kron
 
-from solidsph.arrays import Array, Indices
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.condition import Condition, Observation, SurfaceLoad
-from solidsph.motion import Component, VectorField
-from solidsph.particles import Face
-from solidsph.setting import Setting
-from solidsph.tensors import cofactor, components_first, particles_first
-from solidsph.where import Where
+from solidsph.interfaces.discrete_model import Setting
+from solidsph.maths.arrays import Array, Indices
+from solidsph.maths.tensors import cofactor, components_first, particles_first
+from solidsph.model.fields import Component, VectorField
+from solidsph.model.particles import Face
+from solidsph.model.regions import Where
 from solidsph_builtin.boundaries._reports import asked_resultant
 from solidsph_builtin.effects._gradients import body_gradient, in_the_reference
 

@@ -9,14 +9,14 @@ import attrs
 import numpy as np
 from scipy.sparse import csr_array
 
-from solidsph.arrays import Array, Indices
 from solidsph.errors import SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.condition import Condition, Observation
 from solidsph.interfaces.declared import LinearExtension
-from solidsph.motion import VectorField
-from solidsph.parameters import number
-from solidsph.setting import Setting
+from solidsph.interfaces.discrete_model import Setting
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.fields import VectorField
+from solidsph.registry.parameters import number
 from solidsph_builtin.boundaries._images import interpolation
 from solidsph_builtin.boundaries._imposed import imposed_motion
 from solidsph_builtin.boundaries._reports import COMPONENTS, reaction

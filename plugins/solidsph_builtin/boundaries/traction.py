@@ -8,14 +8,14 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Indices
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.condition import Condition, Observation, SurfaceLoad
 from solidsph.interfaces.declared import ScheduledForce
-from solidsph.motion import Component, VectorField, scheduled_forces
-from solidsph.particles import Face
-from solidsph.setting import Setting
-from solidsph.where import Where
+from solidsph.interfaces.discrete_model import Setting
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.fields import Component, VectorField, scheduled_forces
+from solidsph.model.particles import Face
+from solidsph.model.regions import Where
 from solidsph_builtin.boundaries._reports import COMPONENTS, asked_resultant
 
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices, Mask
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
-from solidsph.particles import Particles
+from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.model.particles import Particles
 from solidsph_builtin.discretisations._checks import check_faces, refusal
 from solidsph_builtin.discretisations._grid import Grid, in_chunks
 from solidsph_builtin.discretisations._nearest import Assignment, nearest

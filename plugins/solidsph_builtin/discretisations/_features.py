@@ -6,8 +6,8 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array
 from solidsph.interfaces.shape import Surface
+from solidsph.maths.arrays import Array
 from solidsph_builtin.discretisations._nearest import thinned
 
 # Tangent planes that cross at more than this angle make an edge; less is a bend.

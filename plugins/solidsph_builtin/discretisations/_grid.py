@@ -8,9 +8,9 @@ from collections.abc import Callable
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Indices, Mask
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
+from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph_builtin.discretisations._checks import check_count, refusal
 from solidsph_builtin.shapes._sampling import cells_along
 

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices, Mask
+from solidsph.maths.arrays import Array, Indices, Mask
 
 # At a point on a diagonal of a lattice, a particle on each axis may be as near.
 _MOST_EQUAL = 4

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from solidsph.arrays import Array
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
+from solidsph.maths.arrays import Array
 from solidsph_builtin.discretisations._checks import refusal
 
 # How often a displacement that leaves the shape is halved before the particle stays in place.

@@ -7,8 +7,8 @@ import itertools
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Indices
 from solidsph.interfaces.shape import Shape
+from solidsph.maths.arrays import Array, Indices
 
 # How often a cell is halved, for each dimension: to 1/16 in the plane, to 1/8 in space.
 _HALVINGS = {1: 3, 2: 4, 3: 3}

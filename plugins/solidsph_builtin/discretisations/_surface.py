@@ -8,10 +8,10 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices, Mask
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape, Surface
-from solidsph.particles import Face
+from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.model.particles import Face
 from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations._nearest import Assignment
 

@@ -8,10 +8,10 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices, Mask
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape, Surface
-from solidsph.particles import Particles
+from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.model.particles import Particles
 from solidsph_builtin.discretisations._cells import cell_shares, fitted, mean_spacing
 from solidsph_builtin.discretisations._checks import check_spacing, refusal
 from solidsph_builtin.discretisations._features import Features, gap, meetings, smooth

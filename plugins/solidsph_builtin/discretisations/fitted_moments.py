@@ -7,11 +7,11 @@ from typing import final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.errors import SceneError
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
-from solidsph.particles import Particles
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import Particles
 
 # Samples of the surface along a spacing.
 _SAMPLES = 4

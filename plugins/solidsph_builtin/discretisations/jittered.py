@@ -9,7 +9,7 @@ import numpy as np
 
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
-from solidsph.particles import Particles
+from solidsph.model.particles import Particles
 from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations._noise import check_noise, moved_inside
 from solidsph_builtin.discretisations.points import Points

@@ -9,7 +9,7 @@ import numpy as np
 
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
-from solidsph.particles import Particles
+from solidsph.model.particles import Particles
 from solidsph_builtin.discretisations._cells import lattice_particles
 from solidsph_builtin.discretisations._checks import check_ghosts, check_spacing
 from solidsph_builtin.discretisations._grid import grid_over

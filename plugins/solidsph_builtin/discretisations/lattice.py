@@ -8,7 +8,7 @@ import attrs
 
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
-from solidsph.particles import Particles
+from solidsph.model.particles import Particles
 from solidsph_builtin.discretisations._cells import lattice_particles
 from solidsph_builtin.discretisations._checks import check_ghosts, check_spacing, refusal
 from solidsph_builtin.discretisations._grid import grid_over

@@ -8,12 +8,12 @@ from typing import final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.errors import SceneError
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
-from solidsph.motion import Component, VectorField
-from solidsph.particles import Particles
+from solidsph.maths.arrays import Array
+from solidsph.model.fields import Component, VectorField
+from solidsph.model.particles import Particles
 from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations.points import Points
 

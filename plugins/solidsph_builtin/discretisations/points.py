@@ -12,12 +12,12 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array
-from solidsph.encoding import decoded
-from solidsph.files import content, located
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
-from solidsph.particles import Particles
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import Particles
+from solidsph.system.encoding import decoded
+from solidsph.system.files import content, located
 from solidsph_builtin.discretisations._checks import check_spacing, refusal
 from solidsph_builtin.discretisations._grid import Grid, grid_over
 from solidsph_builtin.discretisations._nearest import nearest

@@ -6,8 +6,8 @@ from typing import ClassVar, final
 
 import attrs
 
-from solidsph.arrays import Scalar
 from solidsph.interfaces.divergence import PointwiseDivergence
+from solidsph.maths.arrays import Scalar
 
 
 @final

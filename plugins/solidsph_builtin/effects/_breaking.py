@@ -8,15 +8,16 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Mask
-from solidsph.body import Body
-from solidsph.engines.engine import InternalForces, StressFields
-from solidsph.engines.history import HistoryForces, Law, memory_name
+from solidsph.engines.history import HistoryForces
 from solidsph.engines.matrix import MatrixForces, Operators, assembled, fixed_forces
-from solidsph.engines.tally import Tally
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import StressCondition
+from solidsph.interfaces.engine import InternalForces, StressFields
 from solidsph.interfaces.history import HistoryMaterial
-from solidsph.neighbours import Pairs
+from solidsph.interfaces.law import Law, memory_name
+from solidsph.interfaces.operation_count import Tally
+from solidsph.maths.arrays import Array, Mask
+from solidsph.model.neighbours import Pairs
 
 # A moment that is I in a full neighbourhood, and half of it at a flat surface: where its least
 # direction has less than this, what is left of the neighbours determines no gradient.

@@ -9,10 +9,10 @@ import attrs
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
-from solidsph.arrays import Array, Indices, Scalar
-from solidsph.body import Body
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.kernel import Kernel
-from solidsph.smoothing import SmoothingKernel, smoothing_kernel
+from solidsph.interfaces.smoothing_kernel import SmoothingKernel, smoothing_kernel
+from solidsph.maths.arrays import Array, Indices, Scalar
 
 REACH = 2.5
 """Support of the smoothing in spacings: beside a lattice the place where two bodies touch then

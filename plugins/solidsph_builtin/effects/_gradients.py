@@ -5,12 +5,12 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
-from solidsph.body import Body
 from solidsph.engines.matrix import Operators, operators
 from solidsph.errors import SceneError
+from solidsph.interfaces.body import Body
+from solidsph.interfaces.discrete_model import Setting
 from solidsph.interfaces.formulation import Configuration
-from solidsph.setting import Setting
+from solidsph.maths.arrays import Array
 
 
 @attrs.frozen(eq=False)

@@ -8,8 +8,8 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices, Mask
-from solidsph.smoothing import SmoothingKernel
+from solidsph.interfaces.smoothing_kernel import SmoothingKernel
+from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph_builtin.effects._crowding import REACH
 from solidsph_builtin.effects._search import NeighbourList, Search
 from solidsph_builtin.effects._slip import slid

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices
+from solidsph.maths.arrays import Array, Indices
 
 # A list of pairs has room for this much motion, in parts of the reach.
 _SKIN = 0.2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solidsph.arrays import Array
+from solidsph.maths.arrays import Array
 
 
 def slid(

@@ -8,16 +8,16 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Scalar, Vector
-from solidsph.body import Body
 from solidsph.errors import SceneError
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import ForceCondition, Observation
 from solidsph.interfaces.declared import PairForce, PairTable
+from solidsph.interfaces.discrete_model import Setting
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.formulation import Configuration
-from solidsph.parameters import number
-from solidsph.setting import Setting
-from solidsph.tensors import dot
+from solidsph.maths.arrays import Scalar, Vector
+from solidsph.maths.tensors import dot
+from solidsph.registry.parameters import number
 
 # Keeps the approach of two particles that meet finite, in squares of their first distance.
 _SOFTENING = 1e-4

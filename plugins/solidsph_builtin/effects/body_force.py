@@ -7,14 +7,14 @@ from typing import ClassVar, final
 
 import attrs
 
-from solidsph.arrays import Array, Indices
-from solidsph.body import Body
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import ForceCondition, Observation
 from solidsph.interfaces.declared import ScheduledForce
+from solidsph.interfaces.discrete_model import Setting
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.motion import Component, VectorField, scheduled_forces
-from solidsph.setting import Setting
-from solidsph.where import Where
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.fields import Component, VectorField, scheduled_forces
+from solidsph.model.regions import Where
 
 
 @final

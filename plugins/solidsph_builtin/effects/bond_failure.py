@@ -8,23 +8,23 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Indices
-from solidsph.body import Body
-from solidsph.engines.engine import InternalForces
 from solidsph.engines.history import ArrayLaw
 from solidsph.errors import SceneError
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import (
     FieldCondition,
     ForceCondition,
     Observation,
     StressCondition,
 )
+from solidsph.interfaces.discrete_model import Setting
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.gradient import PointwiseGradient
-from solidsph.parameters import check_positive, number
-from solidsph.setting import Setting
-from solidsph.step_size import lattice_frequency
-from solidsph.where import Where
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.regions import Where
+from solidsph.registry.parameters import check_positive, number
+from solidsph.run.stable_step import lattice_frequency
 from solidsph_builtin.effects._breaking import Bonds, BreakingForces
 from solidsph_builtin.effects._gradients import in_the_reference
 

@@ -10,19 +10,19 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Indices
-from solidsph.body import Body
 from solidsph.errors import SceneError
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import (
     FieldCondition,
     ForceCondition,
     Observation,
     StoringCondition,
 )
+from solidsph.interfaces.discrete_model import Setting
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.parameters import check_positive, number
-from solidsph.setting import Setting
-from solidsph.smoothing import SmoothingKernel
+from solidsph.interfaces.smoothing_kernel import SmoothingKernel
+from solidsph.maths.arrays import Array, Indices
+from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.effects._crowding import (
     REACH,
     crowding_kernel,

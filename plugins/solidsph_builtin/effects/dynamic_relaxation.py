@@ -8,14 +8,14 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Indices
-from solidsph.body import Body
 from solidsph.errors import SceneError
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import ForceCondition, Observation
+from solidsph.interfaces.discrete_model import Setting
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.parameters import number
-from solidsph.setting import Setting
-from solidsph.step_size import lattice_frequency
+from solidsph.maths.arrays import Array, Indices
+from solidsph.registry.parameters import number
+from solidsph.run.stable_step import lattice_frequency
 
 # Of the highest frequency of a lattice: no motion worth waiting for is that fast, and a rate that
 # stays below costs a tenth of the time step at most.

@@ -11,19 +11,19 @@ import attrs
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
-from solidsph.arrays import Array, Indices, Tensor
-from solidsph.body import Body
 from solidsph.errors import SceneError
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import FieldCondition, ForceCondition, Observation
+from solidsph.interfaces.discrete_model import Setting
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.material import Material
-from solidsph.motion import Component, VectorField
-from solidsph.parameters import check_positive, number
-from solidsph.setting import Setting
-from solidsph.step_size import lattice_frequency
-from solidsph.tensors import particles_first
-from solidsph.where import Where
+from solidsph.maths.arrays import Array, Indices, Tensor
+from solidsph.maths.tensors import particles_first
+from solidsph.model.fields import Component, VectorField
+from solidsph.model.regions import Where
+from solidsph.registry.parameters import check_positive, number
+from solidsph.run.stable_step import lattice_frequency
 from solidsph_builtin.effects._gradients import BodyGradient, body_gradient, in_the_reference
 
 # Of the largest stable step of the explicit rule, by which heat advances within a step.

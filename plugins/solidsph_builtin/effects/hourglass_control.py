@@ -8,10 +8,9 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
-from solidsph.body import Body
 from solidsph.engines.select import mismatch_operator
 from solidsph.errors import SceneError
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import (
     FieldCondition,
     ForceCondition,
@@ -19,11 +18,12 @@ from solidsph.interfaces.condition import (
     StoringCondition,
 )
 from solidsph.interfaces.declared import MismatchForce
+from solidsph.interfaces.discrete_model import Setting
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.formulation import Configuration
-from solidsph.mismatch import Mismatch, MismatchOperator
-from solidsph.parameters import check_positive, number
-from solidsph.setting import Setting
+from solidsph.interfaces.mismatch import Mismatch, MismatchOperator
+from solidsph.maths.arrays import Array
+from solidsph.registry.parameters import check_positive, number
 
 # Pairs count where their weight, relative to that of particles one spacing apart, is above this. On
 # lattices with a cover near 3 those are the 2, 8 or 26 around a particle, which hold 98 % of the

@@ -11,15 +11,15 @@ import numpy as np
 from scipy.sparse import bsr_array, csr_array
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices, Scalar, Vector
-from solidsph.body import Body
 from solidsph.errors import SceneError
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import ForceCondition, Observation, StoringCondition
 from solidsph.interfaces.declared import PairForce, PairTable
+from solidsph.interfaces.discrete_model import Setting
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.parameters import number
-from solidsph.setting import Setting
-from solidsph.tensors import dot
+from solidsph.maths.arrays import Array, Indices, Scalar, Vector
+from solidsph.maths.tensors import dot
+from solidsph.registry.parameters import number
 
 
 @final

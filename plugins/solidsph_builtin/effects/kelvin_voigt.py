@@ -9,13 +9,13 @@ import attrs
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from solidsph.arrays import Array, Indices, Tensor
-from solidsph.body import Body
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import ForceCondition, Observation
+from solidsph.interfaces.discrete_model import Setting
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.parameters import check_positive, number
-from solidsph.setting import Setting
-from solidsph.tensors import add, identity, product, scale, trace, transpose
+from solidsph.maths.arrays import Array, Indices, Tensor
+from solidsph.maths.tensors import add, identity, product, scale, trace, transpose
+from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.effects._gradients import BodyGradient, body_gradient, in_the_reference
 
 # Up to so many freedoms eigenvalues are found by a dense matrix; beyond, to this part.

@@ -7,15 +7,15 @@ from typing import ClassVar, final
 
 import attrs
 
-from solidsph.arrays import Array, Indices, Vector
-from solidsph.body import Body
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import ForceCondition, Observation
 from solidsph.interfaces.declared import PointwiseForce
+from solidsph.interfaces.discrete_model import Setting
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.parameters import check_positive, number
-from solidsph.setting import Setting
-from solidsph.tensors import scaled
-from solidsph.where import Where
+from solidsph.maths.arrays import Array, Indices, Vector
+from solidsph.maths.tensors import scaled
+from solidsph.model.regions import Where
+from solidsph.registry.parameters import check_positive, number
 
 
 @final

@@ -10,20 +10,20 @@ import attrs
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
-from solidsph.arrays import Array, Indices
-from solidsph.body import Body
 from solidsph.errors import SceneError
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import (
     FieldCondition,
     ForceCondition,
     Observation,
     StoringCondition,
 )
+from solidsph.interfaces.discrete_model import Setting
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.motion import Component, VectorField
-from solidsph.parameters import check_positive, number, optional_number
-from solidsph.setting import Setting
-from solidsph.where import AXES, Where
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.fields import Component, VectorField
+from solidsph.model.regions import AXES, Where
+from solidsph.registry.parameters import check_positive, number, optional_number
 from solidsph_builtin.boundaries._reports import resultant
 from solidsph_builtin.effects._slip import slid
 

@@ -6,11 +6,11 @@ from typing import ClassVar, final
 
 import attrs
 
-from solidsph.arrays import Tensor
 from solidsph.interfaces.divergence import Divergence
 from solidsph.interfaces.formulation import Configuration, Formulation
 from solidsph.interfaces.gradient import Gradient
-from solidsph.tensors import add, cauchy_stress, identity, inverse, scale
+from solidsph.maths.arrays import Tensor
+from solidsph.maths.tensors import add, cauchy_stress, identity, inverse, scale
 from solidsph_builtin.divergences.variational import Variational
 from solidsph_builtin.gradients.corrected import Corrected
 

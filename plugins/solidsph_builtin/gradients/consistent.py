@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, final
 
 import attrs
@@ -9,12 +10,12 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
-from solidsph.arrays import Array, Mask
-from solidsph.body import Body
 from solidsph.errors import BuildError
-from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.gradient import Gradient
-from solidsph.neighbours import Pairs
+from solidsph.interfaces.smoothing_kernel import SmoothingKernel
+from solidsph.maths.arrays import Array, Mask
+from solidsph.model.neighbours import Pairs
+from solidsph.model.particles import Particles
 from solidsph_builtin.gradients.quadratic import Quadratic, closeness
 
 # Eigenvalues of a moment matrix below this part of the largest belong to what the neighbours do
@@ -72,31 +73,39 @@ class Consistent(Gradient):
         """Those of the gradient within: what is to be added is known once there is a body."""
         return self.of.weights(pairs, kernel_gradients, volumes)
 
-    def of_body(self, body: Body) -> Gradient:
-        particles, n = body.particles, body.particles.count
+    def of_body(
+        self,
+        body: str,
+        particles: Particles,
+        smoothing: SmoothingKernel,
+        pairs: Callable[[], Pairs],
+        *,
+        moving: bool,
+    ) -> Gradient:
+        n = particles.count
         if particles.ghosts.any():
             raise BuildError(
                 [
-                    f"gradient 'consistent': body {body.name!r} has {int(particles.ghosts.sum())} "
+                    f"gradient 'consistent': body {body!r} has {int(particles.ghosts.sum())} "
                     "ghosts, and there is no telling what their sums should be; put particles on "
                     "the boundary in their place (conforming-lattice)"
                 ]
             )
-        if body.formulation.configuration is not Configuration.REFERENCE:
+        if moving:
             raise BuildError(
                 [
-                    f"gradient 'consistent': the sums of body {body.name!r} follow its motion, but "
+                    f"gradient 'consistent': the sums of body {body!r} follow its motion, but "
                     "its surface is known in the reference configuration; use 'total-lagrangian'"
                 ]
             )
-        inner = self.of.of_body(body)
-        pairs = body.pairs()
-        slopes = body.smoothing.gradient(pairs.offsets, pairs.distances)
-        plain = inner.weights(pairs, slopes, particles.cells)
+        inner = self.of.of_body(body, particles, smoothing, pairs, moving=moving)
+        found = pairs()
+        slopes = smoothing.gradient(found.offsets, found.distances)
+        plain = inner.weights(found, slopes, particles.cells)
         V = particles.volumes
-        sums = [np.bincount(pairs.columns, V[pairs.rows] * g, minlength=n) for g in plain.T]
+        sums = [np.bincount(found.columns, V[found.rows] * g, minlength=n) for g in plain.T]
         missing = particles.area_vectors - np.stack(sums, axis=1)
-        change = _Change.of(pairs, slopes, particles.cells, V, self.exact_degree)
+        change = _Change.of(found, slopes, particles.cells, V, self.exact_degree)
         surface = np.zeros(n, dtype=np.bool_)
         for face in particles.faces.values():
             surface[face.particles] = True

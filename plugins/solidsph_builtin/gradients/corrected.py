@@ -7,9 +7,9 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Tensor
 from solidsph.interfaces.gradient import PointwiseGradient
-from solidsph.tensors import contraction, inverse_transpose, scale
+from solidsph.maths.arrays import Tensor
+from solidsph.maths.tensors import contraction, inverse_transpose, scale
 
 # Beyond this condition number of the moment matrix, rounding reaches the eighth digit.
 _WORST_CONDITION = 1e8

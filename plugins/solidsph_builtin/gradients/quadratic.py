@@ -9,9 +9,9 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Mask
 from solidsph.interfaces.gradient import Gradient
-from solidsph.neighbours import Pairs
+from solidsph.maths.arrays import Array, Mask
+from solidsph.model.neighbours import Pairs
 from solidsph_builtin.gradients.corrected import Corrected
 
 # Beyond this condition number of the scaled moment matrix the neighbours do not determine the

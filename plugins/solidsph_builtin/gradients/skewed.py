@@ -7,11 +7,11 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.errors import SceneError
 from solidsph.interfaces.gradient import Gradient
-from solidsph.neighbours import Pairs
-from solidsph.parameters import number
+from solidsph.maths.arrays import Array
+from solidsph.model.neighbours import Pairs
+from solidsph.registry.parameters import number
 from solidsph_builtin.gradients.corrected import Corrected
 
 _AXES = ("x", "y", "z")

@@ -8,8 +8,8 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Scalar
 from solidsph.interfaces.kernel import Kernel
+from solidsph.maths.arrays import Scalar
 
 
 @final

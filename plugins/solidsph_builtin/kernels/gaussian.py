@@ -8,10 +8,10 @@ from typing import final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Scalar
 from solidsph.errors import SceneError
 from solidsph.interfaces.kernel import Kernel
-from solidsph.parameters import number
+from solidsph.maths.arrays import Scalar
+from solidsph.registry.parameters import number
 
 
 @final

@@ -7,8 +7,8 @@ from typing import final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Scalar
 from solidsph.interfaces.kernel import Kernel
+from solidsph.maths.arrays import Scalar
 
 # Below this 1 - q^2 the profile is far under the smallest double; it only keeps 1 / 0 away.
 _TINY = 1e-9

@@ -15,9 +15,9 @@ from math import sqrt
 
 import numpy as np
 
-from solidsph.arrays import Scalar, Tensor
 from solidsph.interfaces.history import History
-from solidsph.tensors import (
+from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.tensors import (
     add,
     contraction,
     determinant,

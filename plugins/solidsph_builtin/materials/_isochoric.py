@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solidsph.arrays import Scalar, Tensor
-from solidsph.tensors import (
+from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.tensors import (
     add,
     contraction,
     determinant,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from solidsph.errors import SceneError
-from solidsph.parameters import check_positive
+from solidsph.registry.parameters import check_positive
 
 
 def checked_lame(

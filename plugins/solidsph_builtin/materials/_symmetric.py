@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from solidsph.arrays import Tensor
 from solidsph.interfaces.history import History
+from solidsph.maths.arrays import Tensor
 
 
 def component_count(dimension: int) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solidsph.arrays import Tensor
+from solidsph.maths.arrays import Tensor
 
 
 def widened(F: Tensor) -> Tensor:

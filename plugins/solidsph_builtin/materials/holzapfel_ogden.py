@@ -7,11 +7,10 @@ from typing import Any, ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Scalar, Tensor, Vector
 from solidsph.errors import SceneError
 from solidsph.interfaces.material import Material
-from solidsph.parameters import check_positive, number
-from solidsph.tensors import (
+from solidsph.maths.arrays import Scalar, Tensor, Vector
+from solidsph.maths.tensors import (
     add,
     contraction,
     determinant,
@@ -20,6 +19,7 @@ from solidsph.tensors import (
     inverse_transpose,
     scale,
 )
+from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.materials._isochoric import (
     bulk_energy,
     bulk_stress,

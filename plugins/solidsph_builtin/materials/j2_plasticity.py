@@ -8,11 +8,11 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Scalar, Tensor
 from solidsph.errors import SceneError
 from solidsph.interfaces.history import History, HistoryMaterial
-from solidsph.parameters import check_positive, number
-from solidsph.tensors import identity
+from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.tensors import identity
+from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.materials._flow import (
     ROOT,
     chosen,

@@ -6,10 +6,10 @@ from typing import ClassVar, final
 
 import attrs
 
-from solidsph.arrays import Scalar, Tensor
 from solidsph.interfaces.material import Material
-from solidsph.parameters import number
-from solidsph.tensors import add, contraction, identity, scale, small_strain, trace, transpose
+from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.tensors import add, contraction, identity, scale, small_strain, trace, transpose
+from solidsph.registry.parameters import number
 from solidsph_builtin.materials._lame import checked_lame
 
 

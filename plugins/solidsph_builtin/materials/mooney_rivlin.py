@@ -6,11 +6,10 @@ from typing import final
 
 import attrs
 
-from solidsph.arrays import Scalar, Tensor
 from solidsph.errors import SceneError
 from solidsph.interfaces.material import Material
-from solidsph.parameters import check_positive, number
-from solidsph.tensors import (
+from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.tensors import (
     add,
     contraction,
     determinant,
@@ -21,6 +20,7 @@ from solidsph.tensors import (
     trace,
     transpose,
 )
+from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.materials._isochoric import (
     bulk_energy,
     bulk_stress,

@@ -6,10 +6,9 @@ from typing import final
 
 import attrs
 
-from solidsph.arrays import Scalar, Tensor
 from solidsph.interfaces.material import Material
-from solidsph.parameters import number
-from solidsph.tensors import (
+from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.tensors import (
     add,
     contraction,
     green_lagrange,
@@ -19,6 +18,7 @@ from solidsph.tensors import (
     trace,
     transpose,
 )
+from solidsph.registry.parameters import number
 from solidsph_builtin.materials._lame import checked_lame
 
 

@@ -8,11 +8,10 @@ from typing import Any, ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.arrays import Scalar, Tensor
 from solidsph.errors import SceneError
 from solidsph.interfaces.history import History, HistoryMaterial
-from solidsph.parameters import number
-from solidsph.tensors import (
+from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.tensors import (
     add,
     contraction,
     green_lagrange,
@@ -22,6 +21,7 @@ from solidsph.tensors import (
     trace,
     transpose,
 )
+from solidsph.registry.parameters import number
 from solidsph_builtin.materials._lame import checked_lame
 from solidsph_builtin.materials._symmetric import (
     component_count,

@@ -9,8 +9,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.arrays import Mask
 from solidsph.interfaces.shape import Shape, Surface
+from solidsph.maths.arrays import Mask
 from solidsph_builtin.shapes._checks import as_tuple, refusal
 from solidsph_builtin.shapes._sampling import unit
 

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices
+from solidsph.maths.arrays import Array, Indices
 
 # Pairs of a point and an edge, or of two edges, that are looked at together.
 _AT_ONCE = 1 << 20

@@ -12,8 +12,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.interfaces.shape import Surface
+from solidsph.maths.arrays import Array
 
 # Samples per spacing along a line, and along each direction of a surface in space. Both are even.
 ON_LINE = 16

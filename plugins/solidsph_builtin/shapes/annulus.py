@@ -8,8 +8,8 @@ from reprlib import repr as short
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.interfaces.shape import Shape, Surface
+from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes._checks import (
     as_number,
     as_numbers,

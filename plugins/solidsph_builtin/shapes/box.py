@@ -10,8 +10,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.interfaces.shape import Shape, Surface
+from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes._checks import as_numbers, check_coordinates, check_lengths, refusal
 from solidsph_builtin.shapes._sampling import ON_LINE, ON_SURFACE, Piece, joined, midpoints
 

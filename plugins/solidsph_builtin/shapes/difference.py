@@ -8,8 +8,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.interfaces.shape import Shape, Surface
+from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes._checks import refusal
 from solidsph_builtin.shapes._composite import as_parts, check_parts, remaining
 

@@ -7,8 +7,8 @@ import math
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.interfaces.shape import Shape, Surface
+from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes._checks import as_number, as_numbers, check_coordinates, check_length
 from solidsph_builtin.shapes._sampling import ON_LINE, circle, joined
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.interfaces.shape import Shape, Surface
+from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes._checks import as_number, check_coordinate, check_length
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.interfaces.shape import Shape, Surface
+from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes._checks import as_points, check_coordinates, refusal
 from solidsph_builtin.shapes._outline import Outline, first_crossing
 from solidsph_builtin.shapes._sampling import ON_LINE, samples_along

@@ -8,8 +8,8 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices
 from solidsph.interfaces.shape import Shape, Surface
+from solidsph.maths.arrays import Array, Indices
 from solidsph_builtin.shapes._composite import as_parts, check_parts, remaining
 
 # Up to so many parts, all are asked of every point.

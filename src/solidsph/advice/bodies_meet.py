@@ -9,8 +9,8 @@ import numpy as np
 
 from solidsph.advice.advice import Advice
 from solidsph.advice.seen import Seen, SeenBody
-from solidsph.arrays import Array
 from solidsph.interfaces.effect import Need
+from solidsph.maths.arrays import Array
 
 _NEAR = 1.5  # spacings between particles of bodies that touch
 _LOOKS = 50  # times at which the boxes are compared

@@ -33,7 +33,7 @@ from solidsph.advice.unheld import unheld
 from solidsph.advice.units import units
 from solidsph.advice.unseen_motions import unseen_motions
 from solidsph.advice.viscosity_unneeded import viscosity_unneeded
-from solidsph.simulation import Simulation
+from solidsph.run.built_scene import BuiltScene
 
 Look = Callable[[Seen], Iterator[Advice]]
 
@@ -67,7 +67,7 @@ ADVICE: Mapping[str, Look] = {look.__name__.replace("_", "-"): look for look in 
 """Every warning by its name."""
 
 
-def advised(simulation: Simulation) -> tuple[Advice, ...]:
+def advised(simulation: BuiltScene) -> tuple[Advice, ...]:
     """What there is to say about a built scene, less what it silences.
 
     To warn must never be why a run fails: a warning that cannot be formed is left out.

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from solidsph.advice.advice import Advice
 from solidsph.advice.seen import Seen
-from solidsph.arrays import Mask
+from solidsph.maths.arrays import Mask
 
 # Part of a body's particles that may be held for nothing.
 _SHARE = 0.1

@@ -9,7 +9,7 @@ import numpy as np
 
 from solidsph.advice.advice import Advice
 from solidsph.advice.seen import Seen, SeenBody
-from solidsph.arrays import Mask
+from solidsph.maths.arrays import Mask
 
 # In spacings: on the boundary, or in one plane, up to rounding.
 _ON = 1e-6
@@ -19,7 +19,7 @@ def half_supports(seen: Seen) -> Iterator[Advice]:
     """By what a motion holds: particles on a face, along its normal and no other axis.
 
     A quarter of a sheet with a hole has a peak stress a third too high there, with ever more
-    particles (tests/test_half_supports.py); beyond a plane with ghosts it is that of the whole.
+    particles (test_half_supports.py); beyond a plane with ghosts it is that of the whole.
     """
     degree = min(one.body.formulation.gradient.exact_degree for one in seen.bodies)
     # A gradient of the second degree is about as good on one side.

@@ -8,9 +8,9 @@ import numpy as np
 
 from solidsph.advice.advice import Advice
 from solidsph.advice.seen import Seen
-from solidsph.cover import BLIND, held, own_cover
 from solidsph.interfaces.effect import Need
 from solidsph.interfaces.formulation import Configuration
+from solidsph.scene.default_cover import BLIND, held, own_cover
 
 # Beyond these, in spacings, a kernel smooths details away and each evaluation costs several times
 # what it does at the usual 3.

@@ -8,9 +8,9 @@ import numpy as np
 
 from solidsph.advice.advice import Advice
 from solidsph.advice.seen import Seen
-from solidsph.arrays import Array
 from solidsph.interfaces.condition import StoringCondition
 from solidsph.interfaces.declared import MismatchForce
+from solidsph.maths.arrays import Array
 
 # Of the confined modulus: metals yield from about twice that on.
 _PRESSED = 1e-3

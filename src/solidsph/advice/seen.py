@@ -13,16 +13,16 @@ from scipy.spatial import cKDTree
 
 from solidsph.advice import signals
 from solidsph.advice.thickness import through
-from solidsph.arrays import Array, Mask
-from solidsph.body import Body
-from solidsph.cover import cover_of
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import ExtensionCondition
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.gradient import Gradient
 from solidsph.interfaces.shape import Shape
-from solidsph.parts import construct
-from solidsph.simulation import Simulation
+from solidsph.maths.arrays import Array, Mask
+from solidsph.registry.construct import construct
+from solidsph.run.built_scene import BuiltScene
+from solidsph.scene.default_cover import cover_of
 
 # Particles of a body that are asked whether they are in its shape.
 _SAMPLES = 400
@@ -138,7 +138,7 @@ class SeenBody:
 class Seen:
     """A built scene."""
 
-    simulation: Simulation
+    simulation: BuiltScene
 
     @property
     def scene(self) -> Any:

@@ -9,11 +9,11 @@ from scipy.spatial import cKDTree
 
 from solidsph.advice.advice import Advice
 from solidsph.advice.seen import Seen
-from solidsph.arrays import Mask
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.parts import construct
-from solidsph.surface import Pieces
-from solidsph.where import AXES, Where, names_used
+from solidsph.maths.arrays import Mask
+from solidsph.model.regions import AXES, Where, names_used
+from solidsph.model.surface import Pieces
+from solidsph.registry.construct import construct
 
 _SHOWN = 6  # faces of one load
 

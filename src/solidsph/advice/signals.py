@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.interfaces.condition import ForceCondition, SurfaceLoad
 from solidsph.interfaces.declared import ScheduledForce, ScheduledMotion
-from solidsph.simulation import Simulation
+from solidsph.maths.arrays import Array
+from solidsph.run.built_scene import BuiltScene
 
 # Numbers asked of one condition at most, and times.
 _ENTRIES, _TIMES = 2_000_000, 160
@@ -72,7 +72,7 @@ class Motion(Signal):
         return float(self.speeds[0])
 
 
-def loads(simulation: Simulation) -> Iterator[Load]:
+def loads(simulation: BuiltScene) -> Iterator[Load]:
     """Of every force: at many times where it is a schedule, at a few where it is not.
 
     What answers to the motion is asked at the start, where nothing has moved.
@@ -82,7 +82,7 @@ def loads(simulation: Simulation) -> Iterator[Load]:
         yield _of_load(simulation, load, areas[load.particles])
 
 
-def _of_load(simulation: Simulation, load: ForceCondition, areas: Array) -> Load:
+def _of_load(simulation: BuiltScene, load: ForceCondition, areas: Array) -> Load:
     start, masses = simulation.initial, simulation.setting.masses[load.particles]
     ask = _asked(load, start.positions, start.velocities)
     times = _times(simulation, len(masses) * simulation.particles.dimension)
@@ -109,14 +109,14 @@ def _of_load(simulation: Simulation, load: ForceCondition, areas: Array) -> Load
     )
 
 
-def motions(simulation: Simulation) -> Iterator[Motion]:
+def motions(simulation: BuiltScene) -> Iterator[Motion]:
     """Of every motion that is a schedule."""
     for motion in simulation.dynamics.motions:
         if isinstance(motion, ScheduledMotion):
             yield _of_motion(simulation, motion)
 
 
-def _of_motion(simulation: Simulation, motion: ScheduledMotion) -> Motion:
+def _of_motion(simulation: BuiltScene, motion: ScheduledMotion) -> Motion:
     times = _times(simulation, len(motion.entries[0]))
 
     def found(some: Array) -> tuple[Array, ...]:
@@ -139,7 +139,7 @@ def _asked(load: ForceCondition, x: Array, v: Array) -> Callable[[Array], Array]
     return lambda times: np.stack([load.forces(float(t), x, v) for t in times])
 
 
-def _times(simulation: Simulation, width: int) -> Array:
+def _times(simulation: BuiltScene, width: int) -> Array:
     """From 0 to the end of the duration, close together at the start."""
     end = simulation.scene.duration
     count = max(8, min(_TIMES, _ENTRIES // max(1, width)))

@@ -9,8 +9,8 @@ import numpy as np
 
 from solidsph.advice.advice import Advice
 from solidsph.advice.seen import Seen
-from solidsph.arrays import Array
-from solidsph.smoothing import SmoothingKernel, smoothing_kernel
+from solidsph.interfaces.smoothing_kernel import SmoothingKernel, smoothing_kernel
+from solidsph.maths.arrays import Array
 
 # Kernels in use stay below this in 1, 2 and 3D from the covers on that they are known to work with.
 _WRONG = 0.03

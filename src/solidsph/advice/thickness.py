@@ -13,8 +13,8 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices, Mask
 from solidsph.interfaces.shape import Shape
+from solidsph.maths.arrays import Array, Indices, Mask
 
 _RAYS = {2: 2000, 3: 600}  # by dimension: many find a narrow web, and cost time
 _MARCHES = 200

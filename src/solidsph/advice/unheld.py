@@ -8,8 +8,8 @@ import numpy as np
 
 from solidsph.advice.advice import Advice
 from solidsph.advice.seen import Seen, SeenBody
-from solidsph.arrays import Array
 from solidsph.interfaces.effect import Need
+from solidsph.maths.arrays import Array
 
 _FAR = 5.0  # lengths of the body
 

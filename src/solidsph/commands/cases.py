@@ -5,8 +5,8 @@ from __future__ import annotations
 import attrs
 import click
 
-from solidsph import registry
 from solidsph.commands.console import say, show_json, show_table
+from solidsph.registry import registry
 
 
 @click.command()

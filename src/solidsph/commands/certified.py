@@ -45,9 +45,9 @@ class SchemeOptions:
         Raises:
             SceneError: there is no such scene, case or part.
         """
-        from solidsph.cover import own_cover
-        from solidsph.parts import describe
-        from solidsph.scene import Scene
+        from solidsph.registry.construct import describe
+        from solidsph.scene.default_cover import own_cover
+        from solidsph.scene.scene import Scene
         from solidsph.studies.scheme import Scheme
         from solidsph.testing import example_part
 

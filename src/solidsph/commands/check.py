@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from solidsph import registry
 from solidsph.commands.certified import (
     SchemeOptions,
     confirmations,
@@ -20,9 +19,10 @@ from solidsph.commands.certified import (
 from solidsph.commands.console import say, show_json, show_table
 from solidsph.commands.target import parameters
 from solidsph.errors import SceneError
+from solidsph.registry import registry
 
 if TYPE_CHECKING:
-    from solidsph.testing.check import CheckResult
+    from solidsph.promises.check import CheckResult
 
 
 @click.command()

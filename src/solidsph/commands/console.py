@@ -16,7 +16,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from solidsph.hooks import implementation
+from solidsph.run.hooks import implementation
 
 if TYPE_CHECKING:
     from solidsph.interfaces.condition import Observation

@@ -15,7 +15,7 @@ import click
 from solidsph.commands.console import say, show_json, show_table, sweep_progress
 from solidsph.commands.target import parameters, resolve
 from solidsph.errors import SceneError
-from solidsph.interfaces.case import Case
+from solidsph.studies.case import Case
 
 if TYPE_CHECKING:
     from solidsph.studies.cost import Axes, Means

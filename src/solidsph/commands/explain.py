@@ -8,7 +8,6 @@ from typing import Any
 import attrs
 import click
 
-from solidsph import registry
 from solidsph.advice import advised
 from solidsph.commands import prediction as told
 from solidsph.commands.console import say, show_json, show_table
@@ -21,14 +20,16 @@ from solidsph.costs.model import Prediction, predicted
 from solidsph.costs.process import machine_memory
 from solidsph.costs.shares import Share, shares
 from solidsph.costs.work import Compilation
-from solidsph.cover import cover_of
 from solidsph.errors import SceneError
-from solidsph.interfaces.case import Case
-from solidsph.parts import construct
-from solidsph.scene import DEFAULT_INTEGRATOR, BodyScene, Scene
+from solidsph.registry import registry
+from solidsph.registry.construct import construct
+from solidsph.scene.default_cover import cover_of
+from solidsph.scene.scene import Scene
+from solidsph.scene.scene_data import DEFAULT_INTEGRATOR, BodyScene
 from solidsph.simulation import Simulation
 from solidsph.statics import critical_step
 from solidsph.statics.freedoms import freedoms
+from solidsph.studies.case import Case
 
 
 @click.command()

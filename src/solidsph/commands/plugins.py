@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import click
 
-from solidsph import registry
 from solidsph.commands.console import show_json, show_table
 from solidsph.errors import SolidsphError
+from solidsph.registry import registry
 
 
 @click.command()

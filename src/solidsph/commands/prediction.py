@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import click
 
-from solidsph.builder import Builder
 from solidsph.costs import calibration
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.cluster import Cluster, ClusterPrice, priced
@@ -19,7 +18,7 @@ from solidsph.costs.foreseen import foreseen
 from solidsph.costs.model import Built, Prediction
 from solidsph.costs.process import company, machine_memory, memory_now, peak_memory
 from solidsph.costs.work import Compilation, Work
-from solidsph.scene import Scene
+from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ Row = dict[str, Any]
 def built(scene: Scene) -> tuple[Simulation, Built]:
     """A scene built, and what that took."""
     begun = clock.perf_counter()
-    simulation = Builder(scene).build()
+    simulation = Simulation.builder(scene).build()
     seconds = clock.perf_counter() - begun
     return simulation, Built(seconds, peak_memory(), memory_now())
 

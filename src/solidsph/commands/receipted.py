@@ -7,12 +7,11 @@ from typing import Any
 
 import attrs
 
-from solidsph.builder import Builder
 from solidsph.commands.console import say, show_table
-from solidsph.interfaces.case import Case
-from solidsph.particles import State
-from solidsph.results.energy import KINETIC, STRAIN
+from solidsph.model.particles import State
+from solidsph.run.energy import KINETIC, STRAIN
 from solidsph.simulation import Simulation
+from solidsph.studies.case import Case
 from solidsph.studies.receipts import FINISHED, LARGEST, Receipts, case_changes, percent, receipts
 
 
@@ -26,7 +25,7 @@ def of_case(case: Case, of: Sequence[str]) -> dict[str, Any]:
     scenes = {}
     for name, scene in case.scenes().items():
         if scene.effects:
-            scenes[name] = attrs.asdict(receipts(Builder(scene).build(), of=of))
+            scenes[name] = attrs.asdict(receipts(Simulation.builder(scene).build(), of=of))
     return {"scenes": scenes, "measurements": case_changes(case)}
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
-from solidsph import registry
 from solidsph.commands.console import ProgressObserver, progress, say, show_json, show_table
+from solidsph.registry import registry
 
 
 @click.command()

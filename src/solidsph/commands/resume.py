@@ -11,10 +11,10 @@ from solidsph.commands.console import ProgressObserver, progress, say, show_json
 from solidsph.errors import RecordError
 from solidsph.results.layout import RECORD_SUFFIXES
 from solidsph.results.record import Record
-from solidsph.session import UNSOUND
+from solidsph.run.outcome import UNSOUND
 
 if TYPE_CHECKING:
-    from solidsph.results.resume import Pending
+    from solidsph.resumption import Pending
 
 
 @click.command()
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def resume(result: Path, until: float | None, force: bool, as_json: bool, quiet: bool) -> None:
     """Go on with a run in its own record, bit for bit; of a folder, with every run in it."""
-    from solidsph.results.resume import pending
+    from solidsph.resumption import pending
 
     facts = []
     for path in _records(result):

@@ -21,9 +21,9 @@ from solidsph.commands.console import (
 )
 from solidsph.commands.target import name_of, resolve
 from solidsph.errors import SceneError, UnsoundError
-from solidsph.interfaces.case import Case, Measurement
 from solidsph.results.layout import RECORD_SUFFIXES
-from solidsph.scene import Scene
+from solidsph.scene.scene import Scene
+from solidsph.studies.case import Case, Measurement
 
 if TYPE_CHECKING:
     from solidsph.costs.model import Prediction

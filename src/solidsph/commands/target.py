@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from solidsph import registry
-from solidsph.encoding import decoded
 from solidsph.errors import SceneError
-from solidsph.interfaces.case import Case
-from solidsph.parts import construct
-from solidsph.reading import MOST_BYTES, near
-from solidsph.scene import Scene
+from solidsph.registry import registry
+from solidsph.registry.construct import construct
+from solidsph.scene.scene import Scene
+from solidsph.scene.toml_reader import MOST_BYTES, near
+from solidsph.studies.case import Case
+from solidsph.system.encoding import decoded
 
 STANDARD_INPUT = "-"
 

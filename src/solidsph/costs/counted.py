@@ -8,11 +8,9 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.body import Body
 from solidsph.costs.dissection import dissected
 from solidsph.costs.work import Compilation, Loop, Piece, StaticWork, Work
-from solidsph.cover import cover_of
-from solidsph.engines.tally import Tally, Way
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import (
     ExtensionCondition,
     FieldCondition,
@@ -24,8 +22,10 @@ from solidsph.interfaces.declared import (
     PairForce,
     PointwiseForce,
 )
-from solidsph.mismatch import MismatchOperator, MismatchProducts
-from solidsph.scene import StaticsScene
+from solidsph.interfaces.mismatch import MismatchOperator, MismatchProducts
+from solidsph.interfaces.operation_count import Tally, Way
+from solidsph.scene.default_cover import cover_of
+from solidsph.scene.scene_data import StaticsScene
 from solidsph.simulation import Simulation
 
 _COMPILED = (Way.STENCILS, Way.ROWS)

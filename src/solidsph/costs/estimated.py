@@ -18,16 +18,17 @@ import numpy as np
 from solidsph.costs.counted import ITERATIONS, record_bytes
 from solidsph.costs.dissection import dissected
 from solidsph.costs.work import Compilation, Loop, Piece, StaticWork, Work
-from solidsph.cover import cover_of
-from solidsph.engines.tally import Tally, Way, vectors
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Configuration, Formulation
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.material import Material
+from solidsph.interfaces.operation_count import Tally, Way, vectors
 from solidsph.interfaces.shape import Shape
-from solidsph.parts import construct
-from solidsph.scene import DEFAULT_INTEGRATOR, BodyScene, Scene
-from solidsph.smoothing import UNIT_SPHERE
+from solidsph.interfaces.smoothing_kernel import UNIT_SPHERE
+from solidsph.registry.construct import construct
+from solidsph.scene.default_cover import cover_of
+from solidsph.scene.scene import Scene
+from solidsph.scene.scene_data import DEFAULT_INTEGRATOR, BodyScene
 
 # Points by which the volume of a shape is found that does not know its own.
 _POINTS = 1 << 15

@@ -12,8 +12,8 @@ from solidsph.costs.model import predicted
 from solidsph.costs.process import available_memory
 from solidsph.errors import SceneError
 from solidsph.interfaces.shape import Shape
-from solidsph.parts import construct
-from solidsph.scene import Scene
+from solidsph.registry.construct import construct
+from solidsph.scene.scene import Scene
 
 # Particles up to which a scene is not priced: at 20 kB each, the most that any takes, some 400 MB.
 _FEW = 2e4

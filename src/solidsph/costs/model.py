@@ -12,7 +12,7 @@ from solidsph.costs.calibration import Calibration
 from solidsph.costs.coefficients import COEFFICIENTS
 from solidsph.costs.terms import Term, Yard
 from solidsph.costs.work import Compilation, Loop, Work
-from solidsph.engines.tally import Way
+from solidsph.interfaces.operation_count import Way
 
 # Not in the fit yet, which will bring them when it is next made: what a step takes more with a
 # constant force, or one by a particle's own motion, over the particles that it acts on.

@@ -10,12 +10,12 @@ from solidsph.costs.calibration import Calibration
 from solidsph.costs.counted import counted
 from solidsph.costs.model import predicted
 from solidsph.costs.timed import timed
-from solidsph.engines.engine import InternalForces
 from solidsph.engines.history import remembering
 from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.engine import InternalForces
+from solidsph.run.stable_step import step_by_rates
 from solidsph.simulation import Simulation
-from solidsph.step_size import step_by_rates
 
 
 @attrs.frozen

@@ -9,7 +9,7 @@ from math import exp
 import attrs
 
 from solidsph.costs.work import Loop, Piece, Work
-from solidsph.engines.tally import Tally, Way
+from solidsph.interfaces.operation_count import Tally, Way
 
 # Of the threads that share a sum, what they are together beside one alone.
 _TOGETHER = 0.95

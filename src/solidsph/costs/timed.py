@@ -10,8 +10,8 @@ import attrs
 import numpy as np
 
 from solidsph.costs.work import Loop, Work
-from solidsph.engines.tally import Way
 from solidsph.interfaces.declared import DECLARED_LOADS
+from solidsph.interfaces.operation_count import Way
 from solidsph.simulation import Simulation
 
 _COMPILED = (Way.STENCILS, Way.ROWS)

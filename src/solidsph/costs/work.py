@@ -7,7 +7,7 @@ from enum import Enum
 
 import attrs
 
-from solidsph.engines.tally import Tally
+from solidsph.interfaces.operation_count import Tally
 
 
 class Loop(Enum):

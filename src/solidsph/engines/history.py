@@ -2,46 +2,20 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, final
 
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
-from solidsph.body import Body
-from solidsph.engines.engine import InternalForces, StressFields
-from solidsph.engines.tally import Tally
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import FieldCondition, Observation, StressCondition
+from solidsph.interfaces.engine import InternalForces, StressFields
 from solidsph.interfaces.history import History, HistoryMaterial
-from solidsph.tensors import components_first, particles_first
-
-
-class Law(ABC):
-    """What one body answers to the gradients of its displacements."""
-
-    body: Body
-
-    @abstractmethod
-    def flux(self, H: Array, history: Array, step: float) -> tuple[Array, Array]:
-        """What the divergence is taken of, (d, d, n) [Pa], and the history (n, k) after the step.
-
-        Args:
-            H: gradient of the displacements, (n, d, d).
-            history: internal variables at its beginning, (n, k); they are not written on.
-            step: its length [s]; 0 leaves the history as it is.
-        """
-
-    def history_of(self, memory: Mapping[str, Array]) -> Array:
-        """The internal variables, (n, k): those remembered, or the virgin state's."""
-        name = memory_name(self.body)
-        if name in memory:
-            return memory[name]
-        n, d = self.body.particles.positions.shape
-        material = self.body.material
-        start = material.initial_history(d) if isinstance(material, HistoryMaterial) else {}
-        return np.tile(np.array([*start.values()], dtype=np.float64), (n, 1))
+from solidsph.interfaces.law import Law, memory_name
+from solidsph.interfaces.operation_count import Tally
+from solidsph.maths.arrays import Array
+from solidsph.maths.tensors import components_first, particles_first
 
 
 @final
@@ -68,11 +42,6 @@ class ArrayLaw(Law):
         return np.moveaxis(particles_first(T, n), 0, -1), history
 
 
-def memory_name(body: Body) -> str:
-    """Where the history of a body is in `State.memory`."""
-    return f"history of {body.name}"
-
-
 def remembering(
     internal: InternalForces, bodies: Sequence[Body], conditions: Sequence[StressCondition]
 ) -> InternalForces:
@@ -80,7 +49,9 @@ def remembering(
     asked = internal.advances_histories
     if asked or not any(isinstance(body.material, HistoryMaterial) for body in bodies):
         return internal
-    return HistoryForces(internal, tuple(internal.law(body) for body in bodies), tuple(conditions))
+    return HistoryForces(
+        internal, tuple(internal.law(body) or ArrayLaw(body) for body in bodies), tuple(conditions)
+    )
 
 
 @final

@@ -12,14 +12,14 @@ import attrs
 import numpy as np
 from scipy.sparse import csr_array, diags_array, hstack, vstack
 
-from solidsph.arrays import Array, Indices, Mask, Tensor
-from solidsph.body import Body, part_of
-from solidsph.engines.engine import Engine, InternalForces, StressFields
-from solidsph.engines.tally import Tally, Way, array_bytes, vectors
+from solidsph.interfaces.body import Body, part_of
 from solidsph.interfaces.condition import StressCondition
+from solidsph.interfaces.engine import Engine, InternalForces, StressFields
 from solidsph.interfaces.formulation import Configuration
-from solidsph.neighbours import Pairs, neighbour_pairs
-from solidsph.tensors import identity, particles_first
+from solidsph.interfaces.operation_count import Tally, Way, array_bytes, vectors
+from solidsph.maths.arrays import Array, Indices, Mask, Tensor
+from solidsph.maths.tensors import identity, particles_first
+from solidsph.model.neighbours import Pairs, neighbour_pairs
 
 
 @attrs.frozen(eq=False)

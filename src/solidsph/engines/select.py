@@ -9,14 +9,14 @@ from typing import final
 import attrs
 import numpy as np
 
-from solidsph.body import Body
-from solidsph.engines.engine import Engine, InternalForces
 from solidsph.engines.matrix import MatrixEngine
 from solidsph.errors import SceneError
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import StressCondition
+from solidsph.interfaces.engine import Engine, InternalForces
 from solidsph.interfaces.formulation import Configuration
-from solidsph.mismatch import Mismatch, MismatchOperator, MismatchProducts
-from solidsph.smoothing import UNIT_SPHERE
+from solidsph.interfaces.mismatch import Mismatch, MismatchOperator, MismatchProducts
+from solidsph.interfaces.smoothing_kernel import UNIT_SPHERE
 
 # What the matrix engine takes for a step and for each pair in it, if the pairs stay and if they
 # are found anew, and what compilation takes, all [s], about; beside them the compiled engine's own

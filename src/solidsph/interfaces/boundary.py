@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from solidsph.interfaces.condition import Condition
-from solidsph.setting import Setting
+from solidsph.interfaces.discrete_model import Setting
 
 
 class BoundaryHandler(ABC):

@@ -14,8 +14,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Indices, Mask
-from solidsph.particles import Particles, State
+from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.model.particles import Particles, State
 
 
 @attrs.frozen(eq=False)

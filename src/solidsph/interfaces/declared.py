@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_array, kron
 
-from solidsph.arrays import Array, Indices, Mask, Scalar, Vector
 from solidsph.interfaces.condition import (
     ExtensionCondition,
     ForceCondition,
     MotionCondition,
     StressCondition,
 )
-from solidsph.mismatch import MismatchOperator, MismatchProducts
+from solidsph.interfaces.mismatch import MismatchOperator, MismatchProducts
+from solidsph.maths.arrays import Array, Indices, Mask, Scalar, Vector
 
 
 class ScheduledMotion(MotionCondition):
@@ -189,7 +189,7 @@ class PairForce(ForceCondition):
 
 
 class MismatchForce(ForceCondition):
-    """Forces that resist the mismatch of neighbours (`solidsph.mismatch`), body by body."""
+    """Forces that resist the mismatch of neighbours (`interfaces.mismatch`), body by body."""
 
     @property
     @abstractmethod

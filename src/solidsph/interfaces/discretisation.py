@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 from solidsph.interfaces.shape import Shape
-from solidsph.particles import Particles
+from solidsph.model.particles import Particles
 
 
 class Discretisation(ABC):

@@ -7,8 +7,8 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from solidsph.arrays import Array, Scalar
-from solidsph.neighbours import Pairs
+from solidsph.maths.arrays import Array, Scalar
+from solidsph.model.neighbours import Pairs
 
 
 class Divergence(ABC):

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
 
-from solidsph.body import Body
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import ForceCondition, StressCondition
-from solidsph.setting import Setting
+from solidsph.interfaces.discrete_model import Setting
 
 if TYPE_CHECKING:
-    from solidsph.engines.engine import InternalForces
+    from solidsph.interfaces.engine import InternalForces
 
 
 class Need(Enum):

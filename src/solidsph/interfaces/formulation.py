@@ -6,9 +6,9 @@ from abc import ABC, abstractmethod
 from enum import Enum
 from typing import ClassVar
 
-from solidsph.arrays import Tensor
 from solidsph.interfaces.divergence import Divergence
 from solidsph.interfaces.gradient import Gradient
+from solidsph.maths.arrays import Tensor
 
 
 class Configuration(Enum):

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar, final
+from collections.abc import Callable
+from typing import ClassVar, final
 
 import numpy as np
 
-from solidsph.arrays import Array, Mask, Tensor
 from solidsph.errors import BuildError
-from solidsph.neighbours import Pairs
-from solidsph.tensors import components_first, particles_first
-
-if TYPE_CHECKING:
-    from solidsph.body import Body
+from solidsph.interfaces.smoothing_kernel import SmoothingKernel
+from solidsph.maths.arrays import Array, Mask, Tensor
+from solidsph.maths.tensors import components_first, particles_first
+from solidsph.model.neighbours import Pairs
+from solidsph.model.particles import Particles
 
 
 class Gradient(ABC):
@@ -38,11 +38,26 @@ class Gradient(ABC):
             BuildError: the neighbours of a particle do not determine a gradient.
         """
 
-    def of_body(self, body: Body) -> Gradient:
-        """The gradient as `body` uses it: itself, unless it depends on the body as a whole.
+    def of_body(
+        self,
+        body: str,
+        particles: Particles,
+        smoothing: SmoothingKernel,
+        pairs: Callable[[], Pairs],
+        *,
+        moving: bool,
+    ) -> Gradient:
+        """Specialise to a body; returns self unless the weights depend on the body as a whole.
+
+        Args:
+            body: its name.
+            particles: its own.
+            smoothing: the kernel with the body's support radius.
+            pairs: finds its neighbours.
+            moving: True if the sums are taken in the current configuration.
 
         Raises:
-            BuildError: it does, and cannot be formed on this body.
+            BuildError: it cannot be formed on this body.
         """
         return self
 

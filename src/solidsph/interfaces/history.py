@@ -6,8 +6,8 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from solidsph.arrays import Scalar, Tensor
 from solidsph.interfaces.material import Material
+from solidsph.maths.arrays import Scalar, Tensor
 
 History = tuple[Scalar, ...]
 """Internal variables at a point, in the order of their names."""
@@ -20,9 +20,10 @@ class HistoryMaterial(Material):
     over a step to the F at its end: an implicit update of plastic flow, the exact decay of a
     viscous strain. What that dissipates is one of the variables, so that the ledger closes.
 
-    All are pure pointwise functions in the words of `solidsph.tensors`; h is a tuple of scalars.
-    What `Material` asks for is the law of the virgin state: `energy`, `first_piola` and `tangent`
-    are those at the h of `initial_history`, and `lame_parameters` those of a sudden small strain.
+    All are pure pointwise functions in the words of `solidsph.maths.tensors`; h is a tuple of
+    scalars. What `Material` asks for is the law of the virgin state: `energy`, `first_piola` and
+    `tangent` are those at the h of `initial_history`, and `lame_parameters` those of a sudden small
+    strain.
     """
 
     shown: ClassVar[Sequence[str]] = ()

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
-from solidsph.arrays import Scalar
-from solidsph.particles import State
-
-if TYPE_CHECKING:
-    from solidsph.dynamics import Dynamics
+from solidsph.interfaces.equation_of_motion import EquationOfMotion
+from solidsph.maths.arrays import Scalar
+from solidsph.model.particles import State
 
 MEAN_VELOCITY = "mean velocity of the step"
 """What a pointwise integrator keeps in `memory`: (u_n - u_n-1) / dt of every particle [m/s]."""
@@ -25,11 +23,11 @@ class Integrator(ABC):
     """Largest stable product of the time step and the highest angular frequency [-]."""
 
     @abstractmethod
-    def start(self, state: State, dynamics: Dynamics, step_size: float) -> State:
+    def start(self, state: State, dynamics: EquationOfMotion, step_size: float) -> State:
         """The first state, with accelerations and whatever the scheme keeps in `memory`."""
 
     @abstractmethod
-    def advance(self, state: State, dynamics: Dynamics, step_size: float) -> State:
+    def advance(self, state: State, dynamics: EquationOfMotion, step_size: float) -> State:
         """The state one time step [s] later."""
 
 
@@ -54,7 +52,7 @@ class PointwiseIntegrator(Integrator):
         With the acceleration before the step it is the velocity that forces see.
         """
 
-    def start(self, state: State, dynamics: Dynamics, step_size: float) -> State:
+    def start(self, state: State, dynamics: EquationOfMotion, step_size: float) -> State:
         """The first state: the step before it is one that would have led to its velocity."""
         response = dynamics.respond(state.time, state.positions, state.velocities)
         a = response.accelerations
@@ -64,7 +62,7 @@ class PointwiseIntegrator(Integrator):
             memory={**response.memory, MEAN_VELOCITY: state.velocities - 0.5 * step_size * a},
         )
 
-    def advance(self, state: State, dynamics: Dynamics, step_size: float) -> State:
+    def advance(self, state: State, dynamics: EquationOfMotion, step_size: float) -> State:
         """The state one time step [s] later."""
         time = state.time + step_size
         a = state.accelerations

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from solidsph.arrays import Scalar
+from solidsph.maths.arrays import Scalar
 
 
 class Kernel(ABC):

@@ -6,14 +6,14 @@ from abc import ABC, abstractmethod
 from math import sqrt
 from typing import ClassVar
 
-from solidsph.arrays import Scalar, Tensor
+from solidsph.maths.arrays import Scalar, Tensor
 
 
 class Material(ABC):
     """A hyperelastic law.
 
     `energy`, `first_piola` and `tangent` are pure pointwise functions written in the words of
-    `solidsph.tensors`: F is d x d with components first, in 1D for uniaxial strain, in 2D for
+    `solidsph.maths.tensors`: F is d x d with components first, in 1D for uniaxial strain, in 2D for
     plane strain. An implementation is a frozen attrs class with a `density` field.
     """
 

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 
 import attrs
 
-from solidsph.arrays import Array
+from solidsph.maths.arrays import Array
 
 
 @attrs.frozen(eq=False)

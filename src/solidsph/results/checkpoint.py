@@ -21,12 +21,12 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.errors import RecordError
-from solidsph.files import content
-from solidsph.particles import State
-from solidsph.scene import MOST_STEPS
-from solidsph.uninterrupted import uninterrupted
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import State
+from solidsph.scene.scene_data import MOST_STEPS
+from solidsph.system.files import content
+from solidsph.system.signals import uninterrupted
 
 FORMAT = 1
 _MAGIC = "solidsph checkpoint"

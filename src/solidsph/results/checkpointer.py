@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from solidsph.errors import RecordError
-from solidsph.hooks import implementation
 from solidsph.interfaces.condition import Observation
-from solidsph.particles import State
+from solidsph.model.particles import State
 from solidsph.results.checkpoint import Checkpoint, checkpoint_path, write_checkpoint
 from solidsph.results.circumstances import circumstances
 from solidsph.results.recorder import scene_text
-from solidsph.session import is_over
+from solidsph.run.hooks import implementation
+from solidsph.run.outcome import is_over
 
 if TYPE_CHECKING:
-    from solidsph.arrays import Array
-    from solidsph.simulation import Simulation
+    from solidsph.maths.arrays import Array
+    from solidsph.run.built_scene import BuiltScene
 
 # Of the time that a run takes, what checkpoints may take.
 SHARE = 0.01
@@ -51,14 +51,14 @@ class Checkpointer:
 
     @implementation(trylast=True)
     def solidsph_resume(
-        self, simulation: Simulation, observation: Observation, kept: Mapping[str, Array]
+        self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
     ) -> None:
         # At once: the end of the run, or its step, may be another than the older one says.
         self._hear(simulation, observation)
         self._write(simulation)
 
     @implementation(trylast=True)
-    def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
+    def solidsph_step_end(self, simulation: BuiltScene, observation: Observation) -> None:
         # Last of all listeners: one that stops the run keeps this state from being gone on with.
         if not self._is_ours:
             # The record is the new run's by now, so the older one's checkpoint is of no more use.
@@ -69,7 +69,7 @@ class Checkpointer:
             self._write(simulation)
 
     @implementation
-    def solidsph_finish(self, simulation: Simulation, outcome: str) -> None:
+    def solidsph_finish(self, simulation: BuiltScene, outcome: str) -> None:
         if self._is_written or not self._is_recorded:
             return
         try:
@@ -79,7 +79,7 @@ class Checkpointer:
                 raise
             # Otherwise what stopped the run is what is to be told.
 
-    def _hear(self, simulation: Simulation, observation: Observation) -> None:
+    def _hear(self, simulation: BuiltScene, observation: Observation) -> None:
         self._state, self._is_written = observation.state, False
         if self._recorded is None:  # the recorder has heard it before
             self._recorded = self._record.stat()
@@ -99,7 +99,7 @@ class Checkpointer:
         cost = self._cost if self._cost is not None else _WRITING + _BYTE * _size(state)
         return (clock.perf_counter() - self._last) * SHARE >= cost
 
-    def _write(self, simulation: Simulation) -> None:
+    def _write(self, simulation: BuiltScene) -> None:
         if self._state is None or simulation.scene.statics is not None:
             return  # load steps depend on those before; an equilibrium is found anew
         begun = clock.perf_counter()

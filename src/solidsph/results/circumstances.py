@@ -12,17 +12,17 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from solidsph import registry
+from solidsph.registry import registry
 from solidsph.results.layout import PluginUsed
 
 if TYPE_CHECKING:
-    from solidsph.simulation import Simulation
+    from solidsph.run.built_scene import BuiltScene
 
 _SOFTWARE = ("solidsph", "numpy", "scipy", "numba")
 _CODE = "code of "
 
 
-def circumstances(simulation: Simulation) -> Mapping[str, str]:
+def circumstances(simulation: BuiltScene) -> Mapping[str, str]:
     """Versions of software and of every part used, and how many threads share the work."""
     used = [
         PluginUsed(e.kind, e.name, e.distribution, e.version, e.target) for e in simulation.parts

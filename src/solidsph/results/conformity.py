@@ -13,7 +13,7 @@ import attrs
 import h5py
 import numpy as np
 
-from solidsph.particles import Particles
+from solidsph.model.particles import Particles
 from solidsph.results.digest import BYTES
 from solidsph.results.layout import HDF5_ERRORS, static_fields, tag_name
 

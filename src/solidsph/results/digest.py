@@ -10,8 +10,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
-from solidsph.particles import Particles
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import Particles
 from solidsph.results.layout import Field, PluginUsed
 
 BYTES = 16

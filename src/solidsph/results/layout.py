@@ -22,7 +22,7 @@ import re
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
+from solidsph.maths.arrays import Array
 
 FORMAT = 2  # a reader refuses a higher number than its own
 VTKHDF_VERSION = (2, 0)  # the first with time; higher ones add nothing that is used here

@@ -10,7 +10,7 @@ from solidsph.errors import RecordError
 from solidsph.results.layout import RUNNING
 from solidsph.results.record import NotARecordError, Record, check_is_record
 from solidsph.results.record_writer import check_free
-from solidsph.session import FINISHED, INTERRUPTED, is_over
+from solidsph.run.outcome import FINISHED, INTERRUPTED, is_over
 
 # Outcomes of runs that would come to the same end again.
 _ENDED = (FINISHED, "diverged", "unsound", "ConvergenceError")

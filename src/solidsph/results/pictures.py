@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from solidsph.arrays import Array
+from solidsph.maths.arrays import Array
 from solidsph.results.record import Record
 
 _STRESS = "cauchy_stress"

@@ -15,9 +15,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from solidsph.arrays import Array
 from solidsph.errors import RecordError
-from solidsph.particles import Face, Particles
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import Face, Particles
 from solidsph.results.conformity import Tree, check_first, check_rest, check_values
 from solidsph.results.digest import Reference, step_digest
 from solidsph.results.layout import (

@@ -17,10 +17,9 @@ import attrs
 import h5py
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.errors import DivergedError, RecordError
-from solidsph.files import working_folder
-from solidsph.particles import Particles
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import Particles
 from solidsph.results.digest import BYTES, Reference, step_digest
 from solidsph.results.layout import (
     FORMAT,
@@ -35,7 +34,8 @@ from solidsph.results.layout import (
     static_fields,
     tag_name,
 )
-from solidsph.uninterrupted import uninterrupted
+from solidsph.system.files import working_folder
+from solidsph.system.signals import uninterrupted
 
 __all__ = ["EarlierStep", "Field", "PluginUsed", "RecordWriter"]
 

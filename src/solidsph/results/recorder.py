@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solidsph.errors import RecordError, SceneError
-from solidsph.hooks import implementation
 from solidsph.interfaces.condition import Observation
-from solidsph.results.energy import KINETIC, STRAIN, kinetic_energy, strain_energy
 from solidsph.results.left import check_no_other_file
 from solidsph.results.record import Record
 from solidsph.results.record_writer import EarlierStep, Field, PluginUsed, RecordWriter
 from solidsph.results.shown import OWN, history, parted
 from solidsph.results.shown import fields as shown_fields
-from solidsph.resumption import Resumption
+from solidsph.run.energy import KINETIC, STRAIN, kinetic_energy, strain_energy
+from solidsph.run.hooks import implementation
+from solidsph.run.restart_point import Resumption
 
 if TYPE_CHECKING:
-    from solidsph.arrays import Array
-    from solidsph.simulation import Simulation
+    from solidsph.maths.arrays import Array
+    from solidsph.run.built_scene import BuiltScene
 
 
 COMPOSED = "# this scene was composed in Python"
@@ -44,20 +44,20 @@ class Recorder:
         self.final: dict[str, float] = {}  # columns of the history at the last output so far
 
     @implementation
-    def solidsph_setup(self, simulation: Simulation) -> None:
+    def solidsph_setup(self, simulation: BuiltScene) -> None:
         # What is there stays until there is something to take its place.
         if self._since is None:
             check_no_other_file(self._path)
 
     @implementation
     def solidsph_resume(
-        self, simulation: Simulation, observation: Observation, kept: Mapping[str, Array]
+        self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
     ) -> None:
         self._writer = self._open(simulation, observation)
         self.final.update(self._history(simulation, observation))
 
     @implementation
-    def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
+    def solidsph_step_end(self, simulation: BuiltScene, observation: Observation) -> None:
         if self._writer is None:
             self._writer = self._open(simulation, observation)
         state = observation.state
@@ -72,13 +72,13 @@ class Recorder:
         self._writer.append(state.time, state.step, state.positions, fields, columns)
 
     @implementation
-    def solidsph_finish(self, simulation: Simulation, outcome: str) -> None:
+    def solidsph_finish(self, simulation: BuiltScene, outcome: str) -> None:
         if self._recorded is not None:
             self._recorded.close()
         if self._writer is not None:
             self._writer.close(outcome)
 
-    def _open(self, simulation: Simulation, observation: Observation) -> RecordWriter:
+    def _open(self, simulation: BuiltScene, observation: Observation) -> RecordWriter:
         d = simulation.particles.dimension
         earlier = self._earlier()
         if earlier is None:
@@ -155,7 +155,7 @@ class Recorder:
                 "on all the same, force it; to be sure, run the scene anew into another record"
             )
 
-    def _history(self, simulation: Simulation, observation: Observation) -> dict[str, float]:
+    def _history(self, simulation: BuiltScene, observation: Observation) -> dict[str, float]:
         return history(observation, self._initial_energy, simulation.conditions)
 
 
@@ -174,7 +174,7 @@ def _steps(record: Record, until: float) -> Iterator[EarlierStep]:
                 )
 
 
-def scene_text(simulation: Simulation) -> str:
+def scene_text(simulation: BuiltScene) -> str:
     """The scene as TOML, or why it has no such form."""
     try:
         return simulation.scene.to_toml()

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.errors import RecordError
-from solidsph.particles import Particles
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import Particles
 from solidsph.results.checkpoint import Checkpoint
 from solidsph.results.record import Record
 from solidsph.results.recorder import stress
-from solidsph.simulation import Simulation
+from solidsph.run.built_scene import BuiltScene
 
 # Other versions of libraries may round otherwise; what differs by more, in spacings, is not that.
 _ROUNDING = 1e-9
@@ -46,7 +46,7 @@ def check_same_particles(record: Record, built: Particles, *, exactly: bool) -> 
 
 
 def check_same_output(
-    record: Record, checkpoint: Checkpoint, simulation: Simulation, *, exactly: bool
+    record: Record, checkpoint: Checkpoint, simulation: BuiltScene, *, exactly: bool
 ) -> None:
     """That a checkpoint is an output of the record, and answered as it was then.
 

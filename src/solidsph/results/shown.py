@@ -7,8 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from solidsph import handed_back
-from solidsph.arrays import Array
 from solidsph.errors import PluginError, RecordError
 from solidsph.interfaces.condition import (
     Condition,
@@ -16,8 +14,10 @@ from solidsph.interfaces.condition import (
     Observation,
     StoringCondition,
 )
-from solidsph.results.energy import BY_BODY, ledger
+from solidsph.maths.arrays import Array
 from solidsph.results.layout import field_name, static_fields, tag_name
+from solidsph.run.energy import BY_BODY, ledger
+from solidsph.scene import returned_values
 
 OWN = {"velocity": "m/s", "cauchy_stress": "Pa", "volume_ratio": "-"}
 """Fields of every record, and their units."""
@@ -35,7 +35,7 @@ def history(
     columns = dict(ledger(observation, initial, conditions))
     for condition in conditions:
         reported = condition.report(observation)
-        wrong = handed_back.columns(condition.label, reported)
+        wrong = returned_values.columns(condition.label, reported)
         if wrong:
             raise PluginError(f"{wrong}. This is a fault of the part with that label")
         for name, value in reported.items():

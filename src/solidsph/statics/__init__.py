@@ -1,9 +1,9 @@
 """Equilibria, natural frequencies and the stable step, from the operators that runs use."""
 
+from solidsph.statics.critical_step import StableStep, critical_step, highest_frequency
 from solidsph.statics.equilibrium import EquilibriumResult, LoadStep, equilibrium
 from solidsph.statics.modes import Modes, frequencies
 from solidsph.statics.run import run_statics
-from solidsph.statics.stable_step import StableStep, critical_step, highest_frequency
 from solidsph.statics.stiff import Stiff
 from solidsph.statics.tangent import tangent
 

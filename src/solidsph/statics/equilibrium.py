@@ -8,10 +8,10 @@ from collections.abc import Callable
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.errors import ConvergenceError, PortableError, SceneError
-from solidsph.particles import State
-from solidsph.simulation import Simulation
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import State
+from solidsph.run.built_scene import BuiltScene
 from solidsph.statics.factors import Factors, SingularError, factorised
 from solidsph.statics.freedoms import Freedoms, freedoms
 from solidsph.statics.load_path import Forces, LoadPath
@@ -80,7 +80,7 @@ class _LoadStepError(PortableError):
 
 
 def equilibrium(
-    simulation: Simulation,
+    simulation: BuiltScene,
     *,
     load_steps: int = 1,
     tolerance: float = 1e-9,
@@ -180,7 +180,7 @@ class _Newton:
     coarsest: float = 0.0  # that rounding of positions may leave, too [N]
 
     @classmethod
-    def of(cls, simulation: Simulation, tolerance: float, max_iterations: int) -> _Newton:
+    def of(cls, simulation: BuiltScene, tolerance: float, max_iterations: int) -> _Newton:
         own = freedoms(simulation.dynamics)
         return cls(
             path=LoadPath.of(simulation),

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from solidsph.arrays import Array
 from solidsph.errors import PortableError
+from solidsph.maths.arrays import Array
 
 # An eigenvalue of the matrix scaled to a unit diagonal: below this it is rounding.
 _SINGULAR = 1e-13

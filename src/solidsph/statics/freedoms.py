@@ -6,9 +6,9 @@ import attrs
 import numpy as np
 from scipy.sparse import csr_array, eye_array
 
-from solidsph.arrays import Array, Mask
-from solidsph.dynamics import Dynamics
 from solidsph.interfaces.condition import ExtensionCondition
+from solidsph.maths.arrays import Array, Mask
+from solidsph.run.dynamics import Dynamics
 from solidsph.statics.linear_part import linear_part
 
 

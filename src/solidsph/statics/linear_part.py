@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.sparse import csr_array
 
-from solidsph.arrays import Array, Indices
 from solidsph.errors import SolidsphError
+from solidsph.maths.arrays import Array, Indices
 
 # Terms this far below the largest are rounding.
 _NEGLIGIBLE = 1e-14

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Mask
 from solidsph.engines.matrix import MatrixEngine, MatrixForces
 from solidsph.interfaces.condition import ExtensionCondition, StressCondition
-from solidsph.simulation import Simulation
+from solidsph.maths.arrays import Array, Mask
+from solidsph.run.built_scene import BuiltScene
 
 
 @attrs.frozen(eq=False)
@@ -35,14 +35,14 @@ class LoadPath:
     constant, which stands at full height from the start, grows in proportion to s.
     """
 
-    simulation: Simulation
+    simulation: BuiltScene
     internal: MatrixForces
     offset: Array  # (n, d) motion imposed at t = 0 [m]
     initial_loads: Mapping[str, Array]  # (k, d) of each load at t = 0 [N]
     held: Mask  # (n, d) components of real particles that a motion determines
 
     @classmethod
-    def of(cls, simulation: Simulation) -> LoadPath:
+    def of(cls, simulation: BuiltScene) -> LoadPath:
         """The path of a scene, from its reference configuration."""
         dynamics, particles = simulation.dynamics, simulation.particles
         rest = np.zeros_like(particles.positions)
@@ -101,7 +101,7 @@ class LoadPath:
         return ratios
 
 
-def _double_precision(simulation: Simulation) -> MatrixForces:
+def _double_precision(simulation: BuiltScene) -> MatrixForces:
     """Internal forces whose rounding Newton's method does not see, whichever engine runs."""
     internal = simulation.dynamics.internal
     if isinstance(internal, MatrixForces):

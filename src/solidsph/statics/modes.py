@@ -7,10 +7,10 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from solidsph.arrays import Array
 from solidsph.errors import SceneError, SolidsphError
-from solidsph.particles import State
-from solidsph.simulation import Simulation
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import State
+from solidsph.run.built_scene import BuiltScene
 from solidsph.statics.factors import SingularError, factorised
 from solidsph.statics.freedoms import freedoms
 from solidsph.statics.tangent import is_symmetric, tangent
@@ -34,7 +34,7 @@ class Modes:
     against each other: a zero-energy mode of the gradient, whose frequency means nothing."""
 
 
-def frequencies(simulation: Simulation, count: int, state: State | None = None) -> Modes:
+def frequencies(simulation: BuiltScene, count: int, state: State | None = None) -> Modes:
     """The `count` smallest natural frequencies about `state`, by shift and invert.
 
     Loads count by their stiffness alone, damping not at all.
@@ -103,7 +103,7 @@ def _unstable() -> SolidsphError:
     )
 
 
-def _smoothness(simulation: Simulation, shapes: Array) -> Array:
+def _smoothness(simulation: BuiltScene, shapes: Array) -> Array:
     W = simulation.setting.smoothing_matrix()
     sums = W.sum(axis=1)[:, None]
     return np.array([np.linalg.norm(W @ u / sums) / np.linalg.norm(u) for u in shapes])

@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Sequence
-from pathlib import Path
 
 import attrs
 
-from solidsph.particles import State
-from solidsph.resumption import Resumption
-from solidsph.scene import StaticsScene
-from solidsph.session import session
-from solidsph.simulation import Result, Simulation
+from solidsph.model.particles import State
+from solidsph.run.built_scene import BuiltScene
+from solidsph.run.outcome import Result
+from solidsph.run.restart_point import Resumption
+from solidsph.run.session import session
+from solidsph.scene.scene_data import StaticsScene
 from solidsph.statics.equilibrium import equilibrium
 
 
 def run_statics(
-    simulation: Simulation,
+    simulation: BuiltScene,
     wanted: StaticsScene,
-    *,
-    record: Path | str | None = None,
-    observers: Sequence[object] = (),
+    listeners: Sequence[object],
     since: Resumption | None = None,
 ) -> Result:
     """Find the equilibrium; the unloaded body and every load step are outputs.
@@ -33,18 +31,17 @@ def run_statics(
     Raises:
         ConvergenceError: none was found; the load steps up to there stay readable.
     """
-    path = None if record is None else Path(record)
     begun = clock.perf_counter()
 
     def observe(state: State) -> None:
         observation = simulation.dynamics.observe(state)
         simulation.manager.hook.solidsph_step_end(simulation=simulation, observation=observation)
 
-    with session(simulation, path, observers, since) as final:
+    with session(simulation, listeners):
         found = equilibrium(simulation, **attrs.asdict(wanted), observer=observe)
     return Result(
         state=found.state,
-        record=path,
+        record=None,
         seconds=clock.perf_counter() - begun,
         effort={
             "load steps": len(found.steps),
@@ -52,6 +49,5 @@ def run_statics(
             "residual [-]": found.residual,
             "stable": found.stable,
         },
-        final=final,
         notes=() if since is None else since.notes,
     )

@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable
 
 from scipy.sparse import csr_array
 
-from solidsph.arrays import Array
+from solidsph.maths.arrays import Array
 
 
 @runtime_checkable

@@ -9,16 +9,16 @@ import attrs
 import numpy as np
 from scipy.sparse import block_diag, bsr_array, csr_array, diags_array
 
-from solidsph.arrays import Array
-from solidsph.body import Body
 from solidsph.engines.matrix import Operators, operators
 from solidsph.errors import SolidsphError
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import ForceCondition, StressCondition
 from solidsph.interfaces.formulation import Configuration, Formulation
-from solidsph.simulation import Simulation
+from solidsph.maths.arrays import Array
+from solidsph.maths.tensors import components_first, particles_first
+from solidsph.run.built_scene import BuiltScene
 from solidsph.statics.linear_part import linear_part
 from solidsph.statics.stiff import Stiff
-from solidsph.tensors import components_first, particles_first
 
 
 @attrs.frozen(eq=False)
@@ -99,7 +99,7 @@ class Tangent:
     loads: Sequence[ForceCondition]
 
     @classmethod
-    def of(cls, simulation: Simulation) -> Tangent:
+    def of(cls, simulation: BuiltScene) -> Tangent:
         """Prepare the tangent of a scene.
 
         Raises:
@@ -169,7 +169,7 @@ class Tangent:
         )
 
 
-def tangent(simulation: Simulation, displacements: Array) -> csr_array:
+def tangent(simulation: BuiltScene, displacements: Array) -> csr_array:
     """K = -df/du, (d n, d n) [N/m], at displacements u = x - X (n, d) [m] of all particles.
 
     Rows and columns stand particle by particle, component i of particle p at p d + i, ghosts
@@ -182,7 +182,7 @@ def tangent(simulation: Simulation, displacements: Array) -> csr_array:
     return Tangent.of(simulation).matrix(displacements)
 
 
-def is_symmetric(simulation: Simulation) -> bool:
+def is_symmetric(simulation: BuiltScene) -> bool:
     """Whether the internal forces derive from an energy, so that K is symmetric."""
     return all(body.formulation.divergence.adjoint for body in simulation.setting.bodies)
 
@@ -230,7 +230,7 @@ def _check_form(formulation: Formulation, d: int) -> None:
 
 
 def _stress_extension(
-    body: Body, simulation: Simulation, conditions: Sequence[StressCondition]
+    body: Body, simulation: BuiltScene, conditions: Sequence[StressCondition]
 ) -> csr_array | None:
     """How the stress of ghosts follows that of the body's real particles; None if it is unused."""
     if not (conditions and body.formulation.divergence.uses_ghost_stress):

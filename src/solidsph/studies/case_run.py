@@ -11,15 +11,14 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.builder import Builder
 from solidsph.costs.counted import counted
 from solidsph.costs.process import peak_memory
 from solidsph.errors import ConvergenceError, DivergedError, UnsoundError
-from solidsph.interfaces.case import Case, Curves, Measurement
 from solidsph.results.record import Record
 from solidsph.results.sole_writer import sole_writer
-from solidsph.scene import Scene
+from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
+from solidsph.studies.case import Case, Curves, Measurement
 
 FINISHED = "finished"
 
@@ -110,7 +109,7 @@ def run_scenes(
         path = folder / f"{name}.h5"
         outcome, begun = FINISHED, clock.perf_counter()
         ahead(scene)
-        simulation = Builder(scene).build()
+        simulation = Simulation.builder(scene).build()
         effort: Mapping[str, Any] = {}
         observers = begin(name, simulation)
         try:

@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 from scipy.optimize import minimize
 
-from solidsph.arrays import Array
 from solidsph.errors import SceneError
+from solidsph.maths.arrays import Array
+from solidsph.maths.tensors import components_first, particles_first
+from solidsph.promises.ellipticity import acoustic_tensors, least_stiffness
 from solidsph.simulation import Simulation
 from solidsph.studies.dispersion import LatticeResponse, check_uniform, lattice_response
-from solidsph.studies.ellipticity import acoustic_tensors, least_stiffness
 from solidsph.studies.scheme import Scheme, deformation, stretched
 from solidsph.studies.spectrum import spectrum
-from solidsph.tensors import components_first, particles_first
 
 GROWS = 5e-4
 """Growth counts from here on [e-foldings per wave transit of one spacing]: rounding leaves 1e-4 of

@@ -11,9 +11,9 @@ from math import ceil, log
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
 from solidsph.errors import SolidsphError
-from solidsph.particles import State
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import State
 from solidsph.simulation import Simulation
 from solidsph.studies.certificate import Certificate, Wave
 from solidsph.studies.scheme import stretched

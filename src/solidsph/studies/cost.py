@@ -12,8 +12,8 @@ from typing import Any
 import attrs
 
 from solidsph.errors import SceneError
-from solidsph.interfaces.case import Case
-from solidsph.parts import construct
+from solidsph.registry.construct import construct
+from solidsph.studies.case import Case
 from solidsph.studies.frontier import Frontier
 from solidsph.studies.journal import Journal
 from solidsph.studies.point import Point

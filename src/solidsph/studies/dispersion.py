@@ -15,10 +15,10 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from solidsph.arrays import Array
-from solidsph.dynamics import Dynamics
 from solidsph.errors import SolidsphError
-from solidsph.particles import Particles, State
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import Particles, State
+from solidsph.run.dynamics import Dynamics
 from solidsph.studies.spectrum import RELATIVE_STEP
 
 # Beside the largest derivative: differences leave 1e-11 of it.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from solidsph import registry
+from solidsph.registry import registry
 from solidsph.studies.case_run import CaseResult
 from solidsph.studies.reproduce import Reproduction
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from solidsph.errors import SceneError, SolidsphError
-from solidsph.parts import construct, describe
+from solidsph.registry.construct import construct, describe
 from solidsph.studies.point import Point
 from solidsph.studies.point_json import from_json, to_json
 from solidsph.studies.runner import Lost

@@ -14,7 +14,7 @@ import attrs
 
 from solidsph.costs.process import peak_memory
 from solidsph.errors import SolidsphError
-from solidsph.interfaces.case import Case
+from solidsph.studies.case import Case
 from solidsph.studies.case_run import FINISHED, opened, run_scenes
 from solidsph.studies.varied import varied
 

@@ -18,19 +18,19 @@ from typing import TypeAlias
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
-from solidsph.builder import Builder
 from solidsph.costs.shares import without
 from solidsph.errors import BuildError, ConvergenceError, DivergedError, SceneError, UnsoundError
-from solidsph.interfaces.case import Case
 from solidsph.interfaces.shape import Shape
-from solidsph.particles import State
-from solidsph.parts import construct
-from solidsph.results.energy import RESIDUAL
+from solidsph.interfaces.time_loop import StepError, TimeLoop
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import State
+from solidsph.registry.construct import construct
 from solidsph.results.record import Record
-from solidsph.scene import BodyScene, Scene
+from solidsph.run.energy import RESIDUAL
+from solidsph.scene.scene import Scene
+from solidsph.scene.scene_data import BodyScene
 from solidsph.simulation import Simulation
-from solidsph.time_loop import StepError, TimeLoop
+from solidsph.studies.case import Case
 
 LARGEST = "largest displacement [m]"
 
@@ -129,7 +129,7 @@ def receipts(
     with tempfile.TemporaryDirectory() as folder:
         for factor in (coarser, 1.0):
             small = reduced(simulation.scene, factor)
-            whole = Builder(small).build()
+            whole = Simulation.builder(small).build()
             base = _carried_out(whole, Path(folder) / "with.h5", of)
             if base.outcome == FINISHED:
                 break  # else the scene does not stand being coarser
@@ -148,7 +148,7 @@ def case_changes(case: Case, coarser: float = COARSER) -> Mapping[str, Mapping[s
     Empty where the case cannot measure its scenes at reduced size.
     """
     scenes = {name: reduced(scene, coarser) for name, scene in case.scenes().items()}
-    built = {name: Builder(scene).build() for name, scene in scenes.items()}
+    built = {name: Simulation.builder(scene).build() for name, scene in scenes.items()}
     labels = dict.fromkeys(label for one in built.values() for label in one.effects)
     if not labels:
         return {}
@@ -227,10 +227,10 @@ def reduced(scene: Scene, coarser: float = COARSER) -> Scene:
     bodies = {name: _coarser(body, coarser) for name, body in scene.bodies.items()}
     small = attrs.evolve(scene, bodies=bodies, engine="matrix", time_step=None)
     try:
-        built = Builder(small).build()
+        built = Simulation.builder(small).build()
     except BuildError:  # what is smaller than the coarser spacing matches nothing
         small = attrs.evolve(scene, engine="matrix")
-        built = Builder(small).build()
+        built = Simulation.builder(small).build()
     if scene.statics is not None:
         return small
     cost = _STEP + _PAIR * built.dynamics.internal.pair_count * (1 + len(built.effects))

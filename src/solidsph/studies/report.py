@@ -16,7 +16,7 @@ from typing import Any, final
 import attrs
 
 from solidsph.errors import SolidsphError
-from solidsph.interfaces.case import Case
+from solidsph.studies.case import Case
 from solidsph.studies.case_run import FINISHED
 from solidsph.studies.frontier import Frontier
 from solidsph.studies.point import Point, shown

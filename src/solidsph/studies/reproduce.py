@@ -12,9 +12,9 @@ import attrs
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from solidsph import registry
 from solidsph.errors import SceneError
-from solidsph.interfaces.case import Case
+from solidsph.registry import registry
+from solidsph.studies.case import Case
 from solidsph.studies.case_run import Begin, CaseResult, run_case
 
 _COLUMNS = 3  # of the contact sheet

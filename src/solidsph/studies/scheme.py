@@ -8,17 +8,17 @@ from math import floor
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
-from solidsph.builder import Builder
-from solidsph.cover import cover_of, own_cover
 from solidsph.errors import SceneError
 from solidsph.interfaces.formulation import Configuration, Formulation
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.material import Material
-from solidsph.particles import State
-from solidsph.parts import construct
-from solidsph.scene import DEFAULT_INTEGRATOR, PartLike, Scene
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import State
+from solidsph.registry.construct import construct
+from solidsph.scene.default_cover import cover_of, own_cover
+from solidsph.scene.scene import Scene
+from solidsph.scene.scene_data import DEFAULT_INTEGRATOR, PartLike
 from solidsph.simulation import Simulation
 
 # A soft solid of usual proportions; only Poisson's ratio shows in units of its wave speed.
@@ -151,7 +151,7 @@ class Scheme:
         lengths = [2.0 * one * self.spacing for one in layers]
         shape = {"type": "box", "lengths": lengths, "origin": [-0.5 * one for one in lengths]}
         builder = (
-            Builder()
+            Simulation.builder()
             .body(
                 "block",
                 shape=shape,

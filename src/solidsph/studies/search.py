@@ -12,7 +12,7 @@ from typing import Any, final
 import attrs
 
 from solidsph.errors import SceneError
-from solidsph.interfaces.case import Case
+from solidsph.studies.case import Case
 from solidsph.studies.point import Point
 from solidsph.studies.varied import varied
 

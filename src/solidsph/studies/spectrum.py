@@ -10,10 +10,10 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Mask
-from solidsph.dynamics import Dynamics
 from solidsph.errors import SolidsphError
-from solidsph.particles import State
+from solidsph.maths.arrays import Array, Mask
+from solidsph.model.particles import State
+from solidsph.run.dynamics import Dynamics
 
 # Differences over this part of a spacing: the fourth order formula's error, (step / spacing)^4,
 # then stands near the rounding of the accelerations.

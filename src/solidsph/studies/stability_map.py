@@ -8,9 +8,9 @@ from math import nan
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Mask
 from solidsph.errors import BuildError
 from solidsph.interfaces.formulation import Configuration
+from solidsph.maths.arrays import Array, Mask
 from solidsph.studies.certificate import GROWS
 from solidsph.studies.dispersion import check_uniform, dispersion, lattice_response
 from solidsph.studies.scheme import Scheme, stretched

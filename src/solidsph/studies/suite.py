@@ -13,12 +13,12 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph import registry
 from solidsph.errors import SceneError, SolidsphError
-from solidsph.interfaces.case import Case, Measurement, Trial
-from solidsph.parts import construct
+from solidsph.registry import registry
+from solidsph.registry.construct import construct
 from solidsph.results.record import Record
-from solidsph.scene import Scene
+from solidsph.scene.scene import Scene
+from solidsph.studies.case import Case, Measurement, Trial
 from solidsph.studies.case_run import FINISHED, SceneRun, opened, run_scenes
 from solidsph.studies.varied import varied
 

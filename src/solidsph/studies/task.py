@@ -16,9 +16,9 @@ from typing import Any, final
 import attrs
 import numpy as np
 
-from solidsph import registry
 from solidsph.errors import SceneError, SolidsphError
-from solidsph.interfaces.case import Case
+from solidsph.registry import registry
+from solidsph.studies.case import Case
 from solidsph.studies.varied import varied
 
 

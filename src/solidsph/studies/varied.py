@@ -10,10 +10,11 @@ from typing import Any, final
 import attrs
 
 from solidsph.errors import SceneError
-from solidsph.interfaces.case import Case, Measurement
-from solidsph.parts import describe
+from solidsph.registry.construct import describe
 from solidsph.results.record import Record
-from solidsph.scene import ImposedScene, PartLike, Scene
+from solidsph.scene.scene import Scene
+from solidsph.scene.scene_data import ImposedScene, PartLike
+from solidsph.studies.case import Case, Measurement
 
 
 def varied(case: Case, settings: Mapping[str, Any]) -> Case:

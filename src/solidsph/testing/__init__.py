@@ -3,8 +3,18 @@
 `solidsph.testing.strategies` is imported by itself: it needs Hypothesis, nothing here does.
 """
 
-from solidsph.testing.check import Check, CheckResult
+from solidsph.promises.check import Check, CheckResult
+from solidsph.promises.kernel import MASS_TOLERANCE, smoothed_mass
 from solidsph.testing.examples import example_part
 from solidsph.testing.kits import checks, conformance, kits
 
-__all__ = ["Check", "CheckResult", "checks", "conformance", "example_part", "kits"]
+__all__ = [
+    "MASS_TOLERANCE",
+    "Check",
+    "CheckResult",
+    "checks",
+    "conformance",
+    "example_part",
+    "kits",
+    "smoothed_mass",
+]

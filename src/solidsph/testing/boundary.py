@@ -13,8 +13,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array, Mask
-from solidsph.builder import Builder
 from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.condition import (
@@ -26,11 +24,12 @@ from solidsph.interfaces.condition import (
     Observation,
     StressCondition,
 )
-from solidsph.results.energy import kinetic_energy, ledger, strain_energy
+from solidsph.maths.arrays import Array, Mask
+from solidsph.promises.check import Check, Verdict, at_most, check, not_promised, worst
+from solidsph.promises.derived import overridden
+from solidsph.promises.samples import DIMENSIONS, made_once
+from solidsph.run.energy import kinetic_energy, ledger, strain_energy
 from solidsph.simulation import Simulation
-from solidsph.testing.check import Check, Verdict, at_most, check, not_promised, worst
-from solidsph.testing.derived import overridden
-from solidsph.testing.samples import DIMENSIONS, made_once
 
 _LABEL = "handler"
 _CELLS = {1: (12,), 2: (8, 5), 3: (5, 4, 4)}
@@ -112,7 +111,7 @@ def _simulation(
     if layers:
         lattice |= {"ghosts": layers, "ghost_faces": ["left"]}
     builder = (
-        Builder()
+        Simulation.builder()
         .body(
             "body",
             shape={"type": "box", "lengths": [_SPACING * count for count in _CELLS[d]]},

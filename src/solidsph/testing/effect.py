@@ -13,17 +13,17 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
-from solidsph.builder import Builder
-from solidsph.engines.engine import InternalForces
+from solidsph.build.builder import Builder
 from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.condition import ForceCondition, Observation, StoringCondition
 from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.engine import InternalForces
+from solidsph.maths.arrays import Array
+from solidsph.promises.check import Check, Verdict, at_most, check, more_than, not_promised, worst
+from solidsph.promises.derived import overridden
+from solidsph.promises.samples import DIMENSIONS, made_once
 from solidsph.simulation import Simulation
 from solidsph.testing.boundary import field_verdict, force_problem, report_problem, residual
-from solidsph.testing.check import Check, Verdict, at_most, check, more_than, not_promised, worst
-from solidsph.testing.derived import overridden
-from solidsph.testing.samples import DIMENSIONS, made_once
 
 _LABEL = "effect"
 _ENERGY = f"{_LABEL} energy [J]"
@@ -131,12 +131,12 @@ def _samples(effect: Effect) -> list[_Sample]:
     ]
 
 
-def _scene(d: int, form: str) -> Builder:
+def _scene(d: int, form: str) -> Builder[Simulation]:
     """One body, without any effect."""
     return _with_body(_empty(d, form), "body", d, [0.0] * d)
 
 
-def _touching(d: int, form: str) -> Builder:
+def _touching(d: int, form: str) -> Builder[Simulation]:
     """Two bodies that lie on each other, and are pressed together at the start, without any
     effect."""
     beside = [_SPACING * _CELLS[d][0], *[_ASIDE * _SPACING] * (d - 1)]
@@ -145,7 +145,9 @@ def _touching(d: int, form: str) -> Builder:
     )
 
 
-def _with_body(builder: Builder, name: str, d: int, origin: list[float]) -> Builder:
+def _with_body(
+    builder: Builder[Simulation], name: str, d: int, origin: list[float]
+) -> Builder[Simulation]:
     shape: dict[str, Any] = {
         "type": "box",
         "lengths": [_SPACING * n for n in _CELLS[d]],
@@ -155,9 +157,9 @@ def _with_body(builder: Builder, name: str, d: int, origin: list[float]) -> Buil
     return builder.body(name, shape=shape, spacing=_SPACING, discretisation=scattered)
 
 
-def _empty(d: int, form: str) -> Builder:
+def _empty(d: int, form: str) -> Builder[Simulation]:
     return (
-        Builder()
+        Simulation.builder()
         .kernel("modified-mollifier", cover=_COVER)
         .material("neo-hookean", **_MATERIAL)
         .formulation(form)

@@ -7,8 +7,8 @@ from typing import Any
 
 import attrs
 
-from solidsph import registry
-from solidsph.parts import construct
+from solidsph.registry import registry
+from solidsph.registry.construct import construct
 
 _BOX = {"type": "box", "lengths": [1.2, 0.8]}
 

@@ -13,20 +13,19 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.arrays import Array
-from solidsph.body import Body
-from solidsph.builder import Builder
-from solidsph.engines.engine import InternalForces, StressFields
+from solidsph.interfaces.body import Body
+from solidsph.interfaces.engine import InternalForces, StressFields
 from solidsph.interfaces.formulation import Configuration, Formulation
-from solidsph.simulation import Simulation
-from solidsph.testing.check import Check, Verdict, at_most, check, not_promised
-from solidsph.testing.samples import (
+from solidsph.maths.arrays import Array
+from solidsph.promises.check import Check, Verdict, at_most, check, not_promised
+from solidsph.promises.samples import (
     ANGLES,
     central_difference,
     random_deformation_gradients,
     rotation,
     seeded,
 )
+from solidsph.simulation import Simulation
 
 _CELLS = {1: (12,), 2: (7, 6), 3: (5, 4, 4)}
 _SPACING = 0.1  # [m]
@@ -90,7 +89,7 @@ def _samples(formulation: Formulation) -> Iterator[_Sample]:
             "lengths": [_SPACING * count for count in _CELLS[d]],
         }
         simulation = (
-            Builder()
+            Simulation.builder()
             .body(
                 "body",
                 shape=shape,

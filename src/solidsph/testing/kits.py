@@ -5,32 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from solidsph.errors import SceneError
-from solidsph.parts import construct
-from solidsph.testing import (
-    boundary,
-    discretisation,
-    divergence,
-    effect,
-    formulation,
-    gradient,
-    history,
-    integrator,
-    kernel,
-    material,
-    shape,
-)
-from solidsph.testing.check import Check, CheckResult
+from solidsph.promises.check import Check, CheckResult
+from solidsph.promises.kits import KITS
+from solidsph.registry.construct import construct
+from solidsph.testing import boundary, effect, formulation
 
 _KITS: Mapping[str, tuple[Check, ...]] = {
-    "kernels": kernel.CHECKS,
-    "shapes": shape.CHECKS,
-    "discretisations": discretisation.CHECKS,
+    **KITS,
     "boundaries": boundary.CHECKS,
-    "materials": (*material.CHECKS, *history.CHECKS),
-    "gradients": gradient.CHECKS,
-    "divergences": divergence.CHECKS,
     "formulations": formulation.CHECKS,
-    "integrators": integrator.CHECKS,
     "effects": effect.CHECKS,
 }
 

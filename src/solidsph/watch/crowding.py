@@ -8,15 +8,15 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices
-from solidsph.body import Body
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.condition import Observation
 from solidsph.interfaces.formulation import Configuration
-from solidsph.results.accounts import Accounts
+from solidsph.maths.arrays import Array, Indices
+from solidsph.run.accounts import Accounts
 from solidsph.watch.symptom import Finding, Symptom, graded
 
 if TYPE_CHECKING:
-    from solidsph.simulation import Simulation
+    from solidsph.run.built_scene import BuiltScene
 
 # Nearest neighbours alone, in spacings: they are the first to meet.
 _NEAR = 1.2
@@ -31,7 +31,7 @@ class CollapsingNeighbours(Symptom):
     failure: float = 0.03  # [-]
 
     def look(
-        self, simulation: Simulation, observation: Observation, accounts: Accounts
+        self, simulation: BuiltScene, observation: Observation, accounts: Accounts
     ) -> Finding | None:
         found, part = 0, np.inf
         for body in simulation.setting.bodies:
@@ -57,7 +57,7 @@ class CollapsingNeighbours(Symptom):
         )
 
 
-def _help(simulation: Simulation, particle: int) -> str:
+def _help(simulation: BuiltScene, particle: int) -> str:
     """Against what brings particles of this body together."""
     bodies = simulation.setting.bodies
     body = next(one for one in bodies if one.extent.start <= particle < one.extent.stop)

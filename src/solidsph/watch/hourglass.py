@@ -9,13 +9,13 @@ import numpy as np
 
 from solidsph.interfaces.condition import Observation, StoringCondition
 from solidsph.interfaces.effect import Need
-from solidsph.results.accounts import Accounts
-from solidsph.results.energy import strain_energy
-from solidsph.soundness import rounding
+from solidsph.run.accounts import Accounts
+from solidsph.run.energy import strain_energy
+from solidsph.watch.soundness import rounding
 from solidsph.watch.symptom import Finding, Symptom, graded
 
 if TYPE_CHECKING:
-    from solidsph.simulation import Simulation
+    from solidsph.run.built_scene import BuiltScene
 
 
 @final
@@ -30,7 +30,7 @@ class StoredBesides(Symptom):
     failure: float = 0.6  # [-]
 
     def look(
-        self, simulation: Simulation, observation: Observation, accounts: Accounts
+        self, simulation: BuiltScene, observation: Observation, accounts: Accounts
     ) -> Finding | None:
         strain = strain_energy(observation)
         for condition in simulation.conditions:

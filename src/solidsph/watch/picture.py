@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from solidsph.arrays import Array, Indices
 from solidsph.errors import BuildError, DivergedError
-from solidsph.particles import State
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.particles import State
 
 if TYPE_CHECKING:
-    from solidsph.simulation import Simulation
+    from solidsph.run.built_scene import BuiltScene
 
 # What surrounds the particle: those that were so near in the reference configuration [spacings].
 _AROUND = 5.0
 
 
-def draw_failure(simulation: Simulation, state: State, error: DivergedError, path: Path) -> None:
+def draw_failure(simulation: BuiltScene, state: State, error: DivergedError, path: Path) -> None:
     """The body, and beside it what surrounds the particle, coloured by J."""
     particles = simulation.particles
     J = _volume_ratios(simulation, state)
@@ -66,7 +66,7 @@ def _draw(axis: Any, positions: Array, J: Array, chosen: Indices, particle: int)
     return dots
 
 
-def _volume_ratios(simulation: Simulation, state: State) -> Array:
+def _volume_ratios(simulation: BuiltScene, state: State) -> Array:
     try:
         with np.errstate(all="ignore"):
             return simulation.dynamics.observe(state).volume_ratios

@@ -10,15 +10,16 @@ import attrs
 import numpy as np
 
 from solidsph.errors import DivergedError, UnsoundError
-from solidsph.particles import State
-from solidsph.resumption import Resumption
-from solidsph.simulation import Result, Simulation
+from solidsph.model.particles import State
+from solidsph.run.built_scene import BuiltScene
+from solidsph.run.outcome import Result
+from solidsph.run.restart_point import Resumption
 from solidsph.watch.symptom import Finding, Symptom
 from solidsph.watch.watchdog import SYMPTOMS, Watchdog
 
 
 def run_watched(
-    simulation: Simulation,
+    simulation: BuiltScene,
     *,
     record: Path | str,
     roll_backs: int = 0,
@@ -74,7 +75,7 @@ def _told(failed: DivergedError | UnsoundError) -> str:
     return f"{failed.cause} at particle {failed.particle}"
 
 
-def restarted(simulation: Simulation, state: State) -> State:
+def restarted(simulation: BuiltScene, state: State) -> State:
     """An output of the same scene with twice the step, made ready to go on with this one."""
     dynamics = simulation.dynamics
     moved = attrs.evolve(

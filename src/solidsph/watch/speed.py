@@ -8,11 +8,11 @@ import attrs
 import numpy as np
 
 from solidsph.interfaces.condition import Observation
-from solidsph.results.accounts import Accounts
+from solidsph.run.accounts import Accounts
 from solidsph.watch.symptom import Finding, Symptom, graded
 
 if TYPE_CHECKING:
-    from solidsph.simulation import Simulation
+    from solidsph.run.built_scene import BuiltScene
 
 
 @final
@@ -24,7 +24,7 @@ class FasterThanSound(Symptom):
     failure: float = 1.0  # [-]
 
     def look(
-        self, simulation: Simulation, observation: Observation, accounts: Accounts
+        self, simulation: BuiltScene, observation: Observation, accounts: Accounts
     ) -> Finding | None:
         found, part = 0, 0.0
         for body in simulation.setting.bodies:

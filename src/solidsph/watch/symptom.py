@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, ClassVar
 import attrs
 
 from solidsph.interfaces.condition import Observation
-from solidsph.results.accounts import Accounts
+from solidsph.run.accounts import Accounts
 
 if TYPE_CHECKING:
-    from solidsph.simulation import Simulation
+    from solidsph.run.built_scene import BuiltScene
 
 
 class Grade(Enum):
@@ -41,7 +41,7 @@ class Symptom(ABC):
 
     @abstractmethod
     def look(
-        self, simulation: Simulation, observation: Observation, accounts: Accounts
+        self, simulation: BuiltScene, observation: Observation, accounts: Accounts
     ) -> Finding | None:
         """What there is to find at this output, the worst of it.
 

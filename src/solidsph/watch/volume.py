@@ -8,11 +8,11 @@ import attrs
 import numpy as np
 
 from solidsph.interfaces.condition import Observation
-from solidsph.results.accounts import Accounts
+from solidsph.run.accounts import Accounts
 from solidsph.watch.symptom import Finding, Grade, Symptom
 
 if TYPE_CHECKING:
-    from solidsph.simulation import Simulation
+    from solidsph.run.built_scene import BuiltScene
 
 
 @final
@@ -23,7 +23,7 @@ class VanishingVolume(Symptom):
     warning: float = 0.2  # J below which there is a warning [-]
 
     def look(
-        self, simulation: Simulation, observation: Observation, accounts: Accounts
+        self, simulation: BuiltScene, observation: Observation, accounts: Accounts
     ) -> Finding | None:
         if observation.volume_ratios.min() >= self.warning:  # which no NaN is; of ghosts J = 1
             return None

@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING
 import attrs
 
 from solidsph.errors import DivergedError, RecordError
-from solidsph.hooks import implementation
 from solidsph.interfaces.condition import Observation
-from solidsph.particles import State
-from solidsph.results.accounts import Accounts
-from solidsph.soundness import allowed, part_of_play
+from solidsph.model.particles import State
+from solidsph.run.accounts import Accounts
+from solidsph.run.hooks import implementation
 from solidsph.watch.crowding import CollapsingNeighbours
 from solidsph.watch.hourglass import StoredBesides
+from solidsph.watch.soundness import allowed, part_of_play
 from solidsph.watch.speed import FasterThanSound
 from solidsph.watch.symptom import Finding, Grade, Symptom
 from solidsph.watch.volume import VanishingVolume
 
 if TYPE_CHECKING:
-    from solidsph.arrays import Array
-    from solidsph.simulation import Simulation
+    from solidsph.maths.arrays import Array
+    from solidsph.run.built_scene import BuiltScene
 
 SYMPTOMS: Sequence[Symptom] = (
     VanishingVolume(),
@@ -78,7 +78,7 @@ class Watchdog:
 
     @implementation(tryfirst=True)  # what it cannot use is told before the record is taken over
     def solidsph_resume(
-        self, simulation: Simulation, observation: Observation, kept: Mapping[str, Array]
+        self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
     ) -> None:
         if _ACCOUNTS in kept:
             self._accounts = Accounts.taken(kept[_ACCOUNTS])
@@ -87,7 +87,7 @@ class Watchdog:
         self.good, self._is_clean = Good(observation.state, kept), True
 
     @implementation
-    def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
+    def solidsph_step_end(self, simulation: BuiltScene, observation: Observation) -> None:
         self._accounts.add(observation)
         looks = (
             one.look(simulation, observation, self._accounts)
@@ -108,7 +108,7 @@ class Watchdog:
             simulation.manager.hook.solidsph_keep(simulation=simulation, kept=kept)
             self.good, self._is_clean = Good(state, kept), is_clean
 
-    def _is_due(self, symptom: Symptom, simulation: Simulation, step: int) -> bool:
+    def _is_due(self, symptom: Symptom, simulation: BuiltScene, step: int) -> bool:
         due = step - self._looked.get(symptom, 0) >= symptom.steps_between
         if due or step == simulation.steps:
             self._looked[symptom] = step
@@ -116,11 +116,11 @@ class Watchdog:
         return False
 
     @implementation
-    def solidsph_keep(self, simulation: Simulation, kept: dict[str, Array]) -> None:
+    def solidsph_keep(self, simulation: BuiltScene, kept: dict[str, Array]) -> None:
         kept[_ACCOUNTS] = self._accounts.kept()
 
     @implementation
-    def solidsph_failure(self, simulation: Simulation, state: State, error: DivergedError) -> None:
+    def solidsph_failure(self, simulation: BuiltScene, state: State, error: DivergedError) -> None:
         # The run has found out for itself; what it does not know is what came before.
         if self.findings:
             time, before = self.findings[-1]
@@ -129,7 +129,7 @@ class Watchdog:
         self._draw(simulation, state, error)
 
     def _failed(
-        self, simulation: Simulation, observation: Observation, found: Finding
+        self, simulation: BuiltScene, observation: Observation, found: Finding
     ) -> DivergedError:
         state = observation.state
         error = DivergedError(
@@ -143,7 +143,7 @@ class Watchdog:
         self._draw(simulation, state, error)
         return error
 
-    def _draw(self, simulation: Simulation, state: State, error: DivergedError) -> None:
+    def _draw(self, simulation: BuiltScene, state: State, error: DivergedError) -> None:
         if self._picture is None:
             return
         from solidsph.watch.picture import draw_failure  # brings matplotlib with it

@@ -7,9 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from solidsph_wendland import WendlandC2
 
-from solidsph.parts import construct
-from solidsph.testing import Check, checks
-from solidsph.testing.kernel import MASS_TOLERANCE, smoothed_mass
+from solidsph.registry.construct import construct
+from solidsph.testing import MASS_TOLERANCE, Check, checks, smoothed_mass
 from solidsph.testing.strategies import dimensions, support_radii
 
 

@@ -1,8 +1,9 @@
 """Near pairs of moving particles, by cells; a list with a margin serves many steps.
 
-The pairs are those of `solidsph.neighbours`, in the same order and with the same bits, whenever
-the list was made: each is tested anew at every step, on the square of its distance as the k-d tree
-does. A tree that takes or leaves whole boxes may differ within rounding of the support radius.
+The pairs are those of `solidsph.model.neighbours`, in the same order and with the same bits,
+whenever the list was made: each is tested anew at every step, on the square of its distance as the
+k-d tree does. A tree that takes or leaves whole boxes may differ within rounding of the support
+radius.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Indices, Mask
-from solidsph.neighbours import Hidden
+from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.model.neighbours import Hidden
 
 # The list holds pairs up to this much beyond the support radius. A wider margin lasts longer, but
 # in 3D a step tests a third more pairs than there are already.

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.arrays import Array, Mask
-from solidsph.body import Body
-from solidsph.neighbours import Pairs
+from solidsph.interfaces.body import Body
+from solidsph.maths.arrays import Array, Mask
+from solidsph.model.neighbours import Pairs
 
 _ROWS_AT_ONCE = 2048
 

@@ -7,42 +7,33 @@ from typing import Any, final
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
-from solidsph.arrays import Array, Indices
-from solidsph.body import Body, part_of
-from solidsph.dynamics import Dynamics
 from solidsph.engines.compiled.blocks import STRIDE, group
-from solidsph.engines.compiled.chunks import weighted_chunks
+from solidsph.engines.compiled.compiled_body import CompiledBody, compiled_body
 from solidsph.engines.compiled.history import CompiledLaw
 from solidsph.engines.compiled.loop import are_declared, compiled_loop
 from solidsph.engines.compiled.moving import MovingBody, moving_body
 from solidsph.engines.compiled.part import part_of_rows
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux, no_law
-from solidsph.engines.compiled.rows import (
-    Rows,
-    compressed,
-    in_chunks,
-)
 from solidsph.engines.compiled.shares import (
-    Passes,
-    Shares,
     aligned,
     passes,
     shared,
     spread_pass,
     thread_count,
 )
-from solidsph.engines.engine import Engine, InternalForces, StressFields
-from solidsph.engines.history import ArrayLaw, Law
 from solidsph.engines.matrix import MatrixEngine
-from solidsph.engines.tally import Tally, Way, vectors
+from solidsph.interfaces.body import Body, part_of
 from solidsph.interfaces.condition import StressCondition
+from solidsph.interfaces.engine import Engine, InternalForces, StressFields
+from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.integrator import Integrator
-from solidsph.neighbours import Pairs
-from solidsph.tensors import components_first, particles_first
-from solidsph.time_loop import TimeLoop
+from solidsph.interfaces.law import Law
+from solidsph.interfaces.operation_count import Tally
+from solidsph.interfaces.time_loop import TimeLoop
+from solidsph.maths.arrays import Array, Indices
+from solidsph.maths.tensors import components_first, particles_first
 
 # Particles whose stress is found at once for reports and records.
 _AT_ONCE = 4096
@@ -81,165 +72,8 @@ class CompiledEngine(Engine):
 
     def _part(self, body: Body, law: Any) -> CompiledBody | MovingBody:
         if body.formulation.configuration is Configuration.REFERENCE:
-            return _part(body, law, self.precision)
+            return compiled_body(body, law, self.precision)
         return moving_body(body, law)
-
-
-@final
-@attrs.frozen(eq=False)
-class CompiledBody:
-    """One body made ready: weights, work space, and the passes over them."""
-
-    body: Body
-    law: Any  # compiled (H, params) -> T
-    gradient: Rows
-    force: Rows  # those that are scattered with; the gradient's own for the adjoint divergence
-    factors: NDArray[Any]  # (n,) what multiplies the stress before it is scattered
-    gradient_shares: Shares
-    force_shares: Shares
-    u: NDArray[Any]  # flat
-    passes: Passes
-    gradients: Passes  # without a law
-    spread_pass: Any
-    pair_count: int
-
-    @property
-    def precision(self) -> float:
-        """As of all forces."""
-        return float(np.finfo(self.u.dtype).eps)
-
-    @property
-    def bytes(self) -> int:
-        """Memory of all arrays."""
-        rows = {id(one): one.bytes for one in (self.gradient, self.force)}
-        shares = {id(one): one.buffers.nbytes for one in (self.gradient_shares, self.force_shares)}
-        own = self.factors.nbytes + self.u.nbytes
-        return own + sum(rows.values()) + sum(shares.values())
-
-    @property
-    def tally(self) -> Sequence[Tally]:
-        """What an evaluation passes over: runs by stencils, the rest by rows."""
-        n, d = self.body.particles.positions.shape
-        # Gathering and scattering are one pass each; a pair counts once for the two together.
-        both = (self.gradient, self.force)
-        run_pairs = sum(one.run_pairs for one in both) // 2
-        row_pairs = sum(one.row_pairs for one in both) // 2
-        ran = sum(one.run_particles for one in both) // 2
-        row_bytes = sum({id(one): one.row_bytes for one in both}.values())
-        shared_bytes = sum({id(one): one.bytes for one in both}.values()) - row_bytes
-        # How many buffers there are depends on the threads of the machine; one is touched at least.
-        touched = shared_bytes + self.factors.nbytes + 2 * self.u.nbytes + vectors(n, d)
-        held = self.bytes - row_bytes
-        precision, threaded = self.u.itemsize, self.gradient_shares.threaded
-        return (
-            Tally(Way.STENCILS, run_pairs, ran, touched, held, precision, threaded),
-            Tally(Way.ROWS, row_pairs, n - ran, row_bytes, row_bytes, precision, threaded),
-        )
-
-    @property
-    def fused(self) -> bool:
-        """Whether gathering and scattering go together where no condition comes between them."""
-        return self.force is self.gradient and not self._ghosts_act
-
-    @property
-    def _ghosts_act(self) -> bool:
-        uses = self.body.formulation.divergence.uses_ghost_stress
-        return uses and bool(self.body.particles.ghosts.any())
-
-    def forces(self, displacements: Array, out: Array) -> None:
-        """Forces (n, d) of a fused body from displacements (n, d)."""
-        shares = self.gradient_shares
-        shares.check()
-        self.passes.forces(
-            shares.table,
-            self.gradient,
-            displacements,
-            self.u,
-            self.body.material.params,
-            self.factors,
-            shares.buffers,
-            out,
-        )
-
-    def stress(self, displacements: Array, out: Array) -> None:
-        """Stress (d, d, n) from displacements (n, d); ghosts have none."""
-        self._stress(self.passes, displacements, out)
-        out[:, :, self.body.particles.ghosts] = 0.0
-
-    def gradient_of(self, displacements: Array, out: Array) -> None:
-        """Gradient H (n, d, d) of displacements (n, d); that of ghosts is left as it is."""
-        self._stress(self.gradients, displacements, out.transpose(1, 2, 0))
-
-    def _stress(self, passes: Passes, displacements: Array, out: Array) -> None:
-        self.gradient_shares.check()
-        passes.stress(
-            self.gradient_shares.table,
-            self.gradient,
-            displacements,
-            self.u,
-            self.body.material.params,
-            out,
-        )
-
-    def spread(self, stress: Array, out: Array) -> None:
-        """Forces (n, d) from stress (d, d, n)."""
-        ghosts = self.body.particles.ghosts
-        acts = self.body.formulation.divergence.uses_ghost_stress
-        if not acts:
-            stress[:, :, ghosts] = 0.0
-        shares = self.force_shares
-        self.spread_pass(shares.table, self.force, stress, self.factors, shares.buffers, out)
-        if acts:
-            # Ghosts have acted through their stress; nothing acts on them.
-            out[ghosts] = 0.0
-
-
-def _part(body: Body, law: Any, dtype: str) -> CompiledBody:
-    particles, divergence = body.particles, body.formulation.divergence
-    n, d = particles.count, particles.dimension
-    shortest_run = max(2, group(d, dtype) // 2)
-    count = 0
-
-    def counted(chunks: Iterator[tuple[Pairs, Array]]) -> Iterator[tuple[Pairs, Array]]:
-        nonlocal count
-        for pairs, weights in chunks:
-            count += pairs.count
-            yield pairs, weights
-
-    if divergence.adjoint:
-        # Ghosts have no stress of the law, so their rows are wanted only to act through.
-        wanted = np.ones(n, dtype=np.bool_) if divergence.uses_ghost_stress else ~particles.ghosts
-        chunks = counted(weighted_chunks(body, wanted))
-        gradient = force = compressed(chunks, d, dtype, shortest_run)
-        factors = np.where(wanted, -particles.volumes, 0.0)
-    else:
-        pairs = body.pairs()
-        weights = body.formulation.gradient.weights(
-            pairs, body.smoothing.gradient(pairs.offsets, pairs.distances), particles.cells
-        )
-        gradient = compressed(counted(in_chunks(pairs, weights)), d, dtype, shortest_run)
-        # To gather with d_pq is to scatter with d_qp.
-        weights = divergence.weights(pairs, weights, particles.volumes)[pairs.reversed_order()]
-        force = compressed(in_chunks(pairs, weights), d, dtype, shortest_run)
-        factors = np.ones(n)
-    threads = thread_count(count)
-    gradient_shares = shared(gradient, d, dtype, threads)
-    force_shares = gradient_shares if divergence.adjoint else shared(force, d, dtype, threads)
-    return CompiledBody(
-        body=body,
-        law=law,
-        gradient=gradient,
-        force=force,
-        factors=factors.astype(dtype),
-        gradient_shares=gradient_shares,
-        force_shares=force_shares,
-        # Loops over runs read beyond the last particle by up to a group.
-        u=aligned((n + group(d, dtype)) * STRIDE[d], dtype),
-        passes=passes(d, dtype, law, threads > 1),
-        gradients=passes(d, dtype, no_law, threads > 1),
-        spread_pass=spread_pass(d, dtype, threads > 1),
-        pair_count=count,
-    )
 
 
 @final
@@ -262,23 +96,27 @@ class CompiledForces(InternalForces):
     def precision(self) -> float:
         return max(part.precision for part in self.parts)
 
-    def compiles_steps(self, dynamics: Dynamics, integrator: Integrator) -> bool:
+    def compiles_steps(self, equation: EquationOfMotion, integrator: Integrator) -> bool:
         fixed = self._fixed
         return len(fixed) == len(self.parts) and are_declared(
-            fixed, self.conditions, dynamics, integrator
+            fixed, self.conditions, equation, integrator
         )
 
     @property
     def _fixed(self) -> Sequence[CompiledBody]:
         return [part for part in self.parts if isinstance(part, CompiledBody)]
 
-    def time_loop(self, dynamics: Dynamics, integrator: Integrator, step_size: float) -> TimeLoop:
-        if self.compiles_steps(dynamics, integrator):
-            try:
-                return compiled_loop(self._fixed, self.conditions, dynamics, integrator, step_size)
-            except NotCompilableError:  # a formula does not compile, as its kind did not tell
-                pass
-        return super().time_loop(dynamics, integrator, step_size)
+    def time_loop(
+        self, equation: EquationOfMotion, integrator: Integrator, step_size: float
+    ) -> TimeLoop | None:
+        if not self.compiles_steps(equation, integrator):
+            return None
+        try:
+            return compiled_loop(
+                self._fixed, self.conditions, self, equation, integrator, step_size
+            )
+        except NotCompilableError:  # a formula does not compile, as its kind did not tell
+            return None
 
     def forces(self, time: float, displacements: Array) -> Array:
         forces = np.empty(displacements.shape)
@@ -350,11 +188,11 @@ class CompiledForces(InternalForces):
         only = self.parts[0]
         return only if only.fused and not only.body.particles.ghosts.any() else None
 
-    def law(self, body: Body) -> Law:
+    def law(self, body: Body) -> Law | None:
         try:
             return CompiledLaw.of(body)
         except NotCompilableError:
-            return ArrayLaw(body)
+            return None
 
     def fields(self, displacements: Array) -> StressFields:
         n, d = displacements.shape

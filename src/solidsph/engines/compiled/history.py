@@ -9,8 +9,6 @@ import attrs
 import numpy as np
 from numba import njit, types
 
-from solidsph.arrays import Array
-from solidsph.body import Body
 from solidsph.engines.compiled.pointwise import (
     NUMBERS,
     NotCompilableError,
@@ -19,8 +17,10 @@ from solidsph.engines.compiled.pointwise import (
     registered,
     tensor_type,
 )
-from solidsph.engines.history import Law
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.history import HistoryMaterial
+from solidsph.interfaces.law import Law
+from solidsph.maths.arrays import Array
 
 
 @final

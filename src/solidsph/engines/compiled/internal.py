@@ -10,15 +10,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solidsph.arrays import Array, Indices
 from solidsph.engines.compiled.chain import chain
 from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.engines.compiled.rows import Rows
 from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.declared import LinearExtension
+from solidsph.maths.arrays import Array, Indices
 
 if TYPE_CHECKING:
-    from solidsph.engines.compiled.engine import CompiledBody
+    from solidsph.engines.compiled.compiled_body import CompiledBody
 
 
 class Fused(NamedTuple):

@@ -8,7 +8,6 @@ from typing import Any, TypeAlias
 
 from numba import njit, types
 
-from solidsph.arrays import Array
 from solidsph.engines.compiled.cells import Near
 from solidsph.engines.compiled.pointwise import (
     NotCompilableError,
@@ -16,7 +15,8 @@ from solidsph.engines.compiled.pointwise import (
     numbers_type,
 )
 from solidsph.interfaces.kernel import Kernel
-from solidsph.smoothing import COMPLEX_STEP, SmoothingKernel
+from solidsph.interfaces.smoothing_kernel import COMPLEX_STEP, SmoothingKernel
+from solidsph.maths.arrays import Array
 
 # (near, values (k,), slopes (k,)): W [m^-d] and W'(r) / r [m^-(d+2)] of every pair
 KernelPass: TypeAlias = Callable[[Near, Array, Array], None]

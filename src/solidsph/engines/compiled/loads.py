@@ -11,7 +11,6 @@ from numba import njit, prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
-from solidsph.arrays import Array, Indices
 from solidsph.engines.compiled.chain import chain
 from solidsph.engines.compiled.mismatch import MismatchSweeps, Sweeps, body_sweep
 from solidsph.engines.compiled.pointwise import (
@@ -27,7 +26,8 @@ from solidsph.interfaces.declared import (
     PointwiseForce,
     ScheduledForce,
 )
-from solidsph.mismatch import MismatchOperator
+from solidsph.interfaces.mismatch import MismatchOperator
+from solidsph.maths.arrays import Array, Indices
 
 
 class Load(NamedTuple):

@@ -10,8 +10,6 @@ import attrs
 import numpy as np
 from numba import njit, prange, types
 
-from solidsph.arrays import Array
-from solidsph.dynamics import Dynamics
 from solidsph.engines.compiled.chain import chain
 from solidsph.engines.compiled.internal import Internal, internal_forces
 from solidsph.engines.compiled.loads import Load, LoadPass, load_pass
@@ -31,12 +29,15 @@ from solidsph.interfaces.declared import (
     ScheduledForce,
     ScheduledMotion,
 )
+from solidsph.interfaces.engine import InternalForces
+from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
-from solidsph.particles import State
-from solidsph.time_loop import NOT_FINITE, StepError, TimeLoop
+from solidsph.interfaces.time_loop import NOT_FINITE, StepError, TimeLoop
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import State
 
 if TYPE_CHECKING:
-    from solidsph.engines.compiled.engine import CompiledBody
+    from solidsph.engines.compiled.compiled_body import CompiledBody
 
 # Operations for every particle in a step, beside those for pairs.
 _PER_PARTICLE = 10
@@ -62,45 +63,48 @@ class _Moving(NamedTuple):
 def are_declared(
     bodies: Sequence[CompiledBody],
     conditions: Sequence[StressCondition],
-    dynamics: Dynamics,
+    equation: EquationOfMotion,
     integrator: Integrator,
 ) -> bool:
     """Whether everything in a step is of a kind that this loop knows; then only a formula that
     does not compile can be in its way."""
-    labels = [c.label for c in (*dynamics.loads, *dynamics.motions)]
+    labels = [c.label for c in (*equation.loads, *equation.motions)]
     fused = not conditions and all(body.fused for body in bodies)
     alone = len(bodies) == 1 and all(isinstance(one, LinearExtension) for one in conditions)
     return (
         isinstance(integrator, PointwiseIntegrator)
         and (fused or alone)
-        and all(isinstance(load, DECLARED_LOADS) for load in dynamics.loads)
-        and all(labels.count(load.label) == 1 for load in dynamics.loads)
-        and all(isinstance(one, (ScheduledMotion, LinearExtension)) for one in dynamics.motions)
+        and all(isinstance(load, DECLARED_LOADS) for load in equation.loads)
+        and all(labels.count(load.label) == 1 for load in equation.loads)
+        and all(isinstance(one, (ScheduledMotion, LinearExtension)) for one in equation.motions)
     )
 
 
 def compiled_loop(
     bodies: Sequence[CompiledBody],
     conditions: Sequence[StressCondition],
-    dynamics: Dynamics,
+    sums: InternalForces,
+    equation: EquationOfMotion,
     integrator: Integrator,
     step_size: float,
 ) -> TimeLoop:
-    """The loop for these prepared bodies, conditions on their stress, and the scene's dynamics.
+    """The loop for these prepared bodies, conditions on their stress, and the scene's equation.
+
+    `sums` are the forces of the same bodies, one evaluation at a time.
 
     Raises:
         NotCompilableError: one of the parts is not of a declared kind, or does not compile.
     """
     if not isinstance(integrator, PointwiseIntegrator):
         raise NotCompilableError(f"integrator {type(integrator).__name__} is not pointwise")
-    particles = dynamics.particles
+    particles = equation.particles
     d = particles.dimension
     threads = thread_count(_PER_PARTICLE * particles.count)  # of what is done particle by particle
     for body in bodies:
         body.gradient_shares.check()
     internal = internal_forces(bodies, conditions)
-    loads = [load_pass(load, particles.positions, threads > 1) for load in dynamics.loads]
-    words = [motion_words(motion, d) for motion in dynamics.motions]
+    loads = [load_pass(load, particles.positions, threads > 1) for load in equation.loads]
+    words = [motion_words(motion, d) for motion in equation.motions]
     by_word = [tuple(one[k] for one in words) for k in range(len(MotionWords._fields))]
     steps = _steps(
         d,
@@ -111,7 +115,7 @@ def compiled_loop(
         chain(tuple(one.apply for one in loads)),
         MotionWords(*(chain(functions) for functions in by_word)),
     )
-    return CompiledLoop(dynamics, step_size, internal, loads, steps, threads)
+    return CompiledLoop(sums, equation, step_size, internal, loads, steps, threads)
 
 
 @final
@@ -119,7 +123,8 @@ def compiled_loop(
 class CompiledLoop(TimeLoop):
     """Steps by one compiled function."""
 
-    dynamics: Dynamics
+    sums: InternalForces
+    equation: EquationOfMotion
     step_size: float  # [s]
     internal: Internal
     loads: Sequence[LoadPass]
@@ -133,19 +138,19 @@ class CompiledLoop(TimeLoop):
         parts = [load.schedule(two) for load in self._scheduled_loads]
         parts += [motion.schedule(two, k) for motion in self._scheduled_motions for k in range(3)]
         width = sum(int(part[0].size) for part in parts if len(part) > 1)
-        work = _PER_PARTICLE * self.dynamics.particles.count + 2 * self.dynamics.internal.pair_count
+        work = _PER_PARTICLE * self.equation.particles.count + 2 * self.sums.pair_count
         return max(1, min(_TABLE // max(1, width), int(_AT_ONCE / work)))
 
     @property
     def _scheduled_loads(self) -> Sequence[ScheduledForce]:
-        return [c for c in self.dynamics.loads if isinstance(c, ScheduledForce)]
+        return [c for c in self.equation.loads if isinstance(c, ScheduledForce)]
 
     @property
     def _scheduled_motions(self) -> Sequence[ScheduledMotion]:
-        return [c for c in self.dynamics.motions if isinstance(c, ScheduledMotion)]
+        return [c for c in self.equation.motions if isinstance(c, ScheduledMotion)]
 
     def advance(self, state: State, stop: int) -> State:
-        dynamics, X = self.dynamics, self.dynamics.particles.positions
+        equation, X = self.equation, self.equation.particles.positions
         moving = _Moving(
             u=state.positions - X,
             v=state.velocities.copy(),
@@ -155,9 +160,9 @@ class CompiledLoop(TimeLoop):
             total=np.zeros_like(X),
         )
         # Ghosts have no mass, and no equation of motion.
-        inverse_masses = np.zeros_like(dynamics.masses)
-        np.divide(1.0, dynamics.masses, out=inverse_masses, where=dynamics.masses > 0.0)
-        accounts = _Accounts.of(dynamics, state)
+        inverse_masses = np.zeros_like(equation.masses)
+        np.divide(1.0, equation.masses, out=inverse_masses, where=equation.masses > 0.0)
+        accounts = _Accounts.of(self.sums, equation, state)
         done = 0
         while state.step + done < stop:
             count = min(stop - state.step - done, self.most_steps)
@@ -170,7 +175,7 @@ class CompiledLoop(TimeLoop):
                 self.step_size,
                 self.threads,
                 moving,
-                dynamics.masses,
+                equation.masses,
                 inverse_masses,
                 self.internal.data,
                 loads,
@@ -200,69 +205,74 @@ class CompiledLoop(TimeLoop):
 class _Accounts:
     """Forces and work of every load and motion, between the loop's arrays and those of State."""
 
-    dynamics: Dynamics
+    sums: InternalForces
+    equation: EquationOfMotion
     work: dict[str, float]  # by account [J]
     load_forces: list[Array]  # (k, d) of each load, on its particles [N]
     reactions: list[Array]  # (m,) of each motion [N]; nothing of one that ghosts follow by
 
     @classmethod
-    def of(cls, dynamics: Dynamics, state: State) -> _Accounts:
+    def of(cls, sums: InternalForces, equation: EquationOfMotion, state: State) -> _Accounts:
         """The accounts as a state holds them."""
-        u = state.positions - dynamics.particles.positions
-        loads = [state.applied[load.label][load.particles] for load in dynamics.loads]
+        u = state.positions - equation.particles.positions
+        loads = [state.applied[load.label][load.particles] for load in equation.loads]
         # An account may hold more than the reaction: what ghosts of the same handler hand on.
-        handed = _handed_on(dynamics, state.time, u, loads)
+        handed = _handed_on(sums, equation, state.time, u, loads)
         reactions = [
             (state.applied[motion.label] - handed.get(motion.label, 0.0))[motion.entries]
             if isinstance(motion, ScheduledMotion)
             else np.empty(0)
-            for motion in dynamics.motions
+            for motion in equation.motions
         ]
-        return cls(dynamics, dict(state.work), loads, reactions)
+        return cls(sums, equation, dict(state.work), loads, reactions)
 
     def loads(self, own: Sequence[Any], threads: int) -> tuple[Load, ...]:
         """What the loop holds of the loads, with what each kind needs."""
-        each = zip(self.dynamics.loads, self.load_forces, own, strict=True)
+        each = zip(self.equation.loads, self.load_forces, own, strict=True)
         return tuple(
             Load(load.particles, before, np.zeros(threads), one) for load, before, one in each
         )
 
     def motions(self, times: Array) -> tuple[Scheduled | Following, ...]:
         """What the loop holds of the motions."""
-        pairs = zip(self.dynamics.motions, self.reactions, strict=True)
+        pairs = zip(self.equation.motions, self.reactions, strict=True)
         return tuple(motion_data(motion, times, before) for motion, before in pairs)
 
     def settle(self, loads: Sequence[Load], motions: Sequence[Scheduled | Following]) -> None:
         """Take back what the loop has done with them."""
-        conditions = (*self.dynamics.loads, *self.dynamics.motions)
+        conditions = (*self.equation.loads, *self.equation.motions)
         for condition, part in zip(conditions, (*loads, *motions), strict=True):
             self.work[condition.label] += float(part.work.sum())
         # The arrays `before` are the ones handed out: the loop has written on them.
 
     def applied(self, time: float, u: Array) -> Mapping[str, Array]:
         """Force of every account on every particle, (n, d) [N], at displacements u (n, d)."""
-        dynamics = self.dynamics
-        applied = {c.label: np.zeros_like(u) for c in (*dynamics.loads, *dynamics.motions)}
-        for load, force in zip(dynamics.loads, self.load_forces, strict=True):
+        equation = self.equation
+        applied = {c.label: np.zeros_like(u) for c in (*equation.loads, *equation.motions)}
+        for load, force in zip(equation.loads, self.load_forces, strict=True):
             applied[load.label][load.particles] += force
-        for motion, reaction in zip(dynamics.motions, self.reactions, strict=True):
+        for motion, reaction in zip(equation.motions, self.reactions, strict=True):
             if isinstance(motion, ScheduledMotion):
                 applied[motion.label][motion.entries] += reaction
-        for label, force in _handed_on(dynamics, time, u, self.load_forces).items():
+        for label, force in _handed_on(self.sums, equation, time, u, self.load_forces).items():
             applied[label] += force
         return applied
 
 
 def _handed_on(
-    dynamics: Dynamics, time: float, u: Array, load_forces: Sequence[Array]
+    sums: InternalForces,
+    equation: EquationOfMotion,
+    time: float,
+    u: Array,
+    load_forces: Sequence[Array],
 ) -> Mapping[str, Array]:
     """What ghosts take from themselves and give to those they follow, (n, d) [N] by account."""
-    extensions = [c for c in dynamics.motions if isinstance(c, ExtensionCondition)]
+    extensions = [c for c in equation.motions if isinstance(c, ExtensionCondition)]
     if not extensions:
         return {}
     with np.errstate(all="ignore"):
-        total = dynamics.internal.forces(time, u)
-    for load, force in zip(dynamics.loads, load_forces, strict=True):
+        total = sums.forces(time, u)
+    for load, force in zip(equation.loads, load_forces, strict=True):
         total[load.particles] += force
     handed = {c.label: np.zeros_like(u) for c in extensions}
     for extension in extensions:

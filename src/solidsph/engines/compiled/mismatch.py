@@ -10,7 +10,6 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from solidsph.arrays import Array, Indices
 from solidsph.engines.compiled.blocks import STRIDE, group
 from solidsph.engines.compiled.chunks import weighted_chunks
 from solidsph.engines.compiled.part import part_of_rows
@@ -18,8 +17,9 @@ from solidsph.engines.compiled.pointwise import no_law
 from solidsph.engines.compiled.rows import Rows, compressed
 from solidsph.engines.compiled.shares import aligned, passes, shared, spread_pass, thread_count
 from solidsph.engines.compiled.threads import check_alive
-from solidsph.engines.tally import Tally, Way, vectors
-from solidsph.mismatch import Mismatch, MismatchOperator
+from solidsph.interfaces.mismatch import Mismatch, MismatchOperator
+from solidsph.interfaces.operation_count import Tally, Way, vectors
+from solidsph.maths.arrays import Array, Indices
 
 _DTYPE = "float64"
 

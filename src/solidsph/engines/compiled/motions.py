@@ -9,10 +9,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solidsph.arrays import Array, Indices
 from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.interfaces.condition import MotionCondition
 from solidsph.interfaces.declared import LinearExtension, ScheduledMotion
+from solidsph.maths.arrays import Array, Indices
 
 
 class Scheduled(NamedTuple):

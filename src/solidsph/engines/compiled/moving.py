@@ -11,8 +11,6 @@ import attrs
 import numpy as np
 from numba import njit
 
-from solidsph.arrays import Array
-from solidsph.body import Body
 from solidsph.engines.compiled.cells import NeighbourSearch
 from solidsph.engines.compiled.kernels import KernelPass, kernel_pass
 from solidsph.engines.compiled.neighbourhoods import Neighbourhoods, fill, kernel_sums
@@ -20,7 +18,9 @@ from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.engines.compiled.pointwise_sums import PointwiseSums
 from solidsph.engines.compiled.vectors import MATRIX
 from solidsph.engines.compiled.weighted_sums import WeightedSums
-from solidsph.engines.tally import Tally, Way, vectors
+from solidsph.interfaces.body import Body
+from solidsph.interfaces.operation_count import Tally, Way, vectors
+from solidsph.maths.arrays import Array
 
 
 @attrs.frozen(eq=False)

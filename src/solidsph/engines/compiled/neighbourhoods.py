@@ -8,9 +8,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solidsph.arrays import Array, Indices
 from solidsph.engines.compiled.cells import Near
-from solidsph.neighbours import Pairs
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.neighbours import Pairs
 
 
 class Neighbourhoods(NamedTuple):

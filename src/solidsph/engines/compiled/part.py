@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solidsph.arrays import Array, Indices
 from solidsph.engines.compiled.rows import ROWS, Rows, bands, starts_of
+from solidsph.maths.arrays import Array, Indices
 
 
 def part_of_rows(rows: Rows, chosen: Indices, count: int) -> Rows:

@@ -14,10 +14,10 @@ from numba import njit, types
 from numba.core.errors import NumbaError
 from numba.extending import register_jitable
 
-from solidsph.arrays import Tensor
 from solidsph.errors import PortableError
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.material import Material
+from solidsph.maths.arrays import Tensor
 
 _DEEPEST = 20  # calls within calls; more is taken for a recursion
 

@@ -13,8 +13,6 @@ import attrs
 import numpy as np
 from numba import njit, types
 
-from solidsph.arrays import Array
-from solidsph.body import Body
 from solidsph.engines.compiled.neighbourhoods import Neighbourhoods
 from solidsph.engines.compiled.pointwise import (
     NUMBERS,
@@ -32,9 +30,11 @@ from solidsph.engines.compiled.vectors import (
     with_outer,
     with_product,
 )
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.divergence import Divergence, PointwiseDivergence
 from solidsph.interfaces.gradient import Gradient, PointwiseGradient
-from solidsph.tensors import product
+from solidsph.maths.arrays import Array
+from solidsph.maths.tensors import product
 
 
 @final

@@ -14,9 +14,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solidsph.arrays import Array, Indices, Mask
 from solidsph.engines.compiled.growing import Growing
-from solidsph.neighbours import Pairs
+from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.model.neighbours import Pairs
 
 # Relative to the largest weight of a row: below the first a weight is rounding, and below the
 # second so is the difference of two. Positions of a lattice are rounded to 1e-16 of the body's

@@ -16,11 +16,11 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from solidsph.arrays import Indices
 from solidsph.engines.compiled.blocks import STRIDE, group
 from solidsph.engines.compiled.rows import Rows
 from solidsph.engines.compiled.sweeps import spread_sweep, sweeps
 from solidsph.engines.compiled.threads import check_alive, started
+from solidsph.maths.arrays import Indices
 
 # A second thread must be woken for every pass, which takes some tens of microseconds: as long as
 # one thread takes for so many operations of a nanosecond.

@@ -6,7 +6,7 @@ from typing import Any
 
 from numba import njit
 
-from solidsph.arrays import Array, Scalar, Tensor
+from solidsph.maths.arrays import Array, Scalar, Tensor
 
 Vector = Any  # a tuple of 1, 2 or 3 numbers
 

@@ -8,11 +8,11 @@ from typing import Any, final
 import attrs
 from numba import njit
 
-from solidsph.arrays import Array
 from solidsph.engines.compiled.neighbourhoods import Neighbourhoods
 from solidsph.engines.compiled.vectors import MATRIX, ROW, with_outer, with_product
 from solidsph.interfaces.formulation import Formulation
-from solidsph.neighbours import Pairs
+from solidsph.maths.arrays import Array
+from solidsph.model.neighbours import Pairs
 
 
 @final

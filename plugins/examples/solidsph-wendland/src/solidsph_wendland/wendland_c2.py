@@ -8,7 +8,7 @@ from typing import ClassVar, final
 import attrs
 
 from solidsph import Kernel
-from solidsph.arrays import Scalar
+from solidsph.maths.arrays import Scalar
 
 
 @final

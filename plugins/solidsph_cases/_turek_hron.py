@@ -1,0 +1,148 @@
+"""The elastic beam of Turek and Hron's structure tests, and the two ways to hold it."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from math import sqrt
+from typing import Any
+
+import attrs
+import numpy as np
+
+from solidsph.errors import SceneError
+from solidsph.maths.arrays import Array
+from solidsph.results.record import Record
+from solidsph.scene.scene_builder import SceneBuilder
+from solidsph.simulation import Simulation
+from solidsph_cases._scheme import Scheme, with_scheme
+
+SOURCE = "Turek & Hron (2006), Proposal for numerical benchmarking, section 4.2"
+OURS = "quadratic finite elements refined towards the clamp, extrapolated"
+
+LENGTH = 0.35  # from the foremost point of the disc to the free end [m]
+HEIGHT = 0.02  # [m]
+RADIUS = 0.05  # of the disc [m]
+GRAVITY = 2.0  # [m/s^2]
+
+
+@attrs.frozen
+class Clamp:
+    """Where the beam is held, and what is known of its tip when it is held so."""
+
+    face: str
+    shape: Mapping[str, Any]
+    discretisation: Mapping[str, Any]
+    source: str
+    rest: tuple[float, float]  # displacement of the tip in equilibrium [m]
+    first_minimum: float  # of u_y after release [m]
+    first_minimum_time: float  # [s]
+    # Mean and amplitude of u_x and of u_y in the last period of ten seconds [m], frequency [Hz].
+    oscillation: tuple[float, float, float, float, float] | None
+
+
+_ON_BOUNDARY = {"type": "lattice", "on_boundary": True}
+_BOX = {"type": "box", "lengths": [LENGTH, HEIGHT], "origin": [0.0, -0.5 * HEIGHT]}
+
+STRAIGHT = Clamp(
+    face="left",
+    shape=_BOX,
+    discretisation={"type": "fitted-moments", "of": _ON_BOUNDARY},
+    source=OURS,
+    rest=(-7.087e-3, -65.568e-3),
+    first_minimum=-128.66e-3,
+    first_minimum_time=0.456,
+    oscillation=None,
+)
+
+# The published beam ends on the disc: its edges meet the arc this far behind the foremost point.
+_CORNER = sqrt(RADIUS**2 - (0.5 * HEIGHT) ** 2) - RADIUS  # [m]
+
+ARC = Clamp(
+    face="rim",
+    shape={
+        "type": "difference",
+        "of": {
+            "type": "box",
+            "lengths": [LENGTH - _CORNER, HEIGHT],
+            "origin": [_CORNER, -0.5 * HEIGHT],
+        },
+        "minus": {"type": "disc", "radius": RADIUS, "centre": [-RADIUS, 0.0]},
+    },
+    discretisation={
+        "type": "fitted-moments",
+        "of": {
+            "type": "mapped",
+            "of": _ON_BOUNDARY,
+            "before": _BOX,
+            # Each row is stretched a little, from the arc to the free end.
+            "to": {"x": f"X + (sqrt({RADIUS**2!r} - Y*Y) - {RADIUS!r})*(1 - X/{LENGTH!r})"},
+        },
+    },
+    source=SOURCE,
+    rest=(-7.187e-3, -66.10e-3),
+    first_minimum=-129.73e-3,
+    first_minimum_time=0.455,
+    oscillation=(-14.305e-3, 14.305e-3, -63.607e-3, 65.160e-3, 1.0995),
+)
+
+CLAMPS: Mapping[str, Clamp] = {"arc": ARC, "straight": STRAIGHT}
+
+
+def clamp_named(case: str, name: str) -> Clamp:
+    """The clamp of that name.
+
+    Raises:
+        SceneError: there is none.
+    """
+    if name not in CLAMPS:
+        near = difflib.get_close_matches(name, CLAMPS, 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(CLAMPS)}"
+        raise SceneError(f"case {case!r}: unknown clamp {name!r}; {hint}")
+    return CLAMPS[name]
+
+
+def beam(clamp: Clamp, across: int, scheme: Scheme) -> SceneBuilder:
+    """The beam under gravity, with so many particles across, on its boundary too.
+
+    The clamp and the tip are then where they are in truth. With an even number across, the tip
+    lies halfway between two particles.
+    """
+    spacing = HEIGHT / (across - 1)
+    return with_scheme(
+        Simulation.builder()
+        .body(
+            "beam",
+            shape=clamp.shape,
+            spacing=spacing,
+            discretisation=clamp.discretisation,
+            tags={"tip": f"X > {LENGTH - 0.1 * spacing!r} and abs(Y) < {0.6 * spacing!r}"},
+        )
+        .material(
+            "saint-venant-kirchhoff", youngs_modulus=1.4e6, poissons_ratio=0.4, density=1000.0
+        )
+        .boundary("clamp", where=clamp.face)
+        .effect("body-force", acceleration={"y": -GRAVITY}, label="gravity"),
+        scheme,
+    )
+
+
+def tip(record: Record) -> Array:
+    """Displacement of mid-height at the free end at every time, (t, 2) [m]."""
+    particles = record.particles
+    chosen = particles.tagged("tip")
+    u: Array = record.positions[:][:, chosen].mean(axis=1) - particles.positions[chosen].mean(
+        axis=0
+    )
+    return u
+
+
+def extremum(times: Array, values: Array, index: int) -> tuple[float, float]:
+    """Time and value of the extremum near `index`, by the parabola through three outputs."""
+    if not 0 < index < len(values) - 1:
+        return float(times[index]), float(values[index])
+    near = slice(index - 1, index + 2)
+    a, b, c = np.polyfit(times[near] - times[index], values[near], 2)
+    if a == 0.0:
+        return float(times[index]), float(values[index])
+    return float(times[index] - 0.5 * b / a), float(c - 0.25 * b**2 / a)

@@ -1,0 +1,194 @@
+"""A round foot is pressed on a rigid plane."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import pi, sqrt
+from pathlib import Path
+from typing import Any, ClassVar, final
+
+import attrs
+import numpy as np
+
+from solidsph.maths.arrays import Array
+from solidsph.registry.parameters import check_positive, number
+from solidsph.results.record import Record
+from solidsph.scene.scene import Scene
+from solidsph.simulation import Simulation
+from solidsph.studies.case import Case, Curves, Measurement
+from solidsph_builtin.materials.linear_elastic import LinearElastic
+from solidsph_cases._compare import compared
+from solidsph_cases._scheme import check_count, with_scheme
+
+RADIUS = 1.0  # R, of the foot [m]
+MATERIAL = LinearElastic(youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
+
+# The half width of the block and its height, in half-widths of the contact: stresses at the far
+# sides are then below a fiftieth of the peak.
+_BLOCK = 8.0
+# Half-width of the contact that is aimed at, over R: where Hertz's parabola and small strains hold.
+_SLENDER = 0.1
+# Motion of the top that brings it about, over that half-width.
+_APPROACH = 0.15
+
+_TOLERANCE = 0.05
+_SOURCE = "Hertz (1882): a^2 = 4 P R / (pi E*), p0 = 2 P / (pi a)"
+
+
+@final
+@attrs.frozen
+class Hertz(Case):
+    """The lower side of a long block has the radius R; its top is moved down until the foot is
+    flat over a tenth of R, in plane strain and in equilibrium.
+
+    Rows of particles follow the round side, so that the outermost lie on it. The load P is what
+    the plane carries; half-width and peak pressure come from the parabola that fits the squares of
+    the pressures p^2 = p0^2 (1 - x^2 / a^2) best. Against an elastic half-plane the block is
+    finite, which changes the pressures by less than a hundredth. One half is simulated.
+    """
+
+    title: ClassVar[str] = "A round foot on a rigid plane"
+    source: ClassVar[str] = _SOURCE
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {"in_contact": (4, 6, 8, 12)}
+
+    in_contact: int = 8  # particles from the middle of the contact to its edge
+    strength: float = number(default=10.0)  # of the wall [-]
+    kernel: str = "cubic-spline"
+    cover: float = number(default=2.2)  # [spacings]
+    gradient: str = "consistent"
+    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    engine: str = "auto"
+
+    def __attrs_post_init__(self) -> None:
+        check_count("hertz", "in_contact", self.in_contact, 3)
+        check_positive("hertz", "strength", self.strength, "1 / spacings that the wall yields")
+
+    @property
+    def half_width(self) -> float:
+        """That is aimed at [m]."""
+        return _SLENDER * RADIUS
+
+    @property
+    def spacing(self) -> float:
+        """[m]"""
+        return self.half_width / self.in_contact
+
+    @property
+    def contact_modulus(self) -> float:
+        """E* = E / (1 - nu^2) [Pa]"""
+        return MATERIAL.youngs_modulus / (1.0 - MATERIAL.poissons_ratio**2)
+
+    def scenes(self) -> Mapping[str, Scene]:
+        side = _BLOCK * self.half_width
+        box = {"type": "box", "lengths": [side, side]}
+        profile = f"Y + X**2/{2.0 * RADIUS!r}*(1 - Y/{side!r})"
+        builder = (
+            Simulation.builder()
+            .title(self.title)
+            .body(
+                "foot",
+                shape={"type": "polygon", "vertices": _outline(side, self.spacing)},
+                spacing=self.spacing,
+                discretisation={
+                    "type": "mapped",
+                    "of": {"type": "lattice", "on_boundary": True},
+                    "before": box,
+                    "to": {"y": profile},
+                },
+                tags={
+                    "middle": f"X < {0.1 * self.spacing!r}",
+                    "upper": f"Y > {side - 0.1 * self.spacing!r}",
+                },
+            )
+            .material(
+                "linear-elastic",
+                youngs_modulus=MATERIAL.youngs_modulus,
+                poissons_ratio=MATERIAL.poissons_ratio,
+                density=MATERIAL.density,
+            )
+            .boundary("clamp", where="middle", axes=["x"])
+            .boundary(
+                "prescribed-motion",
+                where="upper",
+                displacement={"y": f"-{_APPROACH * self.half_width!r}*t"},
+            )
+            .effect(
+                "rigid-wall",
+                point={"y": 0.0},
+                normal={"y": 1.0},
+                clearance=0.0,
+                strength=self.strength,
+                label="plane",
+            )
+            .statics(load_steps=4)
+            .duration(1.0)
+        )
+        return {"foot": with_scheme(builder, self).scene()}
+
+    def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
+        record = records["foot"]
+        width, peak = self.expected(record)
+        found_width, found_peak = self.fitted(record)
+        return [
+            compared(
+                record, "half-width of the contact", found_width, "m", width, _SOURCE, _TOLERANCE
+            ),
+            compared(record, "peak pressure", found_peak, "Pa", peak, _SOURCE, _TOLERANCE),
+            Measurement(
+                quantity="load",
+                value=self.load(record),
+                unit="N/m",
+                verdict="from which the two are found",
+            ),
+            Measurement(
+                quantity="largest penetration of the plane",
+                value=-float(record.history["plane least gap [m]"][-1]) / self.spacing,
+                unit="spacings",
+            ),
+        ]
+
+    def load(self, record: Record) -> float:
+        """P of the whole foot [N/m]"""
+        return 2.0 * float(record.history["plane force y [N]"][-1])
+
+    def expected(self, record: Record) -> tuple[float, float]:
+        """Hertz's half-width [m] and peak pressure [Pa] under that load."""
+        load = self.load(record)
+        width = sqrt(4.0 * load * RADIUS / (pi * self.contact_modulus))
+        return width, 2.0 * load / (pi * width)
+
+    def pressures(self, record: Record) -> tuple[Array, Array]:
+        """Places (k,) [m] of the particles that touch, and pressures there (k,) [Pa]."""
+        force = record.field("plane force")[-1][:, 1]
+        touching = np.flatnonzero(force > 0.0)
+        x = record.positions[-1][touching, 0]
+        order = np.argsort(x)
+        touching, x = touching[order], x[order]
+        areas = np.where(record.particles.positions[touching, 0] < 0.1 * self.spacing, 0.5, 1.0)
+        return x, np.asarray(force[touching] / (areas * self.spacing))
+
+    def fitted(self, record: Record) -> tuple[float, float]:
+        """Half-width [m] and peak pressure [Pa] of the half ellipse that fits best."""
+        x, p = self.pressures(record)
+        if len(x) < 3:
+            return float("nan"), float("nan")
+        slope, peak = np.polyfit(x**2, p**2, 1)
+        return float(np.sqrt(-peak / slope)), float(np.sqrt(peak))
+
+    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
+        from solidsph_cases._contact_pictures import draw_foot
+
+        path = folder / "hertz.png"
+        draw_foot(records["foot"], self, path)
+        return [path]
+
+    def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
+        x, p = self.pressures(records["foot"])
+        return {"hertz": {"x [m]": x, "pressure [Pa]": p}}
+
+
+def _outline(side: float, spacing: float) -> list[list[float]]:
+    """Corners of the half of the block, its round side straight from particle to particle."""
+    x = np.linspace(0.0, side, round(side / spacing) + 1)
+    round_side = [[float(a), float(a**2 / (2.0 * RADIUS))] for a in x]
+    return [*round_side, [side, side], [0.0, side]]

@@ -1,0 +1,167 @@
+"""A slab on a layer a thousand times softer, joined where they touch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, final
+
+import attrs
+import numpy as np
+from scipy.optimize import brentq
+
+from solidsph.maths.arrays import Array
+from solidsph.registry.parameters import check_positive, number
+from solidsph.results.record import Record
+from solidsph.scene.scene import Scene
+from solidsph.simulation import Simulation
+from solidsph.studies.case import Case, Measurement, Trial
+from solidsph_builtin.materials.neo_hookean import NeoHookean
+from solidsph_cases._compare import FINISHED, compared
+from solidsph_cases._energy import residual_over_start, smallest_volume_ratio
+from solidsph_cases._scheme import check_count, with_scheme
+
+LENGTH, WIDTH = 0.5, 0.2  # of both the layer and the slab [m]
+SOFT = NeoHookean(youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
+
+# Up to this part of the layer's wave speed the slab swings as the linear theory says.
+_SMALL = 0.02
+_PERIODS, _OUTPUTS = 1.3, 260
+
+# A spring that has given way to so much is no joint any more.
+_JOINED = 1.5
+
+
+@final
+@attrs.frozen
+class StiffnessJump(Case):
+    """Between frictionless walls the slab swings on the layer, whose other side is held.
+
+    Waves of the stiff slab are far shorter than those of the layer, the time step is theirs, and
+    the joint has to pass on the stress between. With M and m the masses of slab and layer, and the
+    slab rigid beside it, the lowest frequency is w = x c / L with x tan x = m / M, c being the
+    confined wave speed of the layer; the slab's own compliance, 1 / ratio of the layer's, is
+    below the tolerance from a ratio of 100 on.
+    """
+
+    title: ClassVar[str] = "A stiff slab swings on a soft layer"
+    source: ClassVar[str] = "Timoshenko: a rod with a mass at its end"
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {"along": (10, 20, 40)}
+    trials: ClassVar[Mapping[str, Trial]] = {
+        "1:1000": Trial({}, {"along": 8, "across": 4, "tolerance": 0.06}),
+        "1:1000, thrown hard": Trial({"speed": 0.3}, {"along": 8, "across": 4, "tolerance": 0.06}),
+    }
+
+    ratio: float = number(default=1000.0)  # of the moduli [-]
+    along: int = 20  # particles along each
+    across: int = 8  # and across
+    speed: float = number(default=0.01)  # of the slab, over the layer's wave speed [-]
+    kernel: str = "cubic-spline"
+    cover: float = number(default=2.2)  # [spacings]
+    gradient: str = "corrected"
+    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    engine: str = "auto"
+    time_step_factor: float = number(default=0.5)  # of the CFL step
+    tolerance: float = number(default=0.03)  # largest error of the period that passes [-]
+
+    def __attrs_post_init__(self) -> None:
+        check_count("stiffness-jump", "along", self.along, 4)
+        check_count("stiffness-jump", "across", self.across, 4)
+        for name in ("ratio", "speed", "tolerance"):
+            check_positive("stiffness-jump", name, getattr(self, name), "parts of one")
+
+    @property
+    def velocity(self) -> float:
+        """Of the slab at the start [m/s]"""
+        return self.speed * SOFT.wave_speed
+
+    @property
+    def period(self) -> float:
+        """Of the linear theory, of a layer from the particles that are held to the slab [s]"""
+        free = LENGTH * (1.0 - 0.5 / self.along)
+        x = brentq(lambda x: x * np.tan(x) - free / LENGTH, 0.1, 1.5)
+        return float(2.0 * np.pi * free / (x * SOFT.wave_speed))
+
+    def scenes(self) -> Mapping[str, Scene]:
+        builder = Simulation.builder().title(self.title)
+        for name, start, stiffness in (("layer", 0.0, 1.0), ("slab", LENGTH, self.ratio)):
+            builder = builder.body(
+                name,
+                shape={
+                    "type": "box",
+                    "lengths": [LENGTH, self.across * LENGTH / self.along],
+                    "origin": [start, 0.0],
+                },
+                spacing=LENGTH / self.along,
+                material={
+                    "type": "neo-hookean",
+                    "youngs_modulus": stiffness * SOFT.youngs_modulus,
+                    "poissons_ratio": SOFT.poissons_ratio,
+                    "density": SOFT.density,
+                },
+            )
+        half = 0.5 * LENGTH / self.along
+        builder = (
+            builder.boundary("clamp", where="all", axes=["y"])
+            .boundary("clamp", where=f"X < {half * 1.01!r}", axes=["x"])
+            .effect("joint")
+            .initial(where=f"X > {LENGTH!r}", velocity={"x": self.velocity})
+            .integrator("central-difference", time_step_factor=self.time_step_factor)
+            .duration(_PERIODS * self.period)
+            .outputs(_OUTPUTS)
+        )
+        return {"slab": with_scheme(builder, self).scene()}
+
+    def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
+        record = records["slab"]
+        stretch = float(record.history["joint largest stretch [-]"].max())
+        whole = record.outcome == FINISHED and stretch < _JOINED
+        small = self.speed <= _SMALL
+        return [
+            compared(
+                record,
+                "period",
+                self.swing_period(record),
+                "s",
+                self.period if small else None,
+                self.source,
+                self.tolerance,
+            ),
+            smallest_volume_ratio(record),
+            Measurement(
+                quantity="largest stretch of the joint",
+                value=stretch,
+                unit="1",
+                source="what is joined stays together",
+                verdict="joined" if whole else "parted, or ended early",
+                passed=whole,
+            ),
+            residual_over_start(record),
+        ]
+
+    def swing(self, record: Record) -> Array:
+        """Mean displacement of the slab along the axis, (t,) [m]."""
+        slab = record.particles.bodies["slab"]
+        return np.asarray(
+            (record.positions[:][:, slab, 0] - record.particles.positions[slab, 0]).mean(axis=1)
+        )
+
+    def swing_period(self, record: Record) -> float:
+        """Twice the time between the first two passages of the rest position [s]."""
+        u = self.swing(record)
+        falls = np.flatnonzero((u[:-1] > 0.0) & (u[1:] <= 0.0))
+        rises = np.flatnonzero((u[:-1] < 0.0) & (u[1:] >= 0.0))
+        if not (falls.size and rises.size):
+            return float("nan")
+        times = [
+            record.times[k] + (record.times[k + 1] - record.times[k]) * u[k] / (u[k] - u[k + 1])
+            for k in (int(falls[0]), int(rises[-1]))
+        ]
+        return float(2.0 * abs(times[1] - times[0]))
+
+    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
+        from solidsph_cases._joint_picture import draw_swing
+
+        path = folder / "stiffness-jump.png"
+        draw_swing(records["slab"], self, path)
+        return [path]

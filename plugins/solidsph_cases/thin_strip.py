@@ -1,0 +1,94 @@
+"""A free strip of few particles across, bending to and fro."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, final
+
+import attrs
+
+from solidsph.registry.parameters import number
+from solidsph.results.record import Record
+from solidsph.scene.scene import Scene
+from solidsph.simulation import Simulation
+from solidsph.studies.case import Case, Measurement, Trial
+from solidsph_builtin.materials.neo_hookean import NeoHookean
+from solidsph_cases._energy import energy_kept, smallest_volume_ratio
+from solidsph_cases._scheme import check_count, with_scheme
+
+MATERIAL = NeoHookean(youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
+SPACING = 0.05  # [m]
+
+
+@final
+@attrs.frozen
+class ThinStrip(Case):
+    """The middle of a free strip is pushed aside; nothing else acts on it, and nothing damps it.
+
+    One row of particles has its neighbours in a line, which determine no gradient across: that is
+    to be refused, not guessed.
+    """
+
+    title: ClassVar[str] = "A strip of few particles across"
+    source: ClassVar[str] = "conservation of energy"
+    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {"across": (2, 3, 5), "hourglass": (0.1, 0.5)}
+    trials: ClassVar[Mapping[str, Trial]] = {
+        "one particle across": Trial(
+            {"across": 1}, must_fail="neighbours in a line determine no gradient across it"
+        ),
+        "two particles across": Trial({"across": 2}, {"transits": 3.0}),
+        "three particles across": Trial({"across": 3}, {"transits": 3.0}),
+    }
+
+    across: int = 3  # particles
+    along: int = 31  # particles
+    speed: float = number(default=0.02)  # of the middle, over the wave speed [-]
+    transits: float = number(default=30.0)  # duration, in wave transits of the length
+    kernel: str = "cubic-spline"
+    cover: float = number(default=2.2)  # [spacings]
+    gradient: str = "quadratic"
+    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    engine: str = "auto"
+    integrator: str = "central-difference"
+    time_step_factor: float = number(default=0.3)  # of the CFL step
+    energy_tolerance: float = number(default=5e-3)  # largest change that passes [-]
+
+    def __attrs_post_init__(self) -> None:
+        check_count("thin-strip", "across", self.across, 1)
+        check_count("thin-strip", "along", self.along, 11)
+
+    @property
+    def resolution(self) -> float:
+        return 1.0 / self.across
+
+    def scenes(self) -> Mapping[str, Scene]:
+        c, length = MATERIAL.wave_speed, SPACING * self.along
+        bump = f"exp(-(X - {0.5 * length!r})**2/{(0.15 * length) ** 2!r})"
+        builder = (
+            Simulation.builder()
+            .title(self.title)
+            .body(
+                "strip",
+                shape={"type": "box", "lengths": [length, SPACING * self.across]},
+                spacing=SPACING,
+            )
+            .material(
+                "neo-hookean",
+                youngs_modulus=MATERIAL.youngs_modulus,
+                poissons_ratio=MATERIAL.poissons_ratio,
+                density=MATERIAL.density,
+            )
+            .initial(velocity={"y": f"{self.speed * c!r}*{bump}"})
+            .integrator(self.integrator, time_step_factor=self.time_step_factor)
+            .duration(self.transits * length / c)
+            .outputs(200)
+        )
+        return {"strip": with_scheme(builder, self).scene()}
+
+    def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
+        record = records["strip"]
+        return [energy_kept(record, self.energy_tolerance), smallest_volume_ratio(record)]
+
+    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
+        return []

@@ -1,0 +1,67 @@
+"""Setting: what a part sees of the discrete problem when it is bound to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
+
+import attrs
+from scipy.sparse import block_diag, csr_array
+
+from solidsph.errors import SceneError
+from solidsph.interfaces.body import Body
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.particles import Face, Particles
+from solidsph.model.regions import Where, described, select
+from solidsph.model.surface import Conditions, Pieces
+
+
+@attrs.frozen(eq=False)
+class Setting:
+    """The particles of all bodies, their masses, and the bodies themselves."""
+
+    particles: Particles
+    masses: Array  # (n,) [kg], 0 for ghosts
+    bodies: Sequence[Body]
+    step_size: float  # time step of the run [s]
+    end: float = inf  # of the scene's duration [s]; a formula of t may have no value beyond it
+    conditions: Conditions = attrs.field(factory=dict)  # of the tags that the scene adds
+
+    def select(self, where: Where) -> Indices:
+        """Indices of the particles at `where`.
+
+        Raises:
+            SceneError: no particle is there, or `where` cannot be understood.
+        """
+        return select(self.particles, where)
+
+    def surface(self, where: Where) -> Face:
+        """The surface at `where`: of the faces that it names, or all that its particles own.
+
+        Raises:
+            SceneError: no surface is there, or `where` cannot be understood.
+        """
+        pieces = self.pieces()
+        chosen = pieces.at(where) & (pieces.areas > 0.0)
+        if not chosen.any():
+            self.select(where)  # which says so where there is no particle either
+            raise SceneError(
+                f"no particle at {described(where)} lies on the surface; name a face: "
+                f"{', '.join(pieces.names) or 'there is none'} ('or' joins two of them; no surface "
+                "is on both)"
+            )
+        return pieces.owned(chosen)
+
+    def pieces(self) -> Pieces:
+        """The whole surface, in pieces."""
+        return Pieces.of(self.particles, self.conditions)
+
+    def smoothing_matrix(self) -> csr_array:
+        """W of the paper's eq. 8, sparse: its product with values gives their approximation."""
+        return csr_array(block_diag([_smoothing(body) for body in self.bodies], format="csr"))
+
+
+def _smoothing(body: Body) -> csr_array:
+    pairs = body.pairs()
+    weights = body.smoothing.value(pairs.distances)
+    return pairs.matrix(weights * body.particles.cells[pairs.columns])

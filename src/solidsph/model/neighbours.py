@@ -1,0 +1,123 @@
+"""Neighbour pairs within the support radius."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
+
+from solidsph.maths.arrays import Array, Indices, Mask
+
+
+@attrs.frozen(eq=False)
+class Pairs:
+    """Ordered pairs (p, q) in rows: the neighbours of p stand together, sorted by q, p among them.
+
+    The list may hold the rows of some of the particles only, as long as they follow each other;
+    rows and columns keep their numbers among all. In a list of all rows every pair has its reverse.
+    """
+
+    starts: Indices  # (n + 1,) the row of the k-th particle listed is starts[k] : starts[k + 1]
+    rows: Indices  # (m,) p
+    columns: Indices  # (m,) q
+    offsets: Array  # (m, d) x_q - x_p [m]
+    distances: Array  # (m,) [m]
+
+    @property
+    def row_count(self) -> int:
+        """Number of particles n whose rows are listed."""
+        return len(self.starts) - 1
+
+    @property
+    def count(self) -> int:
+        """Number of ordered pairs m, n self pairs included."""
+        return len(self.columns)
+
+    def reversed_order(self) -> Indices:
+        """For every pair (p, q) the place of (q, p), (m,)."""
+        # In column order the pairs of column p appear as (q, p) with q rising: row p's order.
+        return np.asarray(self.matrix(np.arange(self.count)).tocsc().data, dtype=np.intp)
+
+    def row_sums(self, values: Array) -> Array:
+        """Sum of `values` (m, ...) over each particle's pairs, (n, ...)."""
+        # Every row holds its self pair, so no segment is empty and reduceat is safe.
+        return np.add.reduceat(values, self.starts[:-1], axis=0)
+
+    def spread(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Values of the particles listed (n, ...), given to each of their pairs, (m, ...)."""
+        return np.repeat(values, np.diff(self.starts), axis=0)
+
+    def of_differences(self, weights: Array) -> Array:
+        """The same weights (m, d) acting on f_q - f_p: each row is made to add up to zero."""
+        weights = weights.copy()
+        weights[self.self_pairs] = 0.0
+        weights[self.self_pairs] = -self.row_sums(weights)
+        return weights
+
+    def matrix(self, values: NDArray[Any]) -> csr_array:
+        """Sparse n x n matrix with `values` (m,) at (p, q)."""
+        n = self.row_count
+        return csr_array((values, self.columns, self.starts), shape=(n, n))
+
+    @property
+    def self_pairs(self) -> Indices:
+        """Places of the pairs (p, p), (n,)."""
+        return np.flatnonzero(self.rows == self.columns)
+
+
+@attrs.frozen(eq=False)
+class Hidden:
+    """Particles that are no neighbours however near they are: the body is not between them.
+
+    `visibility.hidden_pairs` finds them in the reference configuration.
+    """
+
+    keys: Indices  # (k,) rising: p n + q of every hidden pair, (q, p) as well as (p, q)
+    count: int  # number of particles n
+    pieces: Indices | None = None  # (n,) if pieces of the body may meet, which piece each is of
+
+    def between(self, rows: Indices, columns: Indices) -> Mask:
+        """Whether p and q are hidden from each other, for pairs of `rows` and `columns` (m,)."""
+        if len(self.keys):
+            wanted = np.asarray(rows, dtype=np.intp) * self.count + columns
+            places = np.minimum(np.searchsorted(self.keys, wanted), len(self.keys) - 1)
+            hidden: Mask = self.keys[places] == wanted
+        else:
+            hidden = np.zeros(len(rows), dtype=np.bool_)
+        if self.pieces is not None:
+            hidden |= self.pieces[rows] != self.pieces[columns]
+        return hidden
+
+    def part(self, chosen: Indices) -> Hidden:
+        """The same among the chosen particles (k,), numbered in their order."""
+        place = np.full(self.count, -1, dtype=np.intp)
+        place[chosen] = np.arange(len(chosen))
+        p, q = (place[ends] for ends in np.divmod(self.keys, self.count))
+        kept = (p >= 0) & (q >= 0)
+        keys = np.sort(p[kept] * len(chosen) + q[kept])
+        return Hidden(keys, len(chosen), None if self.pieces is None else self.pieces[chosen])
+
+
+def neighbour_pairs(positions: Array, radius: float, hidden: Hidden | None = None) -> Pairs:
+    """All pairs closer than `radius` [m] among `positions` (n, d), self pairs included, but for
+    those that are hidden from each other."""
+    found = cKDTree(positions).query_pairs(radius, output_type="ndarray")
+    if hidden is not None:
+        found = found[~hidden.between(found[:, 0], found[:, 1])]
+    own = np.arange(len(positions), dtype=np.intp)
+    rows = np.concatenate([found[:, 0], found[:, 1], own]).astype(np.intp)
+    columns = np.concatenate([found[:, 1], found[:, 0], own]).astype(np.intp)
+    order = np.lexsort((columns, rows))
+    rows, columns = rows[order], columns[order]
+    offsets = positions[columns] - positions[rows]
+    return Pairs(
+        starts=np.searchsorted(rows, np.arange(len(positions) + 1)).astype(np.intp),
+        rows=rows,
+        columns=columns,
+        offsets=offsets,
+        distances=np.linalg.norm(offsets, axis=1),
+    )

@@ -1,0 +1,298 @@
+"""What every integrator must keep, on one mass and one spring."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import atan2, cos, exp, hypot, log, sin, sqrt
+from typing import final
+
+import attrs
+import numpy as np
+
+from solidsph.interfaces.condition import ForceCondition, MotionCondition, Observation
+from solidsph.interfaces.engine import InternalForces, StressFields
+from solidsph.interfaces.integrator import Integrator
+from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.model.particles import Particles, State
+from solidsph.promises.check import Check, Verdict, at_most, check, more_than
+from solidsph.promises.derived import overridden
+from solidsph.run.dynamics import Dynamics
+
+_MASS = 2.0  # [kg]
+_FREQUENCY = 3.0  # omega [rad/s]
+_RATE = 0.6  # damping rate c / m [1/s]
+_START, _SPEED = 1.0, 1.5  # [m], [m/s]
+
+# Numbers of steps in 5/6 of a period: the coarsest resolves it, the finest stays clear of
+# rounding up to the sixth order.
+_STEPS = (40, 80, 160, 320)
+_DURATION = 2.0 * np.pi / _FREQUENCY * 5.0 / 6.0  # [s]
+
+# A fitted slope differs from the order by about the relative size of the next term of the error,
+# (omega dt)^2 at the coarsest steps.
+_ORDER_TOLERANCE = 0.1
+
+
+@final
+@attrs.frozen(eq=False)
+class _Spring(InternalForces):
+    """f = -m omega^2 u on every particle."""
+
+    @property
+    def pair_count(self) -> int:
+        return 0
+
+    def forces(self, time: float, displacements: Array) -> Array:
+        return -_MASS * _FREQUENCY**2 * displacements
+
+    def fields(self, displacements: Array) -> StressFields:
+        n, d = displacements.shape
+        return StressFields(np.tile(np.eye(d), (n, 1, 1)), np.zeros((n, d, d)), np.zeros(n))
+
+    def gradients(self, displacements: Array) -> Array:
+        n, d = displacements.shape
+        return np.zeros((n, d, d))
+
+    def spread(self, displacements: Array, stress: Array) -> Array:
+        return np.zeros_like(displacements)
+
+
+@final
+@attrs.frozen(eq=False)
+class _Damper(ForceCondition):
+    """f = -c v on the first particle."""
+
+    @property
+    def label(self) -> str:
+        return "damper"
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {}
+
+    @property
+    def particles(self) -> Indices:
+        return np.array([0])
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return -_MASS * _RATE * velocities[:1]
+
+
+@final
+@attrs.frozen(eq=False)
+class _Shaker(MotionCondition):
+    """u = sin t of the first particle."""
+
+    @property
+    def label(self) -> str:
+        return "shaker"
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {}
+
+    @property
+    def held(self) -> Mask:
+        return np.array([[True]])
+
+    def impose(self, time: float, derivative: int, values: Array) -> None:
+        values[0] = (sin(time), cos(time), -sin(time))[derivative]
+
+
+def _dynamics(*conditions: _Damper | _Shaker) -> Dynamics:
+    """One particle at X = 0."""
+    origin, unit = np.zeros((1, 1)), np.ones(1)
+    particles = Particles(
+        positions=origin,
+        volumes=unit,
+        spacings=unit,
+        area_vectors=origin,
+        ghosts=np.array([False]),
+        images=origin,
+    )
+    return Dynamics(
+        particles=particles,
+        masses=_MASS * unit,
+        internal=_Spring(),
+        motions=[one for one in conditions if isinstance(one, _Shaker)],
+        loads=[one for one in conditions if isinstance(one, _Damper)],
+    )
+
+
+def _initial(position: float = _START, velocity: float = _SPEED) -> State:
+    return State(
+        time=0.0,
+        step=0,
+        positions=np.array([[position]]),
+        velocities=np.array([[velocity]]),
+        accelerations=np.zeros((1, 1)),
+    )
+
+
+def _run(integrator: Integrator, dynamics: Dynamics, step_size: float, steps: int) -> State:
+    state = integrator.start(_initial(), dynamics, step_size)
+    for _ in range(steps):
+        state = integrator.advance(state, dynamics, step_size)
+    return state
+
+
+def _fitted_order(integrator: Integrator, dynamics: Dynamics, rate: float) -> float:
+    """Slope of log error against log step for u'' + 2 g u' + omega^2 u = 0 with 2 g = rate."""
+    g = 0.5 * rate
+    omega = sqrt(_FREQUENCY**2 - g**2)
+    amplitude = hypot(_START, (_SPEED + g * _START) / omega)
+    phase = atan2((_SPEED + g * _START) / omega, _START)
+    decay = amplitude * exp(-g * _DURATION)
+    angle = omega * _DURATION - phase
+    u, v = decay * cos(angle), -decay * (g * cos(angle) + omega * sin(angle))
+    errors = []
+    for steps in _STEPS:
+        end = _run(integrator, dynamics, _DURATION / steps, steps)
+        position, velocity = end.positions[0, 0], end.velocities[0, 0]
+        errors.append(log(hypot(position - u, (velocity - v) / _FREQUENCY)))
+    return float(np.polyfit(-np.log(_STEPS), errors, 1)[0])
+
+
+def _order(integrator: Integrator, dynamics: Dynamics, rate: float) -> Verdict:
+    found = _fitted_order(integrator, dynamics, rate)
+    passed = abs(found - integrator.order) <= _ORDER_TOLERANCE
+    return Verdict(passed, f"{found:.3f} (declared {integrator.order})")
+
+
+@check
+def order(integrator: Integrator) -> Verdict:
+    """On a free oscillation the error falls with the declared order."""
+    return _order(integrator, _dynamics(), 0.0)
+
+
+@check
+def order_with_damping(integrator: Integrator) -> Verdict:
+    """With a force that depends on velocity the error falls with the declared order too."""
+    return _order(integrator, _dynamics(_Damper()), _RATE)
+
+
+def _largest(integrator: Integrator, product: float) -> float:
+    """Largest |u| over 2000 steps with omega dt = `product`, up to a million."""
+    step_size = product / _FREQUENCY
+    dynamics = _dynamics()
+    state = integrator.start(_initial(), dynamics, step_size)
+    largest = 0.0
+    for _ in range(2000):
+        state = integrator.advance(state, dynamics, step_size)
+        largest = max(largest, float(abs(state.positions[0, 0])))
+        if not largest < 1e6:
+            break
+    return largest
+
+
+@check
+def stable_below_limit(integrator: Integrator) -> Verdict:
+    """At 0.99 of the declared stability limit, which is positive, an oscillation stays bounded."""
+    if not integrator.stability_limit > 0.0:
+        return Verdict(False, f"declares stability_limit = {integrator.stability_limit}")
+    # So near the limit an amplitude grows by 1 / sqrt(1 - 0.99^2) = 7 before it turns.
+    return at_most(_largest(integrator, 0.99 * integrator.stability_limit), 100.0)
+
+
+@check
+def unstable_above_limit(integrator: Integrator) -> Verdict:
+    """At 1.01 of the declared stability limit it grows: the limit is not too modest."""
+    return more_than(_largest(integrator, 1.01 * integrator.stability_limit), 1e5)
+
+
+@check
+def imposed_motion(integrator: Integrator) -> Verdict:
+    """A particle whose motion is imposed follows it, in position and velocity."""
+    dynamics, step_size = _dynamics(_Shaker()), 0.01
+    state = integrator.start(_initial(0.0, 1.0), dynamics, step_size)
+    error = 0.0
+    for _ in range(100):
+        state = integrator.advance(state, dynamics, step_size)
+        error = max(
+            error,
+            abs(state.positions[0, 0] - sin(state.time)),
+            abs(state.velocities[0, 0] - cos(state.time)),
+        )
+    # They are overwritten, so nothing but the sum X + u may round.
+    return at_most(error, 1e-15)
+
+
+@check
+def work_of_loads(integrator: Integrator) -> Verdict:
+    """The work of a load is accounted for: the energy that a damper takes is the energy lost."""
+    steps = 4000
+    state = _run(integrator, _dynamics(_Damper()), _DURATION / steps, steps)
+    before = _energy(_initial())
+    lost = before - _energy(state)
+    # The trapezoidal rule and a scheme of the first order leave omega dt = 1e-3 of the energy.
+    return at_most(abs(lost + state.work["damper"]) / before, 5e-3)
+
+
+@check
+def bookkeeping(integrator: Integrator) -> Verdict:
+    """A step adds 1 to the count and its size to the time, and leaves the old state as it was."""
+    dynamics, step_size = _dynamics(), 0.01
+    first = _initial()
+    started = integrator.start(first, dynamics, step_size)
+    untouched = _copied(started)
+    after = integrator.advance(started, dynamics, step_size)
+    again = integrator.advance(started, dynamics, step_size)
+    problems = {
+        "start counts as a step": started.step != 0 or started.time != 0.0,
+        "the count is wrong": after.step != 1,
+        "the time is wrong": after.time != step_size,
+        "the initial state was changed": not _same(first, _initial()),
+        "the old state was changed": not _same(started, untouched),
+        "the same step gave another result": not _same(after, again),
+    }
+    found = [problem for problem, present in problems.items() if present]
+    return Verdict(not found, "; ".join(found) or "as required")
+
+
+@check
+def derived(integrator: Integrator) -> Verdict:
+    """What two formulas say of a step is not said otherwise by a method, which a compiled loop does
+    not call."""
+    problem = overridden(integrator)
+    return Verdict(not problem, problem or "nothing is overridden")
+
+
+CHECKS: tuple[Check, ...] = (
+    derived,
+    order,
+    order_with_damping,
+    stable_below_limit,
+    unstable_above_limit,
+    imposed_motion,
+    work_of_loads,
+    bookkeeping,
+)
+
+
+def _energy(state: State) -> float:
+    u, v = state.positions[0, 0], state.velocities[0, 0]
+    return float(0.5 * _MASS * (v**2 + (_FREQUENCY * u) ** 2))
+
+
+def _arrays(state: State) -> list[Array]:
+    mappings = (state.memory, state.applied)
+    return [
+        state.positions,
+        state.velocities,
+        state.accelerations,
+        *(array for mapping in mappings for _, array in sorted(mapping.items())),
+    ]
+
+
+def _copied(state: State) -> State:
+    return attrs.evolve(
+        state,
+        positions=state.positions.copy(),
+        velocities=state.velocities.copy(),
+        accelerations=state.accelerations.copy(),
+        memory={name: array.copy() for name, array in state.memory.items()},
+        applied={name: array.copy() for name, array in state.applied.items()},
+    )
+
+
+def _same(one: State, other: State) -> bool:
+    pairs = zip(_arrays(one), _arrays(other), strict=True)
+    return all(np.array_equal(a, b) for a, b in pairs)

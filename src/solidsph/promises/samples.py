@@ -1,0 +1,90 @@
+"""Rotations and deformation gradients from plain numbers, and arrangements without symmetry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import wraps
+from math import cos, sin
+from typing import Any, TypeVar
+
+import numpy as np
+
+from solidsph.maths.arrays import Array
+
+Made = TypeVar("Made")
+
+DIMENSIONS = (1, 2, 3)
+
+# How many angles a rotation takes in 1, 2 and 3 dimensions.
+ANGLES = {1: 0, 2: 1, 3: 3}
+
+_PLANES = ((0, 1), (1, 2), (2, 0))
+
+
+def rotation(dimension: int, angles: Sequence[float]) -> Array:
+    """Rotation matrix (d, d) from angles [rad]: none, one, or one in each coordinate plane."""
+    Q = np.eye(dimension)
+    for (i, j), angle in zip(_PLANES[: ANGLES[dimension]], angles, strict=True):
+        turn = np.eye(dimension)
+        turn[i, i] = turn[j, j] = cos(angle)
+        turn[i, j], turn[j, i] = -sin(angle), sin(angle)
+        Q = turn @ Q
+    return Q
+
+
+def deformation_gradient(stretches: Sequence[float], left: Array, right: Array) -> Array:
+    """F = left diag(stretches) right^T (d, d), with det F the product of the stretches."""
+    return left @ np.diag(stretches) @ right.T
+
+
+def random_rotation(rng: np.random.Generator, dimension: int) -> Array:
+    """A rotation (d, d) with each angle up to half a turn either way."""
+    return rotation(dimension, rng.uniform(-np.pi, np.pi, ANGLES[dimension]).tolist())
+
+
+def random_deformation_gradients(rng: np.random.Generator, dimension: int, count: int) -> Array:
+    """(d, d, count), principal stretches of 0.7 to 1.4, so J is at least a third."""
+    return np.stack(
+        [
+            deformation_gradient(
+                rng.uniform(0.7, 1.4, dimension).tolist(),
+                random_rotation(rng, dimension),
+                random_rotation(rng, dimension),
+            )
+            for _ in range(count)
+        ],
+        axis=-1,
+    )
+
+
+def scattered(rng: np.random.Generator, cells: Sequence[int], spacing: float) -> Array:
+    """A lattice over a box, each particle moved by up to a fifth of a spacing, (n, d) [m]."""
+    axes = [np.arange(count) + 0.5 for count in cells]
+    centres = np.stack([grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")], axis=1)
+    return spacing * (centres + rng.uniform(-0.2, 0.2, centres.shape))
+
+
+def central_difference(f: Callable[[Array], Array], at: Array, along: Array, step: float) -> Array:
+    """Derivative of f(at + e along) by e at e = 0, with an error of the sixth order in the step."""
+    weights = {1: 45.0, 2: -9.0, 3: 1.0}
+    change = [w * (f(at + k * step * along) - f(at - k * step * along)) for k, w in weights.items()]
+    return np.asarray(sum(change) / (60.0 * step))
+
+
+def seeded() -> Iterator[tuple[int, np.random.Generator]]:
+    """Each dimension with random numbers of its own, the same in every run."""
+    for dimension in DIMENSIONS:
+        yield dimension, np.random.default_rng(dimension)
+
+
+def made_once(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
+    """`make`, which remembers what it made of the last part: checks of a part come one by one."""
+    kept: list[tuple[object, Made]] = []
+
+    @wraps(make)
+    def remembered(part: Any) -> Made:
+        if not kept or kept[0][0] is not part:
+            kept[:] = [(part, make(part))]
+        return kept[0][1]
+
+    return remembered

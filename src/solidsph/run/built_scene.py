@@ -1,0 +1,134 @@
+"""BuiltScene: a checked scene in discrete form, with everything that a run needs."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from math import ceil
+from pathlib import Path
+from typing import Self
+
+import attrs
+import numpy as np
+import pluggy
+
+from solidsph.errors import BuildError, DivergedError, SceneError
+from solidsph.interfaces.condition import Condition, Observation
+from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.engine import Engine
+from solidsph.interfaces.integrator import Integrator
+from solidsph.model.particles import Particles, State, read_only
+from solidsph.registry.registry import Entry
+from solidsph.run.dynamics import Dynamics
+from solidsph.run.outcome import Result
+from solidsph.run.restart_point import Resumption
+from solidsph.scene.scene import Scene
+
+
+@attrs.frozen(eq=False)
+class BuiltScene(ABC):
+    """Everything that a run needs. Running does not change it, so it can be run again."""
+
+    scene: Scene
+    setting: Setting
+    dynamics: Dynamics
+    conditions: Sequence[Condition]
+    effects: Mapping[str, Effect]
+    integrator: Integrator
+    engine: Engine
+    initial: State
+    step_size: float  # [s]
+    steps: int
+    parts: tuple[Entry, ...]  # every plugin used
+    manager: pluggy.PluginManager
+    halvings: int = 0  # of the step that the scene asks for
+
+    @abstractmethod
+    def run(
+        self,
+        *,
+        record: Path | str | None = None,
+        observers: Sequence[object] = (),
+        since: Resumption | None = None,
+    ) -> Result:
+        """Find the equilibrium if the scene has [statics], follow the motion if not."""
+
+    @abstractmethod
+    def halved(self) -> Self:
+        """The same scene, built anew with half the step."""
+
+    @property
+    def particles(self) -> Particles:
+        """The reference configuration."""
+        return self.dynamics.particles
+
+    def start(self) -> State:
+        """The state at the first step, with imposed motions, accelerations and accounts."""
+        positions = self.dynamics.place(self.initial.time, self.initial.positions)
+        velocities = self.dynamics.carry(self.initial.time, self.initial.velocities)
+        state = attrs.evolve(self.initial, positions=positions, velocities=velocities)
+        with np.errstate(all="ignore"):  # as in the steps that follow
+            return self.integrator.start(state, self.dynamics, self.step_size)
+
+    @property
+    def compiles_steps(self) -> bool:
+        """Whether whole steps are compiled, as far as the kinds of the parts tell."""
+        return self.dynamics.internal.compiles_steps(self.dynamics, self.integrator)
+
+    def extended(self, steps: int) -> Self:
+        """The same, of so many steps in all: the step and the outputs up to now stay as they are.
+
+        Raises:
+            SceneError: the scene has more steps than that.
+        """
+        if steps < self.steps:
+            raise SceneError(f"{steps} steps in all are fewer than the {self.steps} that there are")
+        return attrs.evolve(self, steps=steps)
+
+    def output_steps(self) -> tuple[int, ...]:
+        """Steps after which the state is observed, evenly spread, the last one among them."""
+        # In steps of the scene's own size, so that halving them changes no time.
+        size = 2**self.halvings
+        asked, steps = round(self.scene.duration / self.step_size) // size, self.steps / size
+        count = min(self.scene.outputs, asked)
+        marks = np.linspace(0, asked, count + 1)[1:]
+        if steps > asked:  # extended
+            apart = asked / count
+            further = np.arange(count + 1, ceil(steps / apart)) * apart
+            marks = np.concatenate([marks, further])
+        whole = np.append(size * np.rint(marks).astype(np.int64), self.steps)
+        return tuple(int(step) for step in np.unique(whole) if step <= self.steps)
+
+    def observe(self, state: State) -> Observation:
+        """What there is to see of a state.
+
+        Raises:
+            DivergedError: a volume has vanished or turned inside out.
+        """
+        observation = self.dynamics.observe(read_only(state))
+        turned = ~(observation.volume_ratios > 0.0) & ~self.particles.ghosts
+        if turned.any():
+            raise self.diverged(state, "the volume has vanished or turned inside out")
+        return observation
+
+    def diverged(self, state: State, cause: str) -> DivergedError:
+        """The error of a motion that cannot go on from `state`; listeners hear of it."""
+        try:
+            with np.errstate(all="ignore"):
+                J = np.linalg.det(self.dynamics.observe(state).deformation_gradients)
+        except (BuildError, ValueError):  # positions may be such that nothing has neighbours
+            J = np.full(self.particles.count, np.nan)
+        real = np.flatnonzero(~self.particles.ghosts)
+        finite = np.isfinite(J[real])
+        # The first particle whose volume ratio is no number, or else the most compressed one.
+        worst = real[np.argmin(finite)] if not finite.all() else real[np.argmin(J[real])]
+        error = DivergedError(
+            step=state.step,
+            time=state.time,
+            particle=int(worst),
+            volume_ratio=float(J[worst]),
+            cause=cause,
+        )
+        self.manager.hook.solidsph_failure(simulation=self, state=state, error=error)
+        return error

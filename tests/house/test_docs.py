@@ -1,0 +1,95 @@
+"""The documentation shows code that is run, and lists what there is."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+from solidsph import Scene, Simulation, carry_out
+from solidsph.registry import registry
+
+ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "plugins/examples/solidsph-wendland"
+
+
+def blocks(page: str, language: str) -> list[str]:
+    text = (ROOT / page).read_text()
+    return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
+
+
+def test_first_kernel_shows_the_example_plugin() -> None:
+    kernel, tests = blocks("docs/first-kernel.md", "python")
+    assert kernel == (EXAMPLE / "src/solidsph_wendland/wendland_c2.py").read_text()
+    assert tests == (EXAMPLE / "tests/test_wendland_c2.py").read_text()
+    shown = tomllib.loads(blocks("docs/first-kernel.md", "toml")[0])
+    real = tomllib.loads((EXAMPLE / "pyproject.toml").read_text())
+    assert shown["project"]["entry-points"] == real["project"]["entry-points"]
+
+
+def test_the_scenes_shown_can_be_built_and_the_static_one_run() -> None:
+    moving, static = (Scene.from_toml(text) for text in blocks("docs/scenes.md", "toml"))
+    assert Simulation.builder(moving).build().steps > 0
+    assert carry_out(Simulation.builder(static).build()).effort["residual [-]"] < 1e-9
+
+
+def test_the_scenes_shown_are_sound() -> None:
+    from solidsph.advice import advised
+
+    for text in blocks("docs/scenes.md", "toml"):
+        built = Simulation.builder(Scene.from_toml(text)).build()
+        assert [one.line for one in advised(built)] == []
+
+
+def test_every_builtin_part_is_listed() -> None:
+    text = (ROOT / "docs/scenes.md").read_text()
+    missing = [
+        entry.name
+        for kind in registry.INTERFACES
+        for entry in registry.available(kind)
+        if entry.distribution == "solidsph" and f"`{entry.name}`" not in text
+    ]
+    assert missing == []
+
+
+def test_the_readmes_python_runs(tmp_path, monkeypatch) -> None:
+    (code,) = blocks("README.md", "python")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(compile(code, "README.md", "exec"), names)
+    assert (tmp_path / "results/plate/record.h5").exists()
+
+
+def test_what_the_reading_of_the_paper_names_is_there() -> None:
+    text = (ROOT / "docs/reading-the-paper.md").read_text()
+    folder = ROOT
+    for name in re.findall(r"`([\w/.-]+\.py)`", text):
+        path = ROOT / name if "/" in name else folder / name
+        assert path.exists(), name
+        folder = path.parent  # a name without a folder is beside the one before
+    cases = re.findall(r"the case `([\w-]+)`|solidsph run ([\w-]+)", text)
+    assert cases
+    assert {one or other for one, other in cases} <= set(registry.names("cases"))
+
+
+def test_every_verb_is_in_the_readme() -> None:
+    from solidsph.cli import VERBS
+
+    text = (ROOT / "README.md").read_text()
+    assert all(f"solidsph {verb}" in text for verb in VERBS)
+
+
+def test_every_module_of_the_core_is_in_the_architecture() -> None:
+    text = (ROOT / "docs/architecture.md").read_text()
+    core = ROOT / "src/solidsph"
+    named = [path.name for path in core.glob("*.py") if not path.name.startswith("__")]
+    folders = [f"{path.name}/" for path in core.iterdir() if (path / "__init__.py").exists()]
+    small = {"arrays.py", "errors.py", "problems.py"}
+    assert [name for name in [*named, *folders] if name not in text and name not in small] == []
+
+
+def test_every_warning_is_listed() -> None:
+    from solidsph.advice import ADVICE
+
+    text = (ROOT / "docs/scenes.md").read_text()
+    assert [name for name in ADVICE if f"`{name}`" not in text] == []

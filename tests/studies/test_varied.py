@@ -1,0 +1,94 @@
+"""A case with other words in its scenes than it has parameters for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import pytest
+
+from solidsph import SceneError
+from solidsph.costs.counted import counted
+from solidsph.registry import registry
+from solidsph.scene.scene import Scene
+from solidsph.simulation import Simulation
+from solidsph.studies.case import Case
+from solidsph.studies.point import measured, together
+from solidsph.studies.varied import varied
+from solidsph_cases.csm3 import Csm3
+
+
+def scene(**settings: Any) -> Scene:
+    return varied(Csm3(), {name.replace("__", "."): v for name, v in settings.items()}).scenes()[
+        "csm3"
+    ]
+
+
+def test_parameters_of_the_case_come_first() -> None:
+    assert varied(Csm3(), {"across": 9, "cover": 3.0}) == Csm3(across=9, cover=3.0)
+
+
+def test_other_words_change_the_scene_and_nothing_else() -> None:
+    plain = Csm3().scenes()["csm3"]
+    assert scene(outputs=7) == attrs.evolve(plain, outputs=7)
+    assert scene(precision="float32").engine == "compiled-float32"
+    formulation = scene(formulation="updated-lagrangian").formulation
+    assert formulation == {**plain.formulation, "type": "updated-lagrangian"}
+
+
+def test_strengths_of_effects_are_changed_or_added() -> None:
+    gravity, added = scene(**{"hourglass-control__strength": 0.3}).effects
+    assert gravity == Csm3().scenes()["csm3"].effects[0]
+    assert added.part == {"type": "hourglass-control", "strength": 0.3}
+    case = Csm3(hourglass=0.5)
+    effects = varied(case, {"hourglass-control.strength": 0.2}).scenes()["csm3"].effects
+    assert {"type": "hourglass-control", "strength": 0.2} in [one.part for one in effects]
+    assert len(effects) == 2
+
+
+def test_an_unknown_word_names_the_nearest() -> None:
+    with pytest.raises(SceneError, match="did you mean 'gradient'"):
+        varied(Csm3(), {"gradent": "quadratic"})
+    with pytest.raises(SceneError, match="across"):
+        varied(Csm3(), {"across": 1})
+    with pytest.raises(SceneError, match="float64 or float32"):
+        scene(precision="single")
+
+
+def test_a_point_counts_what_no_machine_changes() -> None:
+    case = Csm3(across=3, duration=0.01, engine="matrix")
+    one, two = measured(case, {"cover": 2.2}), measured(case, {"cover": 2.2})
+    assert attrs.evolve(one, seconds=(), peak_memory=0) == attrs.evolve(
+        two, seconds=(), peak_memory=0
+    )
+    built = Simulation.builder(varied(case, {"cover": 2.2}).scenes()["csm3"]).build()
+    assert one.steps == built.steps
+    assert one.pair_evaluations == built.steps * counted(built).visited
+    assert together([one, two]).seconds == (*one.seconds, *two.seconds)
+
+
+def test_what_goes_wrong_is_a_point_too() -> None:
+    case = Csm3(across=3, duration=0.05, engine="matrix")
+    diverged = measured(case, {"time_step": 1.8e-4})
+    assert not diverged.finished
+    assert "diverged" in diverged.outcome
+    refused = measured(case, {"cover": -1.0})
+    assert not refused.finished
+    assert "cover" in refused.outcome
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in registry.names("cases") if attrs.fields(registry.load("cases", name))]
+)
+def test_every_case_has_a_sensible_sweep(name: str) -> None:
+    case: Case = registry.load("cases", name)()
+    priced = case.priced()
+    assert priced.sweep
+    refining, *_ = priced.sweep
+    spacings = [varied(priced, {refining: value}).resolution for value in priced.sweep[refining]]
+    assert len(spacings) >= 2
+    assert spacings == sorted(spacings, reverse=True)
+    for axis, values in priced.sweep.items():
+        assert len(values) == len(set(values)) >= 1
+        for value in values:
+            varied(priced, {axis: value}).scenes()
