@@ -32,7 +32,7 @@ from solidsph.costs import terms
 from solidsph.costs.calibration import Calibration, calibrated
 from solidsph.costs.counted import counted
 from solidsph.costs.process import memory_now, peak_memory
-from solidsph.costs.terms import Term, Yard
+from solidsph.costs.terms import CostTerm, Yard
 from solidsph.costs.work import Work
 from solidsph.scene.scene_builder import SceneBuilder
 
@@ -209,7 +209,7 @@ def _run_with_outputs(simulation: Simulation, outputs: int, folder: str) -> floa
     return min(times)
 
 
-TERMS: Mapping[str, Callable[[Work], Iterable[Term]]] = {
+TERMS: Mapping[str, Callable[[Work], Iterable[CostTerm]]] = {
     "build": terms.build_terms,
     "compile": terms.compile_terms,
     "step": terms.step_terms,

@@ -15,8 +15,8 @@ from bodies import ARRANGEMENTS, CELLS
 from bodies import body as block
 
 from solidsph.engines.compiled.engine import CompiledEngine, CompiledForces
-from solidsph.engines.compiled.mismatch import MismatchSweeps
-from solidsph.interfaces.mismatch import MismatchOperator, MismatchProducts
+from solidsph.engines.compiled.hourglass_sweeps import HourglassSweeps
+from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassProducts
 from solidsph_builtin.effects.hourglass_control import penalised
 
 REPEATS = 15
@@ -47,12 +47,12 @@ def main() -> None:
             assert isinstance(engine, CompiledForces)
             rows = [("engine", engine.bytes, time.perf_counter() - begun)]
             actions: list[Callable[[], object]] = [lambda engine=engine, u=u: engine.forces(0.0, u)]
-            kinds: list[type[MismatchSweeps] | type[MismatchProducts]] = [MismatchSweeps]
+            kinds: list[type[HourglassSweeps] | type[HourglassProducts]] = [HourglassSweeps]
             if n < MOST_FOR_PRODUCTS:
-                kinds.append(MismatchProducts)
+                kinds.append(HourglassProducts)
             for kind in kinds:
                 begun = time.perf_counter()
-                penalty: MismatchOperator = kind.of(penalised(body, 0.3))
+                penalty: HourglassOperator = kind.of(penalised(body, 0.3))
                 rows.append((kind.__name__, penalty.bytes, time.perf_counter() - begun))
                 actions.append(lambda penalty=penalty, u=u: penalty.forces(u))
             for (what, size, made), ms in zip(rows, medians(actions), strict=True):

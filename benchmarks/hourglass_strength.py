@@ -134,13 +134,13 @@ def rough_modes(simulation: Simulation) -> Iterator[tuple[float, float]]:
 
     The first in units of shear speed over spacing, the second of the confined speed over it.
     """
-    particles, (body,) = simulation.particles, simulation.setting.bodies
+    particles, (body,) = simulation.particles, simulation.model.bodies
     n, d = particles.positions.shape
     K = tangent(simulation, np.zeros((n, d))).toarray()
-    control = HourglassControl(strength=1.0).bind(simulation.setting, "control")
+    control = HourglassControl(strength=1.0).bind(simulation.model, "control")
     penalty = control.stiffness(np.zeros((n, d))).toarray()  # type: ignore[attr-defined]
-    scaling = 1.0 / np.sqrt(np.repeat(simulation.setting.masses, d))
-    W = simulation.setting.smoothing_matrix()
+    scaling = 1.0 / np.sqrt(np.repeat(simulation.model.masses, d))
+    W = simulation.model.smoothing_matrix()
     sums = W.sum(axis=1)[:, None]
     spacing = float(particles.spacings[0])
     shear_speed = np.sqrt(body.material.lame_parameters[1] / body.material.density)
@@ -176,7 +176,7 @@ def spectra() -> Iterator[str]:
 
 def roughness(simulation: Simulation, values: Array) -> Array:
     """What smoothing takes from values (n, d), (n,)."""
-    W = simulation.setting.smoothing_matrix()
+    W = simulation.model.smoothing_matrix()
     return np.linalg.norm(values - W @ values / W.sum(axis=1)[:, None], axis=1)
 
 

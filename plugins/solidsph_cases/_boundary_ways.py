@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.interfaces.condition import MotionCondition, StressCondition
+from solidsph.interfaces.terms import Constraint, StressTerm
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph_builtin.boundaries.approximate_neumann import ApproximateNeumann
 from solidsph_builtin.boundaries.exact_dirichlet import ExactDirichlet
@@ -77,9 +77,9 @@ def _imposed(line: Line, kind: _Handler) -> Array:
     """By one of the handlers, which is told how f goes on beyond the ends."""
     field = {"x": lambda positions, time: F(positions[:, 0])}
     handler = kind(where="surface", displacement=field, extension=field)
-    values = np.asarray(F(line.setting.particles.positions), dtype=np.float64)
-    for condition in handler.bind(line.setting, "ends"):
-        if isinstance(condition, MotionCondition):
+    values = np.asarray(F(line.model.particles.positions), dtype=np.float64)
+    for condition in handler.bind(line.model, "ends"):
+        if isinstance(condition, Constraint):
             condition.impose(0.0, 0, values)
     result: Array = values[line.order, 0]
     return result
@@ -102,8 +102,8 @@ def _stress_imposed(line: Line, handler: BoundaryHandler) -> Array:
     """<f'> taken for the stress of the line."""
     stress = np.zeros((1, 1, len(line.X)))
     stress[0, 0, line.order] = line.gradient @ F(line.X)
-    for condition in handler.bind(line.setting, "ends"):
-        if isinstance(condition, StressCondition):
+    for condition in handler.bind(line.model, "ends"):
+        if isinstance(condition, StressTerm):
             condition.impose_stress(0.0, stress)
     result: Array = stress[0, 0, line.order]
     return result

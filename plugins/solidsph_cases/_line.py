@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 
 from solidsph.engines.matrix import operators
 from solidsph.errors import SceneError
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.simulation import Simulation
@@ -32,7 +32,7 @@ class Line:
     kernel: SmoothingKernel
     smoothing: csr_array  # (n, n), <f> = W f
     gradient: csr_array  # (n, n), <df/dX> = X_1 f [1/m]
-    setting: Setting  # of the same particles, in its own order
+    model: DiscreteModel  # of the same particles, in its own order
     order: Indices  # (n,) where they are in it
 
 
@@ -104,18 +104,18 @@ def line(
     )
     if "ghosts" in discretisation:
         builder = builder.boundary("ghost-extension")
-    setting = builder.build().setting
-    (body,) = setting.bodies
+    model = builder.build().model
+    (body,) = model.bodies
     # Ghosts come after all others.
-    order = np.argsort(setting.particles.positions[:, 0])
+    order = np.argsort(model.particles.positions[:, 0])
     return Line(
-        X=setting.particles.positions[order, 0],
-        real=~setting.particles.ghosts[order],
+        X=model.particles.positions[order, 0],
+        real=~model.particles.ghosts[order],
         spacing=spacing,
         kernel=body.smoothing,
-        smoothing=csr_array(setting.smoothing_matrix()[order][:, order]),
+        smoothing=csr_array(model.smoothing_matrix()[order][:, order]),
         gradient=csr_array(operators(body, body.pairs()).gradient[order][:, order]),
-        setting=setting,
+        model=model,
         order=order,
     )
 

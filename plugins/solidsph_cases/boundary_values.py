@@ -267,7 +267,7 @@ def _block_size(line: Line) -> int:
 
 
 def block_condition(line: Line) -> float:
-    """Condition number of W's block of the left end and the ghosts beyond it [-]."""
+    """Term number of W's block of the left end and the ghosts beyond it [-]."""
     count = _block_size(line)
     return float(np.linalg.cond(line.smoothing[:count, :count].toarray()))
 

@@ -150,7 +150,7 @@ class Upwinding(Case):
         for skew in self.skews:
             simulation = self._bar(skew, divergence)
             spacing = float(simulation.particles.spacings[0])
-            scale = spacing / simulation.setting.bodies[0].material.wave_speed
+            scale = spacing / simulation.model.bodies[0].material.wave_speed
             growths.append(scale * spectrum(simulation.dynamics, simulation.start()).growth_rate)
             own.append(scale * _alternating_frequency(simulation))
         return np.array(growths), np.array(own)
@@ -186,7 +186,7 @@ def _alternating_frequency(simulation: Simulation) -> float:
     signs = np.where(np.rint(X[:, 0] / spacing) % 2, -1.0, 1.0)[:, None]
     u = 1e-6 * spacing * signs
     a = simulation.dynamics.respond(0.0, X + u, np.zeros_like(X)).accelerations
-    reach = 2.0 * simulation.setting.bodies[0].smoothing.support_radius
+    reach = 2.0 * simulation.model.bodies[0].smoothing.support_radius
     inside = np.minimum(X, X.max() - X)[:, 0] > reach
     quotient = -float(np.vdot(u[inside], a[inside]) / np.vdot(u[inside], u[inside]))
     return float(np.sqrt(max(quotient, 0.0)))

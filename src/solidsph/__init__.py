@@ -30,8 +30,11 @@ from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Measurement
 
-carry_out = Simulation.run
-"""The run as a function: `carry_out(simulation)`."""
+solve = Simulation.run
+"""The run as a function: `solve(simulation)`."""
+
+carry_out = solve
+"""The former name of `solve`."""
 
 __all__ = [
     "BoundaryHandler",
@@ -64,4 +67,5 @@ __all__ = [
     "UnsoundError",
     "carry_out",
     "resume",
+    "solve",
 ]

@@ -16,7 +16,7 @@ from solidsph.results.recorder import COMPOSED, scene_text
 from solidsph.results.same import check_same_output, check_same_particles
 from solidsph.results.sole_writer import check_no_writer
 from solidsph.run.outcome import Result, is_over
-from solidsph.run.restart_point import Resumption
+from solidsph.run.restart_point import RestartPoint
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import MOST_STEPS
 from solidsph.simulation import Simulation
@@ -32,9 +32,9 @@ class Pending:
 
     path: Path
     simulation: Simulation
-    since: Resumption
+    since: RestartPoint
 
-    def carry_out(self, observers: Sequence[object] = ()) -> Result:
+    def solve(self, observers: Sequence[object] = ()) -> Result:
         """Go on to the end; the record is then what one run without a break would have left."""
         return self.simulation.run(record=self.path, observers=observers, since=self.since)
 
@@ -66,7 +66,7 @@ def resume(
     found = pending(Path(path), simulation=simulation, until=until, force=force)
     if found is None:
         raise RecordError(f"the run in {path} is over; give `until` to extend it")
-    return found.carry_out(observers)
+    return found.solve(observers)
 
 
 def pending(
@@ -100,9 +100,11 @@ def pending(
         if checkpoint is not None and usable:
             check_same_output(record, checkpoint, own, exactly=not force)
         if checkpoint is None or not usable:
-            return Pending(path, own, Resumption(notes=notes, repeats=not force))
+            return Pending(path, own, RestartPoint(notes=notes, repeats=not force))
         return Pending(
-            path, own, Resumption(checkpoint.state, checkpoint.kept, notes=notes, repeats=not force)
+            path,
+            own,
+            RestartPoint(checkpoint.state, checkpoint.kept, notes=notes, repeats=not force),
         )
 
 

@@ -15,7 +15,7 @@ from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.motion import run_motion, time_loop
 from solidsph.run.outcome import Result
-from solidsph.run.restart_point import Resumption
+from solidsph.run.restart_point import RestartPoint
 from solidsph.run.session import alone
 from solidsph.scene.scene import Scene
 from solidsph.watch.soundness import Soundness
@@ -48,7 +48,7 @@ class Simulation(BuiltScene):
         *,
         record: Path | str | None = None,
         observers: Sequence[object] = (),
-        since: Resumption | None = None,
+        since: RestartPoint | None = None,
     ) -> Result:
         """Run the scene: find the equilibrium if it has [statics], follow the motion if not.
 
@@ -80,7 +80,7 @@ class Simulation(BuiltScene):
         *,
         record: Path | str | None = None,
         observers: Sequence[object] = (),
-        since: Resumption | None = None,
+        since: RestartPoint | None = None,
     ) -> Result:
         """Advance from the start to the end of the duration, also a scene that has [statics].
 
@@ -99,7 +99,7 @@ class Simulation(BuiltScene):
         run: Callable[[Sequence[object]], Result],
         record: Path | str | None,
         observers: Sequence[object],
-        since: Resumption | None,
+        since: RestartPoint | None,
     ) -> Result:
         """Run with these observers, and with those that write the record if one is wanted."""
         with ExitStack() as stack:

@@ -14,8 +14,8 @@ import pytest
 from solidsph import Effect
 from solidsph.errors import BuildError, PartWarning, PluginError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import ForceCondition, Observation, StoringCondition
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.terms import Load, Observation, EnergyTerm
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.maths.arrays import Array, Indices
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph_builtin.materials.neo_hookean import NeoHookean
@@ -24,12 +24,12 @@ from tests.helpers.scenes import SOFT, box
 K = 1e3  # [N/m]
 
 
-class Load(ForceCondition):
+class Load(Load):
     """A force on every particle, of which subclasses say what it is."""
 
-    def __init__(self, label: str, setting: Setting) -> None:
+    def __init__(self, label: str, model: DiscreteModel) -> None:
         self._label = label
-        self.X, self.masses = setting.particles.positions, setting.masses
+        self.X, self.masses = model.particles.positions, model.masses
 
     @property
     def label(self) -> str:
@@ -43,7 +43,7 @@ class Load(ForceCondition):
         return {}
 
 
-class Floor(Load, StoringCondition):
+class Floor(Load, EnergyTerm):
     """Pushes what is below the lowest particles at rest: each of those just touches it."""
 
     def depth(self, positions: Array) -> Array:
@@ -56,7 +56,7 @@ class Floor(Load, StoringCondition):
         return np.asarray(0.5 * K * self.depth(observation.state.positions) ** 2)
 
 
-class Hertzian(Load, StoringCondition):
+class Hertzian(Load, EnergyTerm):
     """Springs whose force is a power of the extension, so that at rest they have no stiffness."""
 
     power = 3.0
@@ -71,7 +71,7 @@ class Hertzian(Load, StoringCondition):
         return np.asarray(energies.sum(axis=1))
 
 
-class Weight(Load, StoringCondition):
+class Weight(Load, EnergyTerm):
     """A potential that is no smallest at rest."""
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
@@ -121,7 +121,7 @@ class HalfTheHertzian(Hertzian):
         return 0.5 * super().energies(observation)
 
 
-class Turns(Load, StoringCondition):
+class Turns(Load, EnergyTerm):
     """A force across the displacement, which no energy has."""
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
@@ -171,10 +171,10 @@ class OtherNameLater(Counts):
 class Loaded(Effect):
     kind: type[Load]
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        return self.kind(label, setting)
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        return self.kind(label, model)
 
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
         return {}
 
     def damping_rate(self, bodies: Sequence[Body]) -> float:

@@ -124,7 +124,7 @@ def test_a_piece_that_is_thrown_away_keeps_its_kinetic_energy() -> None:
     for two_bodies in (False, True):
         simulation = thrown(two_bodies).build()
         state = simulation.run().state
-        kinetic = 0.5 * simulation.setting.masses @ np.sum(state.velocities**2, axis=1)
+        kinetic = 0.5 * simulation.model.masses @ np.sum(state.velocities**2, axis=1)
         # A block at rest in itself is accelerated by rounding alone.
         assert kinetic == pytest.approx(1500.0, rel=1e-10), KINETIC
 
@@ -316,7 +316,7 @@ def notched(**options: Any) -> SceneBuilder:
 
 
 def plate(builder: SceneBuilder) -> Body:
-    (body,) = builder.engine("matrix").build().setting.bodies
+    (body,) = builder.engine("matrix").build().model.bodies
     return body
 
 
@@ -387,7 +387,7 @@ def test_effects_do_not_act_across_a_gap(effect: dict[str, Any]) -> None:
         velocities=np.where(free[:, None], [-1.0, 0.5], 0.0) * np.ones_like(X),
     )
     response = built.dynamics.respond(0.0, start.positions, start.velocities)
-    forces = response.accelerations * built.setting.masses[:, None]
+    forces = response.accelerations * built.model.masses[:, None]
     assert np.abs(forces).max() < 1e-10 * SOFT["youngs_modulus"] * H
 
 

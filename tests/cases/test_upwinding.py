@@ -27,7 +27,7 @@ def test_the_case_comes_out_as_it_says(tmp_path: Path) -> None:
 
 
 def test_without_skew_it_is_the_corrected_gradient() -> None:
-    body = box(2, 6).build().setting.bodies[0]
+    body = box(2, 6).build().model.bodies[0]
     pairs = body.pairs()
     slopes = body.smoothing.gradient(pairs.offsets, pairs.distances)
     weights = [g.weights(pairs, slopes, body.particles.cells) for g in (Skewed(0.0), Corrected())]

@@ -104,7 +104,7 @@ def test_speeds_are_the_two_readings() -> None:
     assert PAPER.speed == pytest.approx(5000.0)
     for reading in READINGS:
         scene = WaveBar().scenes()[f"{reading.name}-smooth"]
-        (body,) = Simulation.builder(scene).build().setting.bodies
+        (body,) = Simulation.builder(scene).build().model.bodies
         assert body.material.wave_speed == pytest.approx(reading.speed)
 
 

@@ -30,9 +30,9 @@ from solidsph.costs.shares import shares, without
 from solidsph.costs.timed import timed
 from solidsph.costs.work import Loop, Piece
 from solidsph.errors import SceneError
-from solidsph.interfaces.condition import ForceCondition
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.operation_count import Way
+from solidsph.interfaces.terms import Load
 from solidsph.run.stable_step import largest_step
 from tests.commands.test_cli import solidsph
 from tests.helpers.scenes import SCENE_TOML, SOFT
@@ -114,7 +114,7 @@ def test_effects_add_the_pairs_that_they_visit() -> None:
     assert counted(viscous).visited == counted(plain).visited + PAIRS - 10
     held = counted(bar().effect("hourglass-control").build())
     assert held.visited > 3 * PAIRS  # the gradient's twice, and the nearest between
-    assert held.tally[-1].way is Way.MISMATCH_PRODUCTS
+    assert held.tally[-1].way is Way.HOURGLASS_PRODUCTS
 
 
 def test_counts_are_the_same_every_time(tmp_path: Path) -> None:
@@ -425,10 +425,10 @@ def test_a_prediction_is_never_why_a_run_fails() -> None:
 class Wind(Effect):
     """A third party's effect, of a kind that nobody has declared."""
 
-    def bind(self, setting, label: str) -> ForceCondition:
-        return _Blowing(label, np.arange(setting.particles.count))
+    def bind(self, model, label: str) -> Load:
+        return _Blowing(label, np.arange(model.particles.count))
 
-    def arrays(self, setting) -> Mapping[str, int]:
+    def arrays(self, model) -> Mapping[str, int]:
         return {"chosen": 80}
 
     def damping_rate(self, bodies: Sequence[object]) -> float:
@@ -439,7 +439,7 @@ class Wind(Effect):
 
 
 @attrs.frozen(eq=False)
-class _Blowing(ForceCondition):
+class _Blowing(Load):
     label: str
     particles: np.ndarray
 
@@ -487,8 +487,8 @@ def test_shares_are_of_what_the_effects_add() -> None:
     # The stable step is 2 over the sum of frequency and rates, of which damping has 9 1/s.
     viscous = bar().effect("artificial-viscosity").build()
     assert found["mass-damping"].step == pytest.approx(
-        largest_step(simulation.integrator, simulation.effects.values(), simulation.setting.bodies)
-        / largest_step(viscous.integrator, viscous.effects.values(), viscous.setting.bodies)
+        largest_step(simulation.integrator, simulation.effects.values(), simulation.model.bodies)
+        / largest_step(viscous.integrator, viscous.effects.values(), viscous.model.bodies)
     )
     assert found["v"].step < 0.9 < found["mass-damping"].step < 1.0
     assert without(simulation, "v").step_size == simulation.step_size

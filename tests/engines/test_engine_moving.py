@@ -182,7 +182,7 @@ class Listed(Kernel):
 )
 def test_agrees_for_every_kernel(kernel: str | Kernel) -> None:
     simulation = updated(2)
-    (body,) = simulation.setting.bodies
+    (body,) = simulation.model.bodies
     part = example_part("kernels", kernel) if isinstance(kernel, str) else kernel
     # Exactly two cells of the lattice: pairs at the edge of the support, to rounding.
     own = attrs.evolve(body, smoothing=smoothing_kernel(part, 2, 0.2))
@@ -290,7 +290,7 @@ def test_agrees_for_bodies_in_both_forms() -> None:
         )
         .build()
     )
-    one, other = simulation.setting.bodies
+    one, other = simulation.model.bodies
     total = attrs.evolve(other, formulation=example_part("formulations", "total-lagrangian"))
     reference = MatrixEngine().prepare([one, total], [])
     forces = CompiledEngine().prepare([one, total], [])
@@ -362,7 +362,7 @@ def test_memory_is_bounded() -> None:
 
 
 def test_bodies_keep_their_own_arrays() -> None:
-    bodies: list[Body] = [*updated(2).setting.bodies]
+    bodies: list[Body] = [*updated(2).model.bodies]
     one, other = (CompiledEngine().prepare(bodies, []) for _ in range(2))
     u = random_displacements(updated(2))
     first = one.forces(0.0, u)

@@ -17,9 +17,9 @@ from solidsph.engines.compiled.engine import CompiledEngine, CompiledForces
 from solidsph.engines.matrix import MatrixEngine, MatrixForces
 from solidsph.engines.select import AutomaticEngine, engine_named
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.engine import Engine, InternalForces
 from solidsph.interfaces.material import Material
+from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Mask, Scalar, Tensor
 from solidsph.registry import registry
 from solidsph.scene.scene_builder import SceneBuilder
@@ -73,9 +73,9 @@ def block(
     )
 
 
-def parts_of(simulation: Simulation) -> tuple[Sequence[Body], list[StressCondition]]:
-    stresses = [c for c in simulation.conditions if isinstance(c, StressCondition)]
-    return simulation.setting.bodies, stresses
+def parts_of(simulation: Simulation) -> tuple[Sequence[Body], list[StressTerm]]:
+    stresses = [c for c in simulation.terms if isinstance(c, StressTerm)]
+    return simulation.model.bodies, stresses
 
 
 def prepared(engine: Engine, simulation: Simulation) -> InternalForces:
@@ -312,7 +312,7 @@ def test_a_part_that_cannot_be_compiled_runs_on_the_matrix_engine() -> None:
 def test_scattered_ghosts_are_left_out_of_the_rows() -> None:
     """Rows are wanted of real particles, wherever the ghosts stand among them."""
     simulation = block(2, lengths=[0.8, 0.7]).build()
-    body = simulation.setting.bodies[0]
+    body = simulation.model.bodies[0]
     ghosts: Mask = np.arange(body.particles.count) % 5 == 2
     mixed = attrs.evolve(body, particles=attrs.evolve(body.particles, ghosts=ghosts))
     u = random_displacements(simulation)

@@ -12,9 +12,9 @@ from numba.core.config import NUMBA_NUM_THREADS
 from solidsph import DivergedError, Simulation
 from solidsph.engines.compiled import shares
 from solidsph.engines.compiled.loop import CompiledLoop
-from solidsph.interfaces.condition import ForceCondition, Observation
-from solidsph.interfaces.declared import PointwiseForce
+from solidsph.interfaces.compilable_terms import PointwiseLoad
 from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.terms import Load, Observation
 from solidsph.interfaces.time_loop import StepError
 from solidsph.maths.arrays import Array, Indices, Vector
 from solidsph.model.particles import State
@@ -250,12 +250,12 @@ def test_it_stops_at_the_step_that_goes_wrong() -> None:
 class Custom(Effect):
     """An effect of a third party: a condition on all particles, and nothing about any compiler."""
 
-    condition: type[ForceCondition]
+    condition: type[Load]
 
-    def bind(self, setting, label: str) -> ForceCondition:
-        return self.condition(label, setting.select("all"))
+    def bind(self, model, label: str) -> Load:
+        return self.condition(label, model.select("all"))
 
-    def arrays(self, setting) -> Mapping[str, int]:
+    def arrays(self, model) -> Mapping[str, int]:
         return {}
 
     def damping_rate(self, bodies) -> float:
@@ -266,7 +266,7 @@ class Custom(Effect):
 
 
 @attrs.frozen(eq=False)
-class Formula(PointwiseForce):
+class Formula(PointwiseLoad):
     """Springs, and a drag that is computed by way of infinity: 1/(1 + 1/0) is 0."""
 
     label: str
@@ -285,7 +285,7 @@ class Formula(PointwiseForce):
 
 
 @attrs.frozen(eq=False)
-class Opaque(ForceCondition):
+class Opaque(Load):
     """A force that is any code."""
 
     label: str

@@ -10,8 +10,8 @@ import numpy as np
 
 from solidsph import Discretisation, Effect, Particles, Shape
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import ForceCondition, Observation, StoringCondition
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import EnergyTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices, Tensor
 from solidsph.maths.tensors import scale
 from solidsph.scene.scene_builder import SceneBuilder
@@ -22,7 +22,7 @@ from tests.helpers.scenes import box
 
 
 @attrs.frozen(eq=False)
-class Springs(StoringCondition, ForceCondition):
+class Springs(EnergyTerm, Load):
     """A bed of springs: f = -k u."""
 
     label: str
@@ -95,11 +95,11 @@ class Bed(Effect):
     damping: Any = 0.0
     declared: float = 1.0  # of the frequency that is true
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        X = setting.particles.positions
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        X = model.particles.positions
         return self.kind(label, np.arange(len(X)), X, self.stiffness)
 
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
         return {}
 
     def damping_rate(self, bodies: Sequence[Body]) -> float:
@@ -112,12 +112,12 @@ class Bed(Effect):
 
 
 class BindsNothing(Bed):
-    def bind(self, setting: Setting, label: str) -> Any:
+    def bind(self, model: DiscreteModel, label: str) -> Any:
         return None
 
 
 class BindsText(Bed):
-    def bind(self, setting: Setting, label: str) -> Any:
+    def bind(self, model: DiscreteModel, label: str) -> Any:
         return "springs"
 
 

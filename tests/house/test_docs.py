@@ -6,7 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
-from solidsph import Scene, Simulation, carry_out
+from solidsph import Scene, Simulation, solve
 from solidsph.registry import registry
 
 ROOT = Path(__file__).parents[2]
@@ -30,7 +30,7 @@ def test_first_kernel_shows_the_example_plugin() -> None:
 def test_the_scenes_shown_can_be_built_and_the_static_one_run() -> None:
     moving, static = (Scene.from_toml(text) for text in blocks("docs/scenes.md", "toml"))
     assert Simulation.builder(moving).build().steps > 0
-    assert carry_out(Simulation.builder(static).build()).effort["residual [-]"] < 1e-9
+    assert solve(Simulation.builder(static).build()).effort["residual [-]"] < 1e-9
 
 
 def test_the_scenes_shown_are_sound() -> None:

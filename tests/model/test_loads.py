@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 import pytest
 
-from solidsph import BuildError, Simulation, carry_out
+from solidsph import BuildError, Simulation, solve
 from solidsph.advice import advised
 from solidsph.maths.arrays import Array
 from solidsph.scene.scene_builder import SceneBuilder
@@ -45,8 +45,8 @@ def loaded(builder: SceneBuilder, where: Any, axis: str = "y") -> Array:
 
 def reported(simulation: Simulation) -> dict[str, float]:
     """Everything that is reported of the equilibrium."""
-    observation = simulation.dynamics.observe(carry_out(simulation).state)
-    return {k: v for c in simulation.conditions for k, v in c.report(observation).items()}
+    observation = simulation.dynamics.observe(solve(simulation).state)
+    return {k: v for c in simulation.terms for k, v in c.report(observation).items()}
 
 
 # Ten particles a side, each of which owns 0.1 m of a face: the areas are counted in the comments.
@@ -178,7 +178,7 @@ def test_everything_else_takes_the_face_of_one_body() -> None:
         .build()
     )
     X = made.particles.positions
-    clamp, motion = made.dynamics.motions
+    clamp, motion = made.dynamics.constraints
     assert np.array_equal(clamp.held.any(axis=1), X[:, 0] < 0.1)
     assert np.array_equal(motion.held[:, 0], (X[:, 0] > 2.9) & (X[:, 1] > 0.1))
     upper = (X[:, 0] > 2.0) & (X[:, 1] > 0.7)
@@ -378,7 +378,7 @@ def test_a_pressure_tells_its_resultant_where_it_acts_now() -> None:
 def reported_at(simulation: Simulation, positions: Array) -> dict[str, float]:
     state = attrs.evolve(simulation.initial, positions=positions)
     observation = simulation.dynamics.observe(state)
-    return {k: v for c in simulation.conditions for k, v in c.report(observation).items()}
+    return {k: v for c in simulation.terms for k, v in c.report(observation).items()}
 
 
 def test_what_ghosts_hold_is_held() -> None:

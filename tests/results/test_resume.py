@@ -186,11 +186,11 @@ def test_an_equilibrium_goes_on(tmp_path: Path) -> None:
         .statics(load_steps=3)
     )
     whole, path = tmp_path / "whole.h5", tmp_path / "stopped.h5"
-    from solidsph import carry_out
+    from solidsph import solve
 
-    carry_out(builder.build(), record=whole)
+    solve(builder.build(), record=whole)
     with pytest.raises(KeyboardInterrupt):
-        carry_out(builder.build(), record=path, observers=[Stop(2)])
+        solve(builder.build(), record=path, observers=[Stop(2)])
     resume(path)
     assert_same_record(whole, path)
 
@@ -618,7 +618,7 @@ def test_a_finished_run_is_extended_from_its_end(tmp_path: Path, kept: bool) -> 
     found = pending(path, until=0.02)
     assert (found.since.state is not None) == kept
     assert not kept or found.since.state.time == pytest.approx(0.01, rel=1e-9)
-    found.carry_out([heard])
+    found.solve([heard])
     with Record(path) as record:
         assert record.count == 2 * OUTPUTS + 1
         assert record.times[-1] >= 0.02 * (1.0 - 1e-6)

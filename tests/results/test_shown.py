@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from solidsph import BuildError, Effect, Record
-from solidsph.interfaces.condition import (
-    FieldCondition,
-    ForceCondition,
+from solidsph.interfaces.terms import (
+    EnergyTerm,
+    FieldTerm,
+    Load,
     Observation,
-    StoringCondition,
 )
 from solidsph.scene.scene_builder import SceneBuilder
 from tests.helpers.scenes import box
@@ -35,7 +35,7 @@ COPPER = {
 
 
 @attrs.frozen
-class _Showing(FieldCondition, StoringCondition, ForceCondition):
+class _Showing(FieldTerm, EnergyTerm, Load):
     label: str
     shows: Mapping[str, int]
     reports: Mapping[str, float]
@@ -61,10 +61,10 @@ class Showing(Effect):
     shows: tuple[str, ...] = ()
     reports: tuple[str, ...] = ()
 
-    def bind(self, setting, label):
+    def bind(self, model, label):
         return _Showing(label, dict.fromkeys(self.shows, 1), dict.fromkeys(self.reports, 0.0))
 
-    def arrays(self, setting):
+    def arrays(self, model):
         return {}
 
     def damping_rate(self, bodies):

@@ -149,7 +149,7 @@ def test_a_scene_names_a_cover_only_if_it_has_one() -> None:
     assert "cover" not in toml
     scene = Scene.from_toml(toml)
     assert cover_of(scene) == 2.6
-    (body,) = Simulation.builder(scene).build().setting.bodies
+    (body,) = Simulation.builder(scene).build().model.bodies
     assert body.smoothing.support_radius == pytest.approx(2.6 * 0.033, rel=0.02)
     assert Scene.from_toml(bar("cubic-spline", 3.0).scene().to_toml()).cover == 3.0
 

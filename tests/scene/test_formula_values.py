@@ -71,7 +71,7 @@ def test_initial_values_and_places_count_comparisons() -> None:
     scene = box(1, 10).initial(velocity={"x": "(X > 0.3) + (X > 0.6)"})
     state = scene.build().initial
     assert state.velocities[:, 0].tolist() == [0, 0, 0, 1, 1, 1, 2, 2, 2, 2]  # at 0.05, 0.15 ...
-    chosen = box(1, 10).build().setting.select("(0.3 < X) + (X < 0.6) > 1")
+    chosen = box(1, 10).build().model.select("(0.3 < X) + (X < 0.6) > 1")
     assert chosen.tolist() == [3, 4, 5]
 
 

@@ -173,7 +173,7 @@ def test_two_bodies_that_touch_are_not_in_one_place() -> None:
         spacing=0.1,
     )
     simulation = builder.build()
-    bodies = simulation.setting.bodies
+    bodies = simulation.model.bodies
     assert [body.name for body in bodies] == ["block", "other"]
     assert simulation.particles.tags["left"].sum() == 6 + 10
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solidsph import BuildError, ConvergenceError, Record, Scene, SceneError, Simulation, carry_out
+from solidsph import BuildError, ConvergenceError, Record, Scene, SceneError, Simulation, solve
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.statics import equilibrium
 from solidsph.studies.case import Case
@@ -43,7 +43,7 @@ def test_toml_round_trip_and_the_builders_word() -> None:
 
 def test_it_records_every_load_step_of_the_equilibrium(tmp_path: Path) -> None:
     simulation = static_scene().build()
-    result = carry_out(simulation, record=tmp_path / "record.h5")
+    result = solve(simulation, record=tmp_path / "record.h5")
     expected = equilibrium(simulation, load_steps=3)
     assert np.array_equal(result.state.positions, expected.state.positions)
     assert result.effort["iterations"] == expected.iterations
@@ -64,8 +64,8 @@ def test_it_records_every_load_step_of_the_equilibrium(tmp_path: Path) -> None:
 
 def test_what_carries_out_a_scene_is_what_the_scene_says() -> None:
     moving = Simulation.builder(Scene.from_toml(SCENE_TOML)).build()
-    assert carry_out(moving).effort["steps"] == moving.steps
-    assert "iterations" in carry_out(static_scene().build()).effort
+    assert solve(moving).effort["steps"] == moving.steps
+    assert "iterations" in solve(static_scene().build()).effort
 
 
 def test_no_integrator_counts_as_used() -> None:
@@ -164,4 +164,4 @@ def test_a_case_may_hold_static_scenes_and_outlives_their_failure(tmp_path: Path
     assert pull.steps >= 2
     assert crush.outcome.startswith("no equilibrium beyond load factor")
     with pytest.raises(ConvergenceError):
-        carry_out(Simulation.builder(Scene.from_toml(CRUSHED_TOML)).build())
+        solve(Simulation.builder(Scene.from_toml(CRUSHED_TOML)).build())

@@ -14,7 +14,7 @@ from scipy.sparse import csr_array, diags_array
 
 from solidsph import SceneError, Simulation, SolidsphError
 from solidsph.errors import ConvergenceError
-from solidsph.interfaces.condition import ForceCondition, Observation
+from solidsph.interfaces.terms import Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.registry import registry
 from solidsph.run.energy import strain_energy
@@ -70,7 +70,7 @@ def test_tangent_is_minus_the_derivative_of_the_forces(
         .build()
     )
     u = shaken(simulation)
-    if not simulation.setting.bodies[0].material.smooth:
+    if not simulation.model.bodies[0].material.smooth:
         # Away from where fibres slacken: there the law has two tangents.
         u = u + 0.15 * simulation.particles.positions
     K = tangent(simulation, u)
@@ -121,7 +121,7 @@ def test_an_exact_dirichlet_condition_is_met_in_equilibrium() -> None:
     )
     result = equilibrium(simulation)
     moved = simulation.dynamics.observe(result.state)
-    walls = next(c for c in simulation.conditions if c.label == "walls")
+    walls = next(c for c in simulation.terms if c.label == "walls")
     assert walls.report(moved)["walls miss [m]"] < 1e-12
     assert result.residual < 1e-9
 
@@ -396,7 +396,7 @@ def test_two_bodies_are_as_each_alone() -> None:
 
 
 @attrs.frozen(eq=False)
-class Springs(ForceCondition):
+class Springs(Load):
     """Every particle on a spring to its own place."""
 
     label: str

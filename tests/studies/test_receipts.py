@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from solidsph import Scene, SceneError, Simulation
-from solidsph.interfaces.condition import ForceCondition
 from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.terms import Load
 from solidsph.registry.construct import construct
 from solidsph.studies.receipts import (
     FINISHED,
@@ -146,10 +146,10 @@ class Busy(Effect):
     clock: Clock
     seconds: float
 
-    def bind(self, setting: Any, label: str) -> ForceCondition:
+    def bind(self, model: Any, label: str) -> Load:
         return BusyForce(label, np.arange(1), self.clock, self.seconds)
 
-    def arrays(self, setting: Any) -> Mapping[str, int]:
+    def arrays(self, model: Any) -> Mapping[str, int]:
         return {}
 
     def damping_rate(self, bodies: Any) -> float:
@@ -160,7 +160,7 @@ class Busy(Effect):
 
 
 @attrs.frozen(eq=False)
-class BusyForce(ForceCondition):
+class BusyForce(Load):
     label: str
     particles: Any
     clock: Clock

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from solidsph import Particles, Shape
-from solidsph.interfaces.condition import FieldCondition, Observation
-from solidsph.interfaces.declared import PointwiseForce
+from solidsph.interfaces.compilable_terms import PointwiseLoad
 from solidsph.interfaces.shape import Surface
+from solidsph.interfaces.terms import FieldTerm, Observation
 from solidsph.maths.arrays import Array, Tensor, Vector
 from solidsph.promises.derived import overridden
 from solidsph.testing import checks
@@ -169,7 +169,7 @@ def test_each_lie_is_found_by_its_check(lie: str) -> None:
 
 
 @attrs.frozen(eq=False)
-class Shows(FieldCondition):
+class Shows(FieldTerm):
     name: str
     values: Any
     label: str = "shows"
@@ -204,7 +204,7 @@ def test_fields_are_such_as_a_record_can_hold(name: str, values: Any, told: str 
 
 
 @attrs.frozen(eq=False)
-class Formula(PointwiseForce):
+class Formula(PointwiseLoad):
     label: str = "formula"
     particles: Any = ()
     values: Any = ()
@@ -229,5 +229,5 @@ class Remembers(Formula):
 
 def test_what_a_kind_derives_is_not_overridden() -> None:
     assert overridden(Formula()) == ""
-    assert overridden(OtherForces()) == "OtherForces is a PointwiseForce, and overrides forces"
-    assert overridden(Remembers()) == "Remembers is a PointwiseForce, and overrides advance"
+    assert overridden(OtherForces()) == "OtherForces is a PointwiseLoad, and overrides forces"
+    assert overridden(Remembers()) == "Remembers is a PointwiseLoad, and overrides advance"

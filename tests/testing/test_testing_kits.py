@@ -27,19 +27,19 @@ from solidsph import (
     State,
 )
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import (
-    Condition,
-    FieldCondition,
-    ForceCondition,
-    MotionCondition,
-    Observation,
-    StressCondition,
-)
-from solidsph.interfaces.declared import PointwiseForce, ScheduledForce
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.compilable_terms import PointwiseLoad, ScheduledLoad
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.history import History
 from solidsph.interfaces.shape import Surface
+from solidsph.interfaces.terms import (
+    Constraint,
+    FieldTerm,
+    Load,
+    Observation,
+    StressTerm,
+    Term,
+)
 from solidsph.maths.arrays import Array, Indices, Mask, Scalar, Tensor, Vector
 from solidsph.maths.tensors import (
     add,
@@ -446,7 +446,7 @@ class LimitTooModest(GoodIntegrator):
 
 class NoMotionImposed(GoodIntegrator):
     def advance(self, state: State, dynamics: Dynamics, step_size: float) -> State:
-        return super().advance(state, attrs.evolve(dynamics, motions=[]), step_size)
+        return super().advance(state, attrs.evolve(dynamics, constraints=[]), step_size)
 
 
 class NoWork(GoodIntegrator):
@@ -871,7 +871,7 @@ DISCRETISATIONS = [
 
 
 @attrs.frozen(eq=False)
-class HeldInPlace(MotionCondition):
+class HeldInPlace(Constraint):
     label: str
     held: Mask
 
@@ -882,9 +882,9 @@ class HeldInPlace(MotionCondition):
         return {f"{self.label} count [-]": float(self.held.sum())}
 
 
-def held_left(setting: Setting) -> Mask:
-    held = np.zeros(setting.particles.positions.shape, dtype=np.bool_)
-    held[setting.select("left")] = True
+def held_left(model: DiscreteModel) -> Mask:
+    held = np.zeros(model.particles.positions.shape, dtype=np.bool_)
+    held[model.select("left")] = True
     return held
 
 
@@ -894,12 +894,12 @@ class GoodHandler(BoundaryHandler):
 
     condition: ClassVar[Any] = HeldInPlace
 
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
-        return [self.condition(label, held_left(setting))]
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
+        return [self.condition(label, held_left(model))]
 
 
 class BindsNothing(GoodHandler):
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         return []
 
 
@@ -937,14 +937,14 @@ class KeepsForces(Extension):
 
 
 class ForgetsGhosts(BoundaryHandler):
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
-        (right,) = GhostExtension().bind(setting, label)
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
+        (right,) = GhostExtension().bind(model, label)
         names = ("label", "ghosts", "shape", "displacement", "stress")
         return [KeepsForces(**{name: getattr(right, name) for name in names})]
 
 
 @attrs.frozen(eq=False)
-class NoStress(StressCondition):
+class NoStress(StressTerm):
     label: str
 
     def impose_stress(self, time: float, stress: Array) -> None:
@@ -955,12 +955,12 @@ class NoStress(StressCondition):
 
 
 class StressFree(BoundaryHandler):
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         return [NoStress(label)]
 
 
 @attrs.frozen(eq=False)
-class Push(ForceCondition):
+class Push(Load):
     """By how often it has been asked."""
 
     label: str
@@ -976,11 +976,11 @@ class Push(ForceCondition):
 
 
 class PushesMoreAndMore(BoundaryHandler):
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
-        return [Push(label, setting.select("left"))]
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
+        return [Push(label, model.select("left"))]
 
 
-class HeldWithFields(HeldInPlace, FieldCondition):
+class HeldWithFields(HeldInPlace, FieldTerm):
     def fields(self, observation: Observation) -> dict[str, Array]:
         return {"held [-]": np.full(len(self.held), np.nan)}
 
@@ -990,7 +990,7 @@ class ShowsNoNumbers(GoodHandler):
 
 
 @attrs.frozen(eq=False)
-class PushBySchedule(ScheduledForce):
+class PushBySchedule(ScheduledLoad):
     """Declares a force that follows from time alone, and forms its own."""
 
     label: str
@@ -1008,8 +1008,8 @@ class PushBySchedule(ScheduledForce):
 
 
 class PushesOtherwise(BoundaryHandler):
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
-        return [PushBySchedule(label, setting.select("left"), setting.particles.dimension)]
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
+        return [PushBySchedule(label, model.select("left"), model.particles.dimension)]
 
 
 BOUNDARIES = [
@@ -1028,7 +1028,7 @@ BOUNDARIES = [
 
 
 @attrs.frozen(eq=False)
-class Drag(ForceCondition):
+class Drag(Load):
     label: str
     particles: Indices
     resistance: Array  # (k, 1) [kg/s]
@@ -1046,11 +1046,11 @@ class GoodEffect(Effect):
 
     condition: ClassVar[Any] = Drag
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        return self.condition(label, np.arange(setting.particles.count), setting.masses[:, None])
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        return self.condition(label, np.arange(model.particles.count), model.masses[:, None])
 
-    def arrays(self, setting: Setting) -> dict[str, int]:
-        return {"resistance": setting.masses.nbytes}
+    def arrays(self, model: DiscreteModel) -> dict[str, int]:
+        return {"resistance": model.masses.nbytes}
 
     def damping_rate(self, bodies: Sequence[Body]) -> float:
         return 1.0
@@ -1060,8 +1060,8 @@ class GoodEffect(Effect):
 
 
 class OtherLabel(GoodEffect):
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        return super().bind(setting, "mine")
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        return super().bind(model, "mine")
 
 
 class DragInPlace(Drag):
@@ -1075,7 +1075,7 @@ class MovesParticles(GoodEffect):
 
 
 class NegativeSize(GoodEffect):
-    def arrays(self, setting: Setting) -> dict[str, int]:
+    def arrays(self, model: DiscreteModel) -> dict[str, int]:
         return {"resistance": -1}
 
 
@@ -1118,12 +1118,12 @@ class EffectWithoutUnits(GoodEffect):
 class LeavesItsMark(GoodEffect):
     """Makes every neo-Hookean material stiffer from now on."""
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
+    def bind(self, model: DiscreteModel, label: str) -> Load:
         stress = neo_hookean_stress
-        type(setting.bodies[0].material).first_piola = staticmethod(
+        type(model.bodies[0].material).first_piola = staticmethod(
             lambda F, params: scale(1.01, stress(F, params))
         )
-        return super().bind(setting, label)
+        return super().bind(model, label)
 
 
 neo_hookean_stress = NeoHookean.first_piola
@@ -1135,7 +1135,7 @@ def _mended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(NeoHookean, "first_piola", staticmethod(neo_hookean_stress))
 
 
-class DragWithFields(Drag, FieldCondition):
+class DragWithFields(Drag, FieldTerm):
     def fields(self, observation: Observation) -> dict[str, Array]:
         return {"drag [N]": np.zeros(len(self.particles) + 1)}
 
@@ -1145,7 +1145,7 @@ class ShowsOneMore(GoodEffect):
 
 
 @attrs.frozen(eq=False)
-class OwnForces(PointwiseForce):
+class OwnForces(PointwiseLoad):
     """Says by a formula what it does, and does something else."""
 
     label: str

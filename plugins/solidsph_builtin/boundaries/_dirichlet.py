@@ -17,8 +17,8 @@ from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from solidsph.errors import SceneError
-from solidsph.interfaces.condition import ExtensionCondition, Observation
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import GhostConstraint, Observation
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import Where
@@ -91,7 +91,7 @@ class KnownExtension(Extension):
 
 @final
 @attrs.frozen(eq=False)
-class SmoothedValue(ExtensionCondition):
+class SmoothedValue(GhostConstraint):
     """<u> = field(X, t) at the boundary particles.
 
     Components that the field does not have are reflected at the ghosts, and left free at the
@@ -174,7 +174,7 @@ class SmoothedValue(ExtensionCondition):
 
 
 def smoothed_value(
-    setting: Setting,
+    model: DiscreteModel,
     label: str,
     *,
     where: Where,
@@ -189,45 +189,45 @@ def smoothed_value(
     Raises:
         SceneError: nothing matches, or the equations of this solve have no unique solution.
     """
-    field = VectorField.of(displacement, f"{handler}: displacement", end=setting.end)
-    field.check_dimension(setting.particles.dimension, handler)
-    boundary = setting.select(where)
-    if setting.particles.ghosts[boundary].any():
+    field = VectorField.of(displacement, f"{handler}: displacement", end=model.end)
+    field.check_dimension(model.particles.dimension, handler)
+    boundary = model.select(where)
+    if model.particles.ghosts[boundary].any():
         raise SceneError(f"{handler}: where = {where!r} matches ghosts; name them under `ghosts`")
-    own_ghosts = chosen_ghosts(setting, ghosts, handler)
+    own_ghosts = chosen_ghosts(model, ghosts, handler)
     chosen = np.concatenate([boundary, own_ghosts])
-    smoothing = csr_array(setting.smoothing_matrix()[chosen])
+    smoothing = csr_array(model.smoothing_matrix()[chosen])
     return SmoothedValue(
         label=label,
-        positions=setting.particles.positions,
+        positions=model.particles.positions,
         boundary=boundary,
         ghosts=own_ghosts,
         field=field,
-        step_size=setting.step_size,
+        step_size=model.step_size,
         smoothing=smoothing,
-        extension=_extension(setting, own_ghosts, extension, field, handler),
-        reflection=reflected(setting.particles, own_ghosts),
+        extension=_extension(model, own_ghosts, extension, field, handler),
+        reflection=reflected(model.particles, own_ghosts),
         solve=solve(csr_array(smoothing[:, chosen]), len(boundary)),
     )
 
 
 def _extension(
-    setting: Setting,
+    model: DiscreteModel,
     ghosts: Indices,
     known: Mapping[str, Component] | None,
     field: VectorField,
     handler: str,
 ) -> Extension:
     if known is None:
-        return ReflectedExtension(reflected(setting.particles, ghosts))
-    beyond = VectorField.of(known, f"{handler}: extension", end=setting.end)
+        return ReflectedExtension(reflected(model.particles, ghosts))
+    beyond = VectorField.of(known, f"{handler}: extension", end=model.end)
     missing = set(field.components) - set(beyond.components)
     if missing:
         raise SceneError(
             f"{handler}: extension lacks component {COMPONENTS[min(missing)]!r}; give every "
             "component that displacement has"
         )
-    return KnownExtension(setting.particles.positions[ghosts], beyond, setting.step_size)
+    return KnownExtension(model.particles.positions[ghosts], beyond, model.step_size)
 
 
 def solved_transposed(factors: SuperLU, right: Array) -> Array:

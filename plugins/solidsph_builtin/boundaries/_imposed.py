@@ -8,9 +8,9 @@ from typing import final
 import attrs
 import numpy as np
 
-from solidsph.interfaces.condition import Observation
-from solidsph.interfaces.declared import ScheduledMotion
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.compilable_terms import ScheduledConstraint
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import VectorField
 from solidsph.model.particles import Face
@@ -20,7 +20,7 @@ from solidsph_builtin.boundaries._reports import reaction, stress_reaction
 
 @final
 @attrs.frozen(eq=False)
-class ImposedMotion(ScheduledMotion):
+class ImposedMotion(ScheduledConstraint):
     """u = field(X, t) on some particles, in the components that the field has."""
 
     label: str
@@ -55,27 +55,31 @@ class ImposedMotion(ScheduledMotion):
 
 
 def imposed_motion(
-    setting: Setting, label: str, indices: Indices, field: VectorField, where: Where | None = None
+    model: DiscreteModel,
+    label: str,
+    indices: Indices,
+    field: VectorField,
+    where: Where | None = None,
 ) -> ImposedMotion:
-    """Impose `field` on the particles `indices` of a setting, which are those at `where`."""
-    particles = setting.particles
+    """Impose `field` on the particles `indices` of a model, which are those at `where`."""
+    particles = model.particles
     by_stress = any(
         body.formulation.divergence.uses_ghost_stress and body.particles.ghosts.any()
-        for body in setting.bodies
+        for body in model.bodies
     )
     return ImposedMotion(
         label=label,
         indices=indices,
         positions=particles.positions,
         field=field,
-        step_size=setting.step_size,
-        stressed_face=_surface(setting, indices, where) if by_stress else None,
+        step_size=model.step_size,
+        stressed_face=_surface(model, indices, where) if by_stress else None,
     )
 
 
-def _surface(setting: Setting, indices: Indices, where: Where | None) -> Face:
+def _surface(model: DiscreteModel, indices: Indices, where: Where | None) -> Face:
     """The surface at `where`, or all that the particles `indices` own."""
     if where is None:
-        return Face(indices, setting.particles.area_vectors[indices])
-    pieces = setting.pieces()
+        return Face(indices, model.particles.area_vectors[indices])
+    pieces = model.pieces()
     return pieces.owned(pieces.at(where))

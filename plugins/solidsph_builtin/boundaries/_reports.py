@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import Face
 

@@ -11,8 +11,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU
 
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.interfaces.condition import Condition, Observation, StressCondition
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import Observation, StressTerm, Term
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import Where
@@ -40,15 +40,15 @@ class ApproximateNeumann(BoundaryHandler):
     traction: Mapping[str, Component]  # such as {x = 0, y = "-1e5"} [Pa]
     ghosts: Where = "ghosts"  # those whose stress may change with it
 
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
-        particles = setting.particles
-        field = VectorField.of(self.traction, "approximate-neumann: traction", end=setting.end)
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
+        particles = model.particles
+        field = VectorField.of(self.traction, "approximate-neumann: traction", end=model.end)
         field.check_dimension(particles.dimension, "approximate-neumann")
-        face = setting.surface(self.where)
+        face = model.surface(self.where)
         boundary, area_vectors = face.particles, face.area_vectors
-        ghosts = chosen_ghosts(setting, self.ghosts, "approximate-neumann")
+        ghosts = chosen_ghosts(model, self.ghosts, "approximate-neumann")
         normals = area_vectors / np.linalg.norm(area_vectors, axis=1)[:, None]
-        smoothing = csr_array(setting.smoothing_matrix()[boundary])
+        smoothing = csr_array(model.smoothing_matrix()[boundary])
         rows = csr_array(smoothing[:, np.concatenate([boundary, ghosts])])
         # Stress changes y_b (x) N_b W_bq: their products with N_c make the Gram matrix of normals.
         gram = csr_array((rows @ rows.T).multiply(csr_array(normals @ normals.T)))
@@ -71,7 +71,7 @@ class ApproximateNeumann(BoundaryHandler):
 
 @final
 @attrs.frozen(eq=False)
-class SmoothedTraction(StressCondition):
+class SmoothedTraction(StressTerm):
     """<P> N = field(X, t) at the boundary particles."""
 
     label: str

@@ -9,8 +9,8 @@ import attrs
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.interfaces.condition import Condition
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import Term
 from solidsph.model.fields import VectorField
 from solidsph.model.regions import Where
 from solidsph_builtin.boundaries._imposed import imposed_motion
@@ -25,8 +25,8 @@ class Clamp(BoundaryHandler):
     where: Where
     axes: Sequence[str] | None = None  # such as ["x", "y"]
 
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
-        names = COMPONENTS[: setting.particles.dimension]
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
+        names = COMPONENTS[: model.particles.dimension]
         wanted = names if self.axes is None else self.axes
         if isinstance(wanted, str) or not isinstance(wanted, Sequence) or not wanted:
             raise SceneError(
@@ -37,5 +37,5 @@ class Clamp(BoundaryHandler):
             if name not in names:
                 raise SceneError(f"clamp: unknown axis {name!r}; this scene has {', '.join(names)}")
         field = VectorField({names.index(name): 0.0 for name in axes})
-        indices = setting.select(self.where)
-        return [imposed_motion(setting, label, indices, field, self.where)]
+        indices = model.select(self.where)
+        return [imposed_motion(model, label, indices, field, self.where)]

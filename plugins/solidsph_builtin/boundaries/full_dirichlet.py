@@ -10,8 +10,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU
 
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.interfaces.condition import Condition
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import Term
 from solidsph.maths.arrays import Array
 from solidsph.model.fields import Component
 from solidsph.model.regions import Where
@@ -38,10 +38,10 @@ class FullDirichlet(BoundaryHandler):
     ghosts: Where = "ghosts"  # those that may change with them
     extension: Mapping[str, Component] | None = None  # ghosts' values, if known; else reflected
 
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         return [
             smoothed_value(
-                setting,
+                model,
                 label,
                 where=self.where,
                 ghosts=self.ghosts,

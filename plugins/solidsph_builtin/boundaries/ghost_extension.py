@@ -11,9 +11,9 @@ from scipy.sparse import csr_array
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.interfaces.condition import Condition, Observation
-from solidsph.interfaces.declared import LinearExtension
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.compilable_terms import LinearExtension
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import Observation, Term
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.regions import Where
 from solidsph_builtin.boundaries._images import interpolation, reflected
@@ -30,9 +30,9 @@ class GhostExtension(BoundaryHandler):
 
     where: Where = "ghosts"
 
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
-        particles = setting.particles
-        ghosts = chosen_ghosts(setting, self.where, "ghost-extension")
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
+        particles = model.particles
+        ghosts = chosen_ghosts(model, self.where, "ghost-extension")
         return [
             Extension(
                 label=label,
@@ -44,15 +44,15 @@ class GhostExtension(BoundaryHandler):
         ]
 
 
-def chosen_ghosts(setting: Setting, where: Where, handler: str) -> Indices:
+def chosen_ghosts(model: DiscreteModel, where: Where, handler: str) -> Indices:
     """The particles at `where`, all of which must be ghosts."""
-    if not setting.particles.ghosts.any():
+    if not model.particles.ghosts.any():
         raise SceneError(
             f"{handler}: the scene has no ghosts; give its discretisation some, such as "
             '{type = "lattice", ghosts = 3}'
         )
-    chosen = setting.select(where)
-    real = chosen[~setting.particles.ghosts[chosen]]
+    chosen = model.select(where)
+    real = chosen[~model.particles.ghosts[chosen]]
     if len(real):
         raise SceneError(
             f"{handler}: {len(real)} particles at where = {where!r} are not ghosts; "

@@ -8,8 +8,8 @@ from typing import final
 import attrs
 
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.interfaces.condition import Condition
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import Term
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import Where
 from solidsph_builtin.boundaries._imposed import imposed_motion
@@ -27,12 +27,10 @@ class PrescribedMotion(BoundaryHandler):
     where: Where
     displacement: Mapping[str, Component]  # such as {x = "0.1*t", y = 0} [m]
 
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
-        field = VectorField.of(
-            self.displacement, "prescribed-motion: displacement", end=setting.end
-        )
-        field.check_dimension(setting.particles.dimension, "prescribed-motion")
-        indices = setting.select(self.where)
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
+        field = VectorField.of(self.displacement, "prescribed-motion: displacement", end=model.end)
+        field.check_dimension(model.particles.dimension, "prescribed-motion")
+        indices = model.select(self.where)
         for axis in field.components:  # a formula out of its domain shows now, not in mid-run
-            field.values(axis, setting.particles.positions[indices], 0.0)
-        return [imposed_motion(setting, label, indices, field, self.where)]
+            field.values(axis, model.particles.positions[indices], 0.0)
+        return [imposed_motion(model, label, indices, field, self.where)]

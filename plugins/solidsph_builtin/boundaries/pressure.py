@@ -11,8 +11,8 @@ import numpy as np
 from scipy.sparse import block_diag, csr_array, diags_array, kron
 
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.interfaces.condition import Condition, Observation, SurfaceLoad
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import Observation, SurfaceLoad, Term
 from solidsph.maths.arrays import Array, Indices
 from solidsph.maths.tensors import cofactor, components_first, particles_first
 from solidsph.model.fields import Component, VectorField
@@ -37,11 +37,11 @@ class Pressure(BoundaryHandler):
     where: Where  # a face such as "inner", or a condition on the surface
     pressure: Component  # p such as "5e6*min(t/1e-3, 1)", positive when it pushes [Pa]
 
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
-        particles = setting.particles
-        in_the_reference(setting, "pressure")
-        field = VectorField.of({"x": self.pressure}, "pressure: pressure", end=setting.end)
-        face = setting.surface(self.where)
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
+        particles = model.particles
+        in_the_reference(model, "pressure")
+        field = VectorField.of({"x": self.pressure}, "pressure: pressure", end=model.end)
+        face = model.surface(self.where)
         field.values(0, particles.positions[face.particles], 0.0)
         return [
             FollowerLoad(
@@ -50,15 +50,15 @@ class Pressure(BoundaryHandler):
                 reference=particles.positions,
                 face=face,
                 field=field,
-                gradients=_gradients(setting, face.particles),
+                gradients=_gradients(model, face.particles),
             )
         ]
 
 
-def _gradients(setting: Setting, chosen: Indices) -> Sequence[csr_array]:
+def _gradients(model: DiscreteModel, chosen: Indices) -> Sequence[csr_array]:
     """From displacements of all to their derivatives at the chosen, (k, n) along each axis."""
-    blocks = [body_gradient(body).matrices.gradient for body in setting.bodies]
-    d = setting.particles.dimension
+    blocks = [body_gradient(body).matrices.gradient for body in model.bodies]
+    d = model.particles.dimension
     found = []
     for axis in range(d):
         rows = [one[axis * one.shape[1] : (axis + 1) * one.shape[1]] for one in blocks]

@@ -11,9 +11,9 @@ from scipy.sparse import csr_array
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.interfaces.condition import Condition, Observation
-from solidsph.interfaces.declared import LinearExtension
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.compilable_terms import LinearExtension
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import Observation, Term
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import VectorField
 from solidsph.registry.parameters import number
@@ -39,8 +39,8 @@ class Symmetry(BoundaryHandler):
     axis: str
     at: float = number(default=0.0)  # [m]
 
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
-        particles = setting.particles
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
+        particles = model.particles
         names = COMPONENTS[: particles.dimension]
         if self.axis not in names:
             raise SceneError(
@@ -48,10 +48,8 @@ class Symmetry(BoundaryHandler):
             )
         normal = names.index(self.axis)
         height = particles.positions[:, normal] - self.at
-        on_plane = np.flatnonzero(
-            ~particles.ghosts & (np.abs(height) < _on_plane_tolerance(setting))
-        )
-        beyond = _ghosts_of(setting, normal, self.at)
+        on_plane = np.flatnonzero(~particles.ghosts & (np.abs(height) < _on_plane_tolerance(model)))
+        beyond = _ghosts_of(model, normal, self.at)
         if not len(on_plane) and not len(beyond):
             raise SceneError(
                 f"symmetry: no particle lies on the plane {self.axis} = {self.at:.6g} m and no "
@@ -59,9 +57,9 @@ class Symmetry(BoundaryHandler):
                 "many as the cover and ghost_faces = [its name]; with gradient = 'consistent', "
                 "particles on the plane (on_boundary = true) do as well"
             )
-        conditions: list[Condition] = []
+        conditions: list[Term] = []
         if len(on_plane):
-            conditions.append(imposed_motion(setting, label, on_plane, VectorField({normal: 0.0})))
+            conditions.append(imposed_motion(model, label, on_plane, VectorField({normal: 0.0})))
         if len(beyond):
             X, images = particles.positions[beyond], particles.images[beyond]
             conditions.append(
@@ -71,21 +69,21 @@ class Symmetry(BoundaryHandler):
                     shape=particles.positions.shape,
                     images=interpolation(particles, images),
                     # Beyond a corner of two planes a ghost is mirrored in both.
-                    signs=np.where(np.abs(X - images) > _on_plane_tolerance(setting), -1.0, 1.0),
+                    signs=np.where(np.abs(X - images) > _on_plane_tolerance(model), -1.0, 1.0),
                     reports=not conditions,
                 )
             )
         return conditions
 
 
-def _on_plane_tolerance(setting: Setting) -> float:
-    return _ON_PLANE * float(setting.particles.spacings.min())
+def _on_plane_tolerance(model: DiscreteModel) -> float:
+    return _ON_PLANE * float(model.particles.spacings.min())
 
 
-def _ghosts_of(setting: Setting, normal: int, at: float) -> Indices:
+def _ghosts_of(model: DiscreteModel, normal: int, at: float) -> Indices:
     """Ghosts that are mirror images in the plane; beyond a corner, in the plane of least axis."""
-    particles = setting.particles
-    tolerance = _on_plane_tolerance(setting)
+    particles = model.particles
+    tolerance = _on_plane_tolerance(model)
     X, images = particles.positions, particles.images
     moved = np.abs(X - images) > tolerance
     mirrored_here = moved[:, normal] & (np.abs(0.5 * (X + images)[:, normal] - at) < tolerance)

@@ -9,9 +9,9 @@ import attrs
 import numpy as np
 
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.interfaces.condition import Condition, Observation, SurfaceLoad
-from solidsph.interfaces.declared import ScheduledForce
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.compilable_terms import ScheduledLoad
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import Observation, SurfaceLoad, Term
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField, scheduled_forces
 from solidsph.model.particles import Face
@@ -37,11 +37,11 @@ class Traction(BoundaryHandler):
     where: Where  # a face such as "right", or a condition on the surface
     traction: Mapping[str, Component]  # such as {x = "5e6*min(t/1e-3, 1)"} [Pa]
 
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
-        particles = setting.particles
-        field = VectorField.of(self.traction, "traction: traction", end=setting.end)
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
+        particles = model.particles
+        field = VectorField.of(self.traction, "traction: traction", end=model.end)
         field.check_dimension(particles.dimension, "traction")
-        face = setting.surface(self.where)
+        face = model.surface(self.where)
         indices = face.particles
         for axis in field.components:
             field.values(axis, particles.positions[indices], 0.0)
@@ -58,7 +58,7 @@ class Traction(BoundaryHandler):
 
 @final
 @attrs.frozen(eq=False)
-class DeadLoad(SurfaceLoad, ScheduledForce):
+class DeadLoad(SurfaceLoad, ScheduledLoad):
     """Traction times area on each surface particle."""
 
     label: str

@@ -11,11 +11,11 @@ import numpy as np
 from solidsph.engines.history import HistoryForces
 from solidsph.engines.matrix import MatrixForces, Operators, assembled, fixed_forces
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.engine import InternalForces, StressFields
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.law import Law, memory_name
 from solidsph.interfaces.operation_count import Tally
+from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs
 
@@ -131,7 +131,7 @@ class BreakingForces(InternalForces):
 
     bonds: Sequence[Bonds]
     laws: Sequence[Law]
-    conditions: Sequence[StressCondition]
+    conditions: Sequence[StressTerm]
     _flags: tuple[Array, ...] = ()
     _sums: MatrixForces | None = None
 

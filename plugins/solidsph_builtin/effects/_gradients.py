@@ -8,7 +8,7 @@ import numpy as np
 from solidsph.engines.matrix import Operators, operators
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.formulation import Configuration
 from solidsph.maths.arrays import Array
 
@@ -42,9 +42,9 @@ def body_gradient(body: Body) -> BodyGradient:
     return found
 
 
-def in_the_reference(setting: Setting, effect: str) -> None:
+def in_the_reference(model: DiscreteModel, effect: str) -> None:
     """Raise SceneError unless the formulations of all bodies have their pairs in the reference."""
-    for body in setting.bodies:
+    for body in model.bodies:
         if body.formulation.configuration is not Configuration.REFERENCE:
             raise SceneError(
                 f"{effect}: it is written in the reference configuration, but the formulation of "

@@ -10,11 +10,11 @@ import numpy as np
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import ForceCondition, Observation
-from solidsph.interfaces.declared import PairForce, PairTable
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.compilable_terms import PairLoad, PairTable
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.formulation import Configuration
+from solidsph.interfaces.terms import Load, Observation
 from solidsph.maths.arrays import Scalar, Vector
 from solidsph.maths.tensors import dot
 from solidsph.registry.parameters import number
@@ -61,15 +61,15 @@ class ArtificialViscosity(Effect):
         if self.linear == self.quadratic == 0.0:
             raise SceneError("artificial-viscosity: both strengths are 0; leave the effect out")
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        for body in setting.bodies:
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        for body in model.bodies:
             if body.formulation.configuration is not Configuration.REFERENCE:
                 raise SceneError(
                     "artificial-viscosity: its pairs are those of the reference configuration, but "
                     f"the formulation of body {body.name!r} follows the motion; use "
                     "'total-lagrangian'"
                 )
-        tables = [self._table(body) for body in setting.bodies]
+        tables = [self._table(body) for body in model.bodies]
         firsts = np.cumsum([0, *(len(table.columns) for table in tables)])
         return _Viscosity(
             label,
@@ -80,7 +80,7 @@ class ArtificialViscosity(Effect):
                 columns=np.concatenate(
                     [
                         t.columns + body.extent.start
-                        for t, body in zip(tables, setting.bodies, strict=True)
+                        for t, body in zip(tables, model.bodies, strict=True)
                     ]
                 ).astype(np.int32),
                 values=np.concatenate([table.values for table in tables]),
@@ -108,8 +108,8 @@ class ArtificialViscosity(Effect):
             ),
         )
 
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
-        tables = [self._table(body) for body in setting.bodies]
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
+        tables = [self._table(body) for body in model.bodies]
         return {"pairs": sum(t.starts.nbytes + t.columns.nbytes + t.values.nbytes for t in tables)}
 
     def damping_rate(self, bodies: Sequence[Body]) -> float:
@@ -136,7 +136,7 @@ class ArtificialViscosity(Effect):
 
 @final
 @attrs.frozen(eq=False)
-class _Viscosity(PairForce):
+class _Viscosity(PairLoad):
     label: str
     pairs: PairTable
 

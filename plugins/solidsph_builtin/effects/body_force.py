@@ -8,10 +8,10 @@ from typing import ClassVar, final
 import attrs
 
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import ForceCondition, Observation
-from solidsph.interfaces.declared import ScheduledForce
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.compilable_terms import ScheduledLoad
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.terms import Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField, scheduled_forces
 from solidsph.model.regions import Where
@@ -27,21 +27,21 @@ class BodyForce(Effect):
     acceleration: Mapping[str, Component]  # b such as {y = -9.81} [m/s^2]
     where: Where = "all"
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        field = VectorField.of(self.acceleration, "body-force: acceleration", end=setting.end)
-        field.check_dimension(setting.particles.dimension, "body-force")
-        indices = setting.select(self.where)
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        field = VectorField.of(self.acceleration, "body-force: acceleration", end=model.end)
+        field.check_dimension(model.particles.dimension, "body-force")
+        indices = model.select(self.where)
         return _MassTimesField(
             label=label,
             particles=indices,
-            positions=setting.particles.positions[indices],
-            masses=setting.masses[indices],
+            positions=model.particles.positions[indices],
+            masses=model.masses[indices],
             field=field,
         )
 
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
-        count = len(setting.select(self.where))
-        d = setting.particles.dimension
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
+        count = len(model.select(self.where))
+        d = model.particles.dimension
         return {"chosen particles": 8 * count, "positions": 8 * count * d, "masses": 8 * count}
 
     def damping_rate(self, bodies: Sequence[Body]) -> float:
@@ -53,7 +53,7 @@ class BodyForce(Effect):
 
 @final
 @attrs.frozen(eq=False)
-class _MassTimesField(ScheduledForce):
+class _MassTimesField(ScheduledLoad):
     label: str
     particles: Indices  # (k,)
     positions: Array  # (k, d) reference positions

@@ -11,16 +11,16 @@ import numpy as np
 from solidsph.engines.history import ArrayLaw
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import (
-    FieldCondition,
-    ForceCondition,
-    Observation,
-    StressCondition,
-)
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.gradient import PointwiseGradient
+from solidsph.interfaces.terms import (
+    FieldTerm,
+    Load,
+    Observation,
+    StressTerm,
+)
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.regions import Where
 from solidsph.registry.parameters import check_positive, number
@@ -63,22 +63,22 @@ class BondFailure(Effect):
             "bond-failure", "critical_stretch", self.critical_stretch, "parts of the first distance"
         )
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        return _Cracks(label, self._bonds(setting), setting.particles.count)
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        return _Cracks(label, self._bonds(model), model.particles.count)
 
     def within(
-        self, internal: InternalForces, setting: Setting, conditions: Sequence[StressCondition]
+        self, internal: InternalForces, model: DiscreteModel, conditions: Sequence[StressTerm]
     ) -> InternalForces:
         if isinstance(internal, BreakingForces):
             raise SceneError(
                 "bond-failure: it is named twice, and a bond fails once; give it one "
                 "critical_stretch, and places by `where`"
             )
-        laws = [ArrayLaw(body) for body in setting.bodies]
-        return BreakingForces(self._bonds(setting), laws, conditions)
+        laws = [ArrayLaw(body) for body in model.bodies]
+        return BreakingForces(self._bonds(model), laws, conditions)
 
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
-        return {f"bonds of {one.body.name}": one.bytes for one in self._bonds(setting)}
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
+        return {f"bonds of {one.body.name}": one.bytes for one in self._bonds(model)}
 
     def damping_rate(self, bodies: Sequence[Body]) -> float:
         return 0.0
@@ -89,12 +89,12 @@ class BondFailure(Effect):
     def pair_work(self, particles: float, pairs: float) -> float:
         return pairs
 
-    def _bonds(self, setting: Setting) -> Sequence[Bonds]:
-        in_the_reference(setting, "bond-failure")
-        chosen = np.zeros(setting.particles.count, dtype=np.bool_)
-        chosen[setting.select(self.where)] = True
+    def _bonds(self, model: DiscreteModel) -> Sequence[Bonds]:
+        in_the_reference(model, "bond-failure")
+        chosen = np.zeros(model.particles.count, dtype=np.bool_)
+        chosen[model.select(self.where)] = True
         found = []
-        for body in setting.bodies:
+        for body in model.bodies:
             gradient = body.formulation.gradient
             if not isinstance(gradient, PointwiseGradient):
                 raise SceneError(
@@ -111,7 +111,7 @@ class BondFailure(Effect):
 
 @final
 @attrs.frozen(eq=False)
-class _Cracks(FieldCondition, ForceCondition):
+class _Cracks(FieldTerm, Load):
     """Adds no force of its own; it shows what has failed."""
 
     label: str

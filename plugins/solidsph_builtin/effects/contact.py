@@ -12,15 +12,15 @@ import numpy as np
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import (
-    FieldCondition,
-    ForceCondition,
-    Observation,
-    StoringCondition,
-)
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
+from solidsph.interfaces.terms import (
+    EnergyTerm,
+    FieldTerm,
+    Load,
+    Observation,
+)
 from solidsph.maths.arrays import Array, Indices
 from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.effects._crowding import (
@@ -114,8 +114,8 @@ class Contact(Effect):
                 raise SceneError(_not_pairs(self.between))
             object.__setattr__(self, "between", pairs)
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        meetings = [self._meeting(one, other) for one, other in self._who(setting.bodies)]
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        meetings = [self._meeting(one, other) for one, other in self._who(model.bodies)]
         return _Contact(
             label=label,
             particles=np.unique(np.concatenate([one.particles for one in meetings])),
@@ -123,10 +123,10 @@ class Contact(Effect):
             friction=self.friction,
         )
 
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
-        d = setting.particles.dimension
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
+        d = model.particles.dimension
         found: dict[str, int] = {}
-        for one, other in self._who(setting.bodies):
+        for one, other in self._who(model.bodies):
             meeting = self._meeting(one, other)
             count = len(meeting.particles)
             found[f"sites of {meeting.name}"] = 41 * count
@@ -180,7 +180,7 @@ class Contact(Effect):
 
 @final
 @attrs.frozen(eq=False)
-class _Contact(StoringCondition, FieldCondition, ForceCondition):
+class _Contact(EnergyTerm, FieldTerm, Load):
     label: str
     particles: Indices  # (k,)
     meetings: Sequence[Meeting]

@@ -10,9 +10,9 @@ import numpy as np
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import ForceCondition, Observation
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.terms import Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.registry.parameters import number
 from solidsph.run.stable_step import lattice_frequency
@@ -49,16 +49,16 @@ class DynamicRelaxation(Effect):
                 "critical"
             )
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
+    def bind(self, model: DiscreteModel, label: str) -> Load:
         return _Relaxation(
             label=label,
-            masses=setting.masses,
+            masses=model.masses,
             damping=self.damping,
-            highest_rate=self.damping_rate(setting.bodies),
+            highest_rate=self.damping_rate(model.bodies),
         )
 
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
-        n, d = setting.particles.positions.shape
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
+        n, d = model.particles.positions.shape
         return {"masses": 8 * n, "first step": 2 * 8 * n * d, "last velocity": 8 * n * d}
 
     def damping_rate(self, bodies: Sequence[Body]) -> float:
@@ -70,7 +70,7 @@ class DynamicRelaxation(Effect):
 
 @final
 @attrs.frozen(eq=False)
-class _Relaxation(ForceCondition):
+class _Relaxation(Load):
     label: str
     masses: Array  # (n,) [kg]
     damping: float

@@ -13,11 +13,11 @@ from scipy.sparse import csr_array, diags_array
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import FieldCondition, ForceCondition, Observation
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.material import Material
+from solidsph.interfaces.terms import FieldTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices, Tensor
 from solidsph.maths.tensors import particles_first
 from solidsph.model.fields import Component, VectorField
@@ -83,20 +83,20 @@ class Heat(Effect):
                 f"times {self.largest:g} K; metals have some 1e-5 1/K"
             )
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        in_the_reference(setting, "heat")
-        for body in setting.bodies:
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        in_the_reference(model, "heat")
+        for body in model.bodies:
             if self.expansion and isinstance(body.material, HistoryMaterial):
                 raise SceneError(
                     f"heat: the swelling of body {body.name!r} needs a material that is a formula "
                     f"of F, and {type(body.material).__name__} remembers; set expansion = 0, or "
                     "take another material"
                 )
-        X = setting.particles.positions
+        X = model.particles.positions
         held = [
             (
-                setting.select(where),
-                VectorField.of({"x": value}, "heat: held.temperature", end=setting.end),
+                model.select(where),
+                VectorField.of({"x": value}, "heat: held.temperature", end=model.end),
             )
             for where, value in self.held
         ]
@@ -105,26 +105,26 @@ class Heat(Effect):
         return _Conduction(
             label=label,
             reference=X,
-            conduction=_conduction(setting.bodies, self.conductivity),
-            capacities=self.heat_capacity * setting.masses,
-            volumes=np.where(setting.particles.ghosts, 0.0, setting.particles.volumes),
+            conduction=_conduction(model.bodies, self.conductivity),
+            capacities=self.heat_capacity * model.masses,
+            volumes=np.where(model.particles.ghosts, 0.0, model.particles.volumes),
             expansion=self.expansion,
             start=start.values(0, X, 0.0),
-            source=VectorField.of({"x": self.source}, "heat: source", end=setting.end),
+            source=VectorField.of({"x": self.source}, "heat: source", end=model.end),
             held=held,
-            gradients=[body_gradient(b) for b in setting.bodies] if self.expansion else [],
+            gradients=[body_gradient(b) for b in model.bodies] if self.expansion else [],
         )
 
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
-        in_the_reference(setting, "heat")
-        K = _conduction(setting.bodies, self.conductivity)
-        n = setting.particles.count
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
+        in_the_reference(model, "heat")
+        K = _conduction(model.bodies, self.conductivity)
+        n = model.particles.count
         kept = {"conduction": K.data.nbytes + K.indices.nbytes + K.indptr.nbytes}
         kept |= {"temperature": 8 * n, "capacities": 8 * n}
         if self.expansion:
             kept |= {
                 f"gradient of {body.name}": body_gradient(body).matrices.bytes
-                for body in setting.bodies
+                for body in model.bodies
             }
         return kept
 
@@ -161,7 +161,7 @@ def _conduction(bodies: Sequence[Body], conductivity: float) -> csr_array:
 
 @final
 @attrs.frozen(eq=False)
-class _Conduction(FieldCondition, ForceCondition):
+class _Conduction(FieldTerm, Load):
     label: str
     reference: Array  # X (n, d)
     conduction: csr_array  # K (n, n) [W/K]

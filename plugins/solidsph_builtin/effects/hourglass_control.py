@@ -8,20 +8,20 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.engines.select import mismatch_operator
+from solidsph.engines.select import hourglass_operator
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import (
-    FieldCondition,
-    ForceCondition,
-    Observation,
-    StoringCondition,
-)
-from solidsph.interfaces.declared import MismatchForce
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.compilable_terms import HourglassLoad
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.formulation import Configuration
-from solidsph.interfaces.mismatch import Mismatch, MismatchOperator
+from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassPairs
+from solidsph.interfaces.terms import (
+    EnergyTerm,
+    FieldTerm,
+    Load,
+    Observation,
+)
 from solidsph.maths.arrays import Array
 from solidsph.registry.parameters import check_positive, number
 
@@ -67,8 +67,8 @@ class HourglassControl(Effect):
     def __attrs_post_init__(self) -> None:
         check_positive("hourglass-control", "strength", self.strength, "times mu, near 0.5")
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        for body in setting.bodies:
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        for body in model.bodies:
             if body.formulation.configuration is not Configuration.REFERENCE:
                 raise SceneError(
                     "hourglass-control: it is written in the reference configuration, but the "
@@ -76,14 +76,13 @@ class HourglassControl(Effect):
                 )
         return _Control(
             label=label,
-            reference=setting.particles.positions,
-            operators=[_operator(body, self.strength) for body in setting.bodies],
+            reference=model.particles.positions,
+            operators=[_operator(body, self.strength) for body in model.bodies],
         )
 
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
         return {
-            f"penalty of {body.name}": _operator(body, self.strength).bytes
-            for body in setting.bodies
+            f"penalty of {body.name}": _operator(body, self.strength).bytes for body in model.bodies
         }
 
     def damping_rate(self, bodies: Sequence[Body]) -> float:
@@ -98,16 +97,16 @@ class HourglassControl(Effect):
         return 2.0 * pairs + min(pairs, 26.0 * particles)
 
 
-def _operator(body: Body, strength: float) -> MismatchOperator:
+def _operator(body: Body, strength: float) -> HourglassOperator:
     # The step is chosen before the term is bound: what is made for one serves the other.
     key = (HourglassControl, strength)
     if key not in body.made:
-        body.made[key] = mismatch_operator(penalised(body, strength))
-    operator: MismatchOperator = body.made[key]
+        body.made[key] = hourglass_operator(penalised(body, strength))
+    operator: HourglassOperator = body.made[key]
     return operator
 
 
-def penalised(body: Body, strength: float) -> Mismatch:
+def penalised(body: Body, strength: float) -> HourglassPairs:
     """Near pairs with c_ab = strength mu V_a V_b W(X_ab) / |X_ab|^2; ghosts have none."""
     particles = body.particles
     pairs = body.pairs(_reach(body))
@@ -118,7 +117,7 @@ def penalised(body: Body, strength: float) -> Mismatch:
     _, mu = body.material.lame_parameters
     V = particles.volumes
     weights[apart] = strength * mu * (V[a] * V[b]) * body.smoothing.value(r) / r**2
-    return Mismatch.of(body, pairs, weights)
+    return HourglassPairs.of(body, pairs, weights)
 
 
 def _reach(body: Body) -> float:
@@ -131,10 +130,10 @@ def _reach(body: Body) -> float:
 
 @final
 @attrs.frozen(eq=False)
-class _Control(MismatchForce, FieldCondition, StoringCondition):
+class _Control(HourglassLoad, FieldTerm, EnergyTerm):
     label: str
     reference: Array  # (n, d)
-    operators: Sequence[MismatchOperator]
+    operators: Sequence[HourglassOperator]
 
     def energies(self, observation: Observation) -> Array:
         """The penalty's energy, particle by particle, (n,) [J]: half of each pair's."""
@@ -147,7 +146,7 @@ class _Control(MismatchForce, FieldCondition, StoringCondition):
         u = observation.state.positions - self.reference
         H = observation.deformation_gradients - np.eye(u.shape[1])
         squares = [
-            one.mismatch.squares(u[one.mismatch.body.extent], H[one.mismatch.body.extent])
+            one.pairs.squares(u[one.pairs.body.extent], H[one.pairs.body.extent])
             for one in self.operators
         ]
         return 0.25 * np.concatenate(squares)
@@ -175,13 +174,13 @@ class _Control(MismatchForce, FieldCondition, StoringCondition):
         own = self.energies(observation)
         share, error = np.zeros_like(own), np.zeros_like(own)
         V = np.where(observation.particles.ghosts, 0.0, observation.particles.volumes)
-        for mismatch in (one.mismatch for one in self.operators):
-            extent = mismatch.body.extent
+        for pairs in (one.pairs for one in self.operators):
+            extent = pairs.body.extent
             density, volumes = observation.energy_densities[extent], V[extent]
             strain = volumes * np.maximum(density, volumes @ density / volumes.sum())
-            near = mismatch.moments > 0.0
+            near = pairs.moments > 0.0
             # The root of the weighted mean of squares.
-            error[extent][near] = np.sqrt(4.0 * own[extent][near] / mismatch.moments[near])
+            error[extent][near] = np.sqrt(4.0 * own[extent][near] / pairs.moments[near])
             moving = error[extent] > _AT_REST
             share[extent][moving] = own[extent][moving] / (own[extent] + strain)[moving]
         return {f"{self.label} share [-]": share, f"{self.label} error [-]": error}

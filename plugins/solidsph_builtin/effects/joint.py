@@ -13,10 +13,10 @@ from scipy.spatial import cKDTree
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import ForceCondition, Observation, StoringCondition
-from solidsph.interfaces.declared import PairForce, PairTable
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.compilable_terms import PairLoad, PairTable
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.terms import EnergyTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices, Scalar, Vector
 from solidsph.maths.tensors import dot
 from solidsph.registry.parameters import number
@@ -57,12 +57,12 @@ class Joint(Effect):
                 f"joint: between must name two bodies at least, got {list(self.between)}"
             )
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        springs = self._springs(setting.bodies)
-        return _Springs(label, springs.table(setting.particles.count), setting.particles.positions)
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        springs = self._springs(model.bodies)
+        return _Springs(label, springs.table(model.particles.count), model.particles.positions)
 
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
-        table = self._springs(setting.bodies).table(setting.particles.count)
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
+        table = self._springs(model.bodies).table(model.particles.count)
         return {"springs": table.starts.nbytes + table.columns.nbytes + table.values.nbytes}
 
     def damping_rate(self, bodies: Sequence[Body]) -> float:
@@ -172,7 +172,7 @@ def _squares(ends: Indices, directions: Array, count: int) -> Array:
 
 @final
 @attrs.frozen(eq=False)
-class _Springs(PairForce, StoringCondition):
+class _Springs(PairLoad, EnergyTerm):
     label: str
     pairs: PairTable
     reference: Array  # X (n, d)

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import ForceCondition, Observation
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.terms import Load, Observation
 from solidsph.maths.arrays import Array, Indices, Tensor
 from solidsph.maths.tensors import add, identity, product, scale, trace, transpose
 from solidsph.registry.parameters import check_positive, number
@@ -42,20 +42,19 @@ class KelvinVoigt(Effect):
     def __attrs_post_init__(self) -> None:
         check_positive("kelvin-voigt", "time", self.time, "s, or leave the effect out")
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        in_the_reference(setting, "kelvin-voigt")
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        in_the_reference(model, "kelvin-voigt")
         return _Dashpot(
             label,
-            setting.particles.positions,
+            model.particles.positions,
             self.time,
-            [body_gradient(body) for body in setting.bodies],
+            [body_gradient(body) for body in model.bodies],
         )
 
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
-        in_the_reference(setting, "kelvin-voigt")
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
+        in_the_reference(model, "kelvin-voigt")
         return {
-            f"gradient of {body.name}": body_gradient(body).matrices.bytes
-            for body in setting.bodies
+            f"gradient of {body.name}": body_gradient(body).matrices.bytes for body in model.bodies
         }
 
     def damping_rate(self, bodies: Sequence[Body]) -> float:
@@ -105,7 +104,7 @@ def _viscous_stress(body: Body, rate: Tensor) -> Tensor:
 
 @final
 @attrs.frozen(eq=False)
-class _Dashpot(ForceCondition):
+class _Dashpot(Load):
     label: str
     reference: Array  # X (n, d)
     time: float

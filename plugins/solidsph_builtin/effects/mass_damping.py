@@ -8,10 +8,10 @@ from typing import ClassVar, final
 import attrs
 
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import ForceCondition, Observation
-from solidsph.interfaces.declared import PointwiseForce
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.compilable_terms import PointwiseLoad
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.terms import Load, Observation
 from solidsph.maths.arrays import Array, Indices, Vector
 from solidsph.maths.tensors import scaled
 from solidsph.model.regions import Where
@@ -31,12 +31,12 @@ class MassDamping(Effect):
     def __attrs_post_init__(self) -> None:
         check_positive("mass-damping", "rate", self.rate, "1/s, or leave the effect out")
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        indices = setting.select(self.where)
-        return _Drag(label, indices, self.rate * setting.masses[indices, None])
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        indices = model.select(self.where)
+        return _Drag(label, indices, self.rate * model.masses[indices, None])
 
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
-        count = len(setting.select(self.where))
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
+        count = len(model.select(self.where))
         return {"chosen particles": 8 * count, "drag": 8 * count}
 
     def damping_rate(self, bodies: Sequence[Body]) -> float:
@@ -48,7 +48,7 @@ class MassDamping(Effect):
 
 @final
 @attrs.frozen(eq=False)
-class _Drag(PointwiseForce):
+class _Drag(PointwiseLoad):
     label: str
     particles: Indices  # (k,)
     values: Array  # c m, (k, 1) [kg/s]

@@ -12,14 +12,14 @@ from scipy.sparse import bsr_array, csr_array
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import (
-    FieldCondition,
-    ForceCondition,
-    Observation,
-    StoringCondition,
-)
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.terms import (
+    EnergyTerm,
+    FieldTerm,
+    Load,
+    Observation,
+)
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import AXES, Where
@@ -76,19 +76,19 @@ class RigidWall(Effect):
         if not any(self.normal.values()):
             raise SceneError("rigid-wall: the normal has no length; give it one, such as {y = 1}")
 
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
-        particles, d = setting.particles, setting.particles.dimension
+    def bind(self, model: DiscreteModel, label: str) -> Load:
+        particles, d = model.particles, model.particles.dimension
         normal = _vector("normal", self.normal, d)
-        indices = setting.select(self.where)
+        indices = model.select(self.where)
         field = None
         if self.displacement is not None:
-            field = VectorField.of(self.displacement, "rigid-wall: displacement", end=setting.end)
+            field = VectorField.of(self.displacement, "rigid-wall: displacement", end=model.end)
             field.check_without(AXES, "a wall moves as a whole: its motion is a formula of t")
             field.check_dimension(d, "rigid-wall")
         moduli = np.concatenate(
             [
                 np.full(body.particles.count, body.material.density * body.material.wave_speed**2)
-                for body in setting.bodies
+                for body in model.bodies
             ]
         )[indices]
         V, s = particles.volumes[indices], particles.spacings[indices]
@@ -98,28 +98,26 @@ class RigidWall(Effect):
             reference=particles.positions,
             point=_vector("point", self.point, d),
             normal=normal / np.linalg.norm(normal),
-            clearances=self._clearances(setting)[indices],
+            clearances=self._clearances(model)[indices],
             springs=self.strength * moduli * V / s**2,
             friction=self.friction,
             field=field,
-            step_size=setting.step_size,
+            step_size=model.step_size,
         )
         wall.motion(0.0, 0)  # a formula out of its domain shows now, not in mid-run
         return wall
 
-    def _clearances(self, setting: Setting) -> Array:
+    def _clearances(self, model: DiscreteModel) -> Array:
         """Of all particles, (n,) [m]."""
-        particles = setting.particles
+        particles = model.particles
         if self.clearance is not None:
             return np.asarray(self.clearance * particles.spacings)
-        distances = [
-            body.shape.signed_distance(body.particles.positions) for body in setting.bodies
-        ]
+        distances = [body.shape.signed_distance(body.particles.positions) for body in model.bodies]
         return np.clip(-np.concatenate(distances), 0.0, 0.5 * particles.spacings)
 
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
-        count = len(setting.select(self.where))
-        slip = 8 * count * setting.particles.dimension
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
+        count = len(model.select(self.where))
+        slip = 8 * count * model.particles.dimension
         own = {"chosen particles": 8 * count, "clearances": 8 * count, "stiffness": 8 * count}
         return {**own, "slip": slip} if self.friction else own
 
@@ -135,7 +133,7 @@ class RigidWall(Effect):
 
 @final
 @attrs.frozen(eq=False)
-class _Wall(StoringCondition, FieldCondition, ForceCondition):
+class _Wall(EnergyTerm, FieldTerm, Load):
     label: str
     particles: Indices  # (k,)
     reference: Array  # X of all particles, (n, d) [m]

@@ -43,7 +43,7 @@ def _way(seen: Seen, one: SeenBody, times: Array) -> Array:
     """Displacement of a body's middle, (t, d) [m]; none along axes that hold it."""
     d = seen.dimension
     extent = one.body.extent
-    masses = seen.simulation.setting.masses[extent]
+    masses = seen.simulation.model.masses[extent]
     mean = masses @ seen.velocities[extent] / masses.sum()
     pull = np.zeros(d)
     for load in seen.simulation.dynamics.loads:

@@ -25,7 +25,7 @@ def half_supports(seen: Seen) -> Iterator[Advice]:
     # A gradient of the second degree is about as good on one side.
     if seen.dimension == 1 or seen.fits_surface or degree >= 2:
         return
-    for motion in seen.simulation.dynamics.motions:
+    for motion in seen.simulation.dynamics.constraints:
         for one in seen.bodies:
             plane = _plane(one, motion.held[one.body.extent])
             if plane is None:

@@ -25,7 +25,7 @@ _USUAL = 3.0
 def large_cover(seen: Seen) -> Iterator[Advice]:
     """By what the gradient holds on a lattice in rows, and by the neighbours that it brings."""
     d, cover = seen.dimension, seen.cover
-    body = seen.simulation.setting.bodies[0]
+    body = seen.simulation.model.bodies[0]
     kernel = body.smoothing.kernel
     share = held(kernel, d, cover)
     # Sums that end right at the surface set off no saw-tooth there.

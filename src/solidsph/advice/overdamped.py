@@ -19,7 +19,7 @@ def overdamped(seen: Seen) -> Iterator[Advice]:
         return
     omega = 2.0 * pi / seen.slowest_period
     for label, effect in seen.answering(Need.REST).items():
-        rate = effect.damping_rate(seen.simulation.setting.bodies)
+        rate = effect.damping_rate(seen.simulation.model.bodies)
         creeping = rate / omega**2
         if rate > _STRONG * 2.0 * omega and creeping > _LONG * seen.scene.duration:
             yield Advice(

@@ -8,8 +8,8 @@ import numpy as np
 
 from solidsph.advice.advice import Advice
 from solidsph.advice.seen import Seen
-from solidsph.interfaces.condition import StoringCondition
-from solidsph.interfaces.declared import MismatchForce
+from solidsph.interfaces.compilable_terms import HourglassLoad
+from solidsph.interfaces.terms import EnergyTerm
 from solidsph.maths.arrays import Array
 
 # Of the confined modulus: metals yield from about twice that on.
@@ -25,8 +25,8 @@ def pressed_at_start(seen: Seen) -> Iterator[Advice]:
     moduli = np.concatenate([np.full(one.body.particles.count, one.modulus) for one in seen.bodies])
     x = particles.positions + seen.displacements
     for load in seen.simulation.dynamics.loads:
-        # What resists the mismatch of neighbours acts inside a body.
-        if not isinstance(load, StoringCondition) or isinstance(load, MismatchForce):
+        # Hourglass control acts inside a body.
+        if not isinstance(load, EnergyTerm) or isinstance(load, HourglassLoad):
             continue
         forces = np.zeros_like(x)
         forces[load.particles] = load.forces(0.0, x, seen.velocities)

@@ -11,14 +11,14 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.advice import signals
+from solidsph.advice import load_histories
 from solidsph.advice.thickness import through
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import ExtensionCondition
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.gradient import Gradient
 from solidsph.interfaces.shape import Shape
+from solidsph.interfaces.terms import GhostConstraint
 from solidsph.maths.arrays import Array, Mask
 from solidsph.registry.construct import construct
 from solidsph.run.built_scene import BuiltScene
@@ -191,14 +191,14 @@ class Seen:
                 construct("shapes", self.simulation.scene.bodies[body.name].shape),
                 np.asarray(held[body.extent].any(axis=0)),
             )
-            for body in self.simulation.setting.bodies
+            for body in self.simulation.model.bodies
         ]
 
     @cached_property
     def freedoms(self) -> Mask:
         """(n, d) that some motion determines."""
         held = np.zeros(self.simulation.particles.positions.shape, dtype=np.bool_)
-        for motion in self.simulation.dynamics.motions:
+        for motion in self.simulation.dynamics.constraints:
             held |= motion.held
         return held
 
@@ -208,8 +208,8 @@ class Seen:
         behind = np.zeros(self.freedoms.shape, dtype=np.bool_)
         followers = [
             motion
-            for motion in self.simulation.dynamics.motions
-            if isinstance(motion, ExtensionCondition)
+            for motion in self.simulation.dynamics.constraints
+            if isinstance(motion, GhostConstraint)
         ]
         for axis in range(self.dimension if followers else 0):
             moved = np.zeros(self.freedoms.shape)
@@ -220,12 +220,12 @@ class Seen:
         return behind
 
     @cached_property
-    def loads(self) -> Sequence[signals.Load]:
-        return list(signals.loads(self.simulation))
+    def loads(self) -> Sequence[load_histories.LoadHistory]:
+        return list(load_histories.loads(self.simulation))
 
     @cached_property
-    def motions(self) -> Sequence[signals.Motion]:
-        return list(signals.motions(self.simulation))
+    def motions(self) -> Sequence[load_histories.Motion]:
+        return list(load_histories.motions(self.simulation))
 
     @cached_property
     def velocities(self) -> Array:

@@ -29,7 +29,7 @@ def several_faces(seen: Seen) -> Iterator[Advice]:
     condition says "surface", or consists of names alone, such as "not left", all of it is meant. So
     are the faces of one name on several bodies, unless one of them lies against another body.
     """
-    pieces = seen.simulation.setting.pieces()
+    pieces = seen.simulation.model.pieces()
     for entry in seen.scene.boundaries:
         handler: BoundaryHandler = construct("boundaries", entry.part)
         where: Where | None = getattr(handler, "where", None)

@@ -18,7 +18,7 @@ def slow_load(seen: Seen) -> Iterator[Advice]:
     """By the slowest period of the bodies; not where materials remember, or waves are imposed."""
     if (
         not seen.moves
-        or any(isinstance(b.material, HistoryMaterial) for b in seen.simulation.setting.bodies)
+        or any(isinstance(b.material, HistoryMaterial) for b in seen.simulation.model.bodies)
         or not all(one.supported for one in seen.bodies)
         or seen.simulation.initial.velocities.any()
         or len(seen.bodies) > 1

@@ -21,7 +21,7 @@ _PLACES = (0.0, 0.25, 0.5)
 
 def small_cover(seen: Seen) -> Iterator[Advice]:
     """How far the kernel's sum over a lattice is from 1, at worst."""
-    own = seen.simulation.setting.bodies[0].smoothing
+    own = seen.simulation.model.bodies[0].smoothing
     wrong = _unevenness(own, seen.cover)
     if wrong <= _WRONG:
         return

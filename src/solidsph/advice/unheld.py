@@ -38,7 +38,7 @@ def unheld(seen: Seen) -> Iterator[Advice]:
 def _pull(seen: Seen, one: SeenBody, moved: Array | float) -> Array:
     """Mean acceleration at the end of the duration, were it `moved` [m], (d,) [m/s^2]."""
     simulation, extent = seen.simulation, one.body.extent
-    masses = simulation.setting.masses[extent]
+    masses = simulation.model.masses[extent]
     pull = np.zeros(seen.dimension)
     rest = np.zeros_like(seen.velocities)
     positions = simulation.initial.positions.copy()

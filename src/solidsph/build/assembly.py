@@ -23,12 +23,12 @@ from solidsph.interfaces.body import Body
 from solidsph.run.dynamics import Dynamics
 from solidsph.engines.history import HistoryFields, remembering
 from solidsph.errors import BuildError, SceneError
-from solidsph.interfaces.condition import (
-    Condition,
-    ForceCondition,
-    MotionCondition,
+from solidsph.interfaces.terms import (
+    Term,
+    Load,
+    Constraint,
     Observation,
-    StressCondition,
+    StressTerm,
 )
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Configuration, Formulation
@@ -38,14 +38,14 @@ from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.material import Material
 from solidsph.interfaces.shape import Shape
-from solidsph.scene.part_maker import Making, Parts
+from solidsph.scene.part_maker import PartMaker, Parts
 from solidsph.model.fields import VectorField
 from solidsph.model.particles import Particles, State
 from solidsph.results.shown import clashes
 from solidsph.scene.placed_parts import PlacedParts
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import MOST_STEPS
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.run.built_scene import BuiltScene
 from solidsph.interfaces.smoothing_kernel import smoothing_kernel
 from solidsph.run.stable_step import largest_step
@@ -110,7 +110,7 @@ class Assembly:
         step = problems.attempt(self._step_size, scheme, effects, made)
         words.stop_if_any()
         steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
-        setting = Setting(
+        model = DiscreteModel(
             particles=particles,
             masses=np.concatenate([body.masses for body in made]),
             bodies=made,
@@ -118,43 +118,43 @@ class Assembly:
             end=scene.duration,
             conditions=tag_conditions,
         )
-        conditions = self._bound(parts.handlers, effects, setting)
+        terms = self._bound(parts.handlers, effects, model)
         problems.stop_if_any()
-        motions = _in_order([c for c in conditions if isinstance(c, MotionCondition)], particles)
-        stresses = [c for c in conditions if isinstance(c, StressCondition)]
+        motions = _in_order([c for c in terms if isinstance(c, Constraint)], particles)
+        stresses = [c for c in terms if isinstance(c, StressTerm)]
         problems.add(compatibility.motions(motions, particles))
-        forces = [c for c in conditions if isinstance(c, ForceCondition)]
+        forces = [c for c in terms if isinstance(c, Load)]
         problems.add(compatibility.loads(forces, particles, formulation))
         problems.add(compatibility.stresses(stresses, formulation))
         initial = problems.attempt(self._initial_state, particles)
         chosen_engine = problems.settled(parts.engine)
-        internal = problems.attempt(chosen_engine.prepare, setting.bodies, stresses, steps)
+        internal = problems.attempt(chosen_engine.prepare, model.bodies, stresses, steps)
         for effect in effects.values() if internal is not None else ():
-            internal = problems.attempt(effect.within, internal, setting, stresses) or internal
+            internal = problems.attempt(effect.within, internal, model, stresses) or internal
         problems.add(compatibility.history(made, scene, words.labels))
         problems.stop_if_any()
         remembered = [body for body in made if isinstance(body.material, HistoryMaterial)]
         if remembered:
-            conditions.append(HistoryFields(remembered, particles.count))
-        problems.add(clashes(_at_rest(problems.settled(initial), setting, conditions), conditions))
+            terms.append(HistoryFields(remembered, particles.count))
+        problems.add(clashes(_at_rest(problems.settled(initial), model, terms), terms))
         problems.stop_if_any()
 
         made_ready = kind(
             scene=scene,
-            setting=setting,
+            model=model,
             dynamics=Dynamics(
                 particles=particles,
-                masses=setting.masses,
+                masses=model.masses,
                 internal=remembering(problems.settled(internal), made, stresses),
-                motions=motions,
+                constraints=motions,
                 loads=forces,
             ),
-            conditions=tuple(conditions),
+            terms=tuple(terms),
             effects=effects,
             integrator=scheme,
             engine=chosen_engine,
             initial=problems.settled(initial),
-            step_size=setting.step_size,
+            step_size=model.step_size,
             steps=steps,
             parts=tuple(words.used),
             manager=self._manager,
@@ -222,22 +222,22 @@ class Assembly:
         self,
         handlers: Mapping[str, Any],
         effects: Mapping[str, Effect],
-        setting: Setting,
-    ) -> list[Condition]:
-        conditions: list[Condition] = []
+        model: DiscreteModel,
+    ) -> list[Term]:
+        terms: list[Term] = []
         parts = [("boundaries", *one) for one in handlers.items()]
         parts += [("effects", *one) for one in effects.items()]
         for kind, label, part in parts:
-            conditions += self._problems.attempt(self._bind, kind, part, setting, label) or []
-        return conditions
+            terms += self._problems.attempt(self._bind, kind, part, model, label) or []
+        return terms
 
-    def _bind(self, kind: str, part: Any, setting: Setting, label: str) -> Sequence[Condition]:
-        bound = part.bind(setting, label)
+    def _bind(self, kind: str, part: Any, model: DiscreteModel, label: str) -> Sequence[Term]:
+        bound = part.bind(model, label)
         wrong = list(returned_values.conditions(kind, label, part, bound))
         if wrong:
             raise BuildError(wrong)
-        found: Sequence[Condition] = [bound] if kind == "effects" else bound
-        particles = setting.particles
+        found: Sequence[Term] = [bound] if kind == "effects" else bound
+        particles = model.particles
         for one in found:
             wrong += returned_values.shapes(one, particles.count, particles.dimension)
         if wrong:
@@ -293,13 +293,13 @@ class Assembly:
         return step
 
 
-def _at_rest(initial: State, setting: Setting, conditions: Sequence[Condition]) -> Observation:
+def _at_rest(initial: State, model: DiscreteModel, terms: Sequence[Term]) -> Observation:
     """The particles where they are in the reference, before anything has happened."""
-    particles, (n, d) = setting.particles, initial.positions.shape
+    particles, (n, d) = model.particles, initial.positions.shape
     # Views of one number: they take no memory.
     none, nothing = np.broadcast_to(0.0, n), np.broadcast_to(0.0, (n, d))
-    remembers = any(isinstance(body.material, HistoryMaterial) for body in setting.bodies)
-    labels = [c.label for c in conditions if isinstance(c, (ForceCondition, MotionCondition))]
+    remembers = any(isinstance(body.material, HistoryMaterial) for body in model.bodies)
+    labels = [c.label for c in terms if isinstance(c, (Load, Constraint))]
     return Observation(
         state=attrs.evolve(
             initial,
@@ -310,7 +310,7 @@ def _at_rest(initial: State, setting: Setting, conditions: Sequence[Condition]) 
             work=dict.fromkeys(labels, 0.0),
         ),
         particles=particles,
-        masses=setting.masses,
+        masses=model.masses,
         deformation_gradients=np.broadcast_to(np.eye(d), (n, d, d)),
         stresses=np.broadcast_to(0.0, (n, d, d)),
         energy_densities=none,
@@ -319,8 +319,8 @@ def _at_rest(initial: State, setting: Setting, conditions: Sequence[Condition]) 
 
 
 def _in_order(
-    motions: Sequence[MotionCondition], particles: Particles
-) -> tuple[MotionCondition, ...]:
+    motions: Sequence[Constraint], particles: Particles
+) -> tuple[Constraint, ...]:
     """Motions of particles first, then those of ghosts, which follow particles."""
     return tuple(sorted(motions, key=lambda m: bool(m.held[particles.ghosts].any())))
 

@@ -14,7 +14,7 @@ import numpy as np
 from solidsph.scene import returned_values
 from solidsph.registry.origin import described
 from solidsph.errors import BuildError, PartWarning
-from solidsph.interfaces.condition import ForceCondition, StoringCondition
+from solidsph.interfaces.terms import Load, EnergyTerm
 from solidsph.model.particles import read_only
 from solidsph.promises.kits import KITS
 from solidsph.registry.registry import entry_of, singular
@@ -106,7 +106,7 @@ def _of_effect(simulation: BuiltScene, label: str, effect: Any) -> Iterator[str]
         return out
 
     wrong: list[str] = []
-    if isinstance(condition, StoringCondition):
+    if isinstance(condition, EnergyTerm):
         end = simulation.steps * simulation.step_size
         for time in (0.0, end):
             wrong += _of_energy(simulation, condition, effect, force, time, _MOVED * moved, du)
@@ -117,12 +117,12 @@ def _of_effect(simulation: BuiltScene, label: str, effect: Any) -> Iterator[str]
     for name, declared, change in (
         (
             "stiffness_rate",
-            effect.stiffness_rate(simulation.setting.bodies) ** 2,
+            effect.stiffness_rate(simulation.model.bodies) ** 2,
             (force(-h * du, still) - force(h * du, still)) / (2.0 * h),
         ),
         (
             "damping_rate",
-            effect.damping_rate(simulation.setting.bodies),
+            effect.damping_rate(simulation.model.bodies),
             (force(still, -h * du) - force(still, h * du)) / (2.0 * h),
         ),
     ):
@@ -192,7 +192,7 @@ def force_problems(simulation: BuiltScene, modules: set[str]) -> list[str]:
     state, d = read_only(simulation.initial), simulation.particles.dimension
     found = []
     for load in simulation.dynamics.loads:
-        if type(load).__module__ in modules and isinstance(load, ForceCondition):
+        if type(load).__module__ in modules and isinstance(load, Load):
             x, v, h = state.positions, state.velocities, simulation.step_size
             f, kept = load.advance(0.0, 0.0, x, v, state.memory)
             wrong = returned_values.force(load, f, d) or returned_values.kept(load, kept)

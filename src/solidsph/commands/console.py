@@ -19,7 +19,7 @@ from rich.table import Table
 from solidsph.run.hooks import implementation
 
 if TYPE_CHECKING:
-    from solidsph.interfaces.condition import Observation
+    from solidsph.interfaces.terms import Observation
     from solidsph.simulation import Simulation
     from solidsph.studies.sweep import Standing, Watch
 

@@ -232,11 +232,11 @@ def _why(scene: Scene, entry: registry.Entry) -> str:
 
 
 def _numbers(simulation: Simulation) -> list[dict[str, Any]]:
-    scene, setting = simulation.scene, simulation.setting
-    particles = setting.particles
+    scene, model = simulation.scene, simulation.model
+    particles = model.particles
     pairs = simulation.dynamics.internal.pair_count
     neighbours = pairs / particles.count - 1.0
-    speed = max(body.material.wave_speed for body in setting.bodies)
+    speed = max(body.material.wave_speed for body in model.bodies)
     d = particles.dimension
     rows = [
         ("dimensions", d, "1 is uniaxial strain, 2 is plane strain"),
@@ -260,7 +260,7 @@ def _why_cover(scene: Scene) -> str:
 
 def _hidden(simulation: Simulation) -> list[tuple[str, Any, str]]:
     """Pairs of near particles that are no neighbours, where there are any."""
-    found = [body.hidden for body in simulation.setting.bodies if body.hidden is not None]
+    found = [body.hidden for body in simulation.model.bodies if body.hidden is not None]
     count = sum(len(one.keys) for one in found) // 2
     why = "near, but no neighbours: their straight line leaves the body"
     return [("pairs across gaps", count, why)] if count else []
@@ -323,7 +323,7 @@ def _effects(
     rows: list[dict[str, Any]] = []
     named = {label: registry.entry_of("effects", one).name for label, one in effects.items()}
     for label, effect in effects.items():
-        arrays = {} if simulation is None else effect.arrays(simulation.setting)
+        arrays = {} if simulation is None else effect.arrays(simulation.model)
         share = found.get(label)
         rows.append(
             {

@@ -43,7 +43,7 @@ def reproduce(
     """Reproduce the figures of Ismail & Reddy, and answer what they ask for: all, or those named,
     such as fig-11."""
     from solidsph.studies.reproduce import figures
-    from solidsph.studies.reproduce import reproduce as carry_out
+    from solidsph.studies.reproduce import reproduce as solve
 
     if listed:
         _list(figures(), as_json)
@@ -54,7 +54,7 @@ def reproduce(
         def begin(name: str, simulation: Any) -> Sequence[object]:
             return [ProgressObserver(display, name, simulation)] if display else []
 
-        made = carry_out(wanted, output, begin)
+        made = solve(wanted, output, begin)
     seconds = clock.perf_counter() - begun
     if page is not None:
         from solidsph.studies.gallery import write_gallery

@@ -68,7 +68,7 @@ def _carried_out(found: Pending, *, shown: bool) -> dict[str, Any]:
         observers = (
             [ProgressObserver(display, found.path.stem, found.simulation)] if display else []
         )
-        result = found.carry_out(observers)
+        result = found.solve(observers)
     since = found.since.state
     return {
         "record": str(found.path),

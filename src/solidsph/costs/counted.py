@@ -11,19 +11,19 @@ from scipy.spatial import cKDTree
 from solidsph.costs.dissection import dissected
 from solidsph.costs.work import Compilation, Loop, Piece, StaticWork, Work
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import (
-    ExtensionCondition,
-    FieldCondition,
-    ForceCondition,
-    StressCondition,
+from solidsph.interfaces.compilable_terms import (
+    HourglassLoad,
+    PairLoad,
+    PointwiseLoad,
 )
-from solidsph.interfaces.declared import (
-    MismatchForce,
-    PairForce,
-    PointwiseForce,
-)
-from solidsph.interfaces.mismatch import MismatchOperator, MismatchProducts
+from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassProducts
 from solidsph.interfaces.operation_count import Tally, Way
+from solidsph.interfaces.terms import (
+    FieldTerm,
+    GhostConstraint,
+    Load,
+    StressTerm,
+)
 from solidsph.scene.default_cover import cover_of
 from solidsph.scene.scene_data import StaticsScene
 from solidsph.simulation import Simulation
@@ -60,13 +60,13 @@ def counted(simulation: Simulation) -> Work:
         steps=steps,
         evaluations=evaluations,
         tally=tally,
-        conditions=len(simulation.conditions),
+        conditions=len(simulation.terms),
         outputs=outputs,
         record_bytes=record_bytes(n, d, outputs, _own_fields(simulation)),
         compilations=frozenset(_compilations(simulation, tally, compiled=compiled)),
         statics=own,
         cover=cover_of(simulation.scene),
-        motions=len(simulation.dynamics.motions),
+        motions=len(simulation.dynamics.constraints),
     )
 
 
@@ -85,20 +85,20 @@ def _of_loads(simulation: Simulation, *, compiled: bool) -> Iterator[Tally]:
     d, n = simulation.particles.dimension, simulation.particles.count
     for load in simulation.dynamics.loads:
         match load:
-            case PairForce():
+            case PairLoad():
                 way = Way.PAIR_LOOPS if compiled else Way.PAIR_ARRAYS
                 table = load.pairs
                 held = table.starts.nbytes + table.columns.nbytes + table.values.nbytes
                 touched = held + 3 * 8 * n * d
                 yield Tally(way, len(table.columns), n, touched, held)
-            case MismatchForce():
+            case HourglassLoad():
                 for operator in load.operators:
-                    yield _of_mismatch(operator, compiled=compiled)
+                    yield _of_hourglass(operator, compiled=compiled)
             case _:
                 yield _of_any(load, simulation)
 
 
-def _of_any(load: ForceCondition, simulation: Simulation) -> Tally:
+def _of_any(load: Load, simulation: Simulation) -> Tally:
     """Of a load on particles; an effect that is not known here says what pairs it visits."""
     d, chosen = simulation.particles.dimension, len(load.particles)
     effect = simulation.effects.get(load.label)
@@ -106,23 +106,23 @@ def _of_any(load: ForceCondition, simulation: Simulation) -> Tally:
     if effect is not None:
         particles, internal = simulation.particles, simulation.dynamics.internal
         pairs = int(effect.pair_work(particles.count, internal.pair_count))
-        held = sum(effect.arrays(simulation.setting).values())
+        held = sum(effect.arrays(simulation.model).values())
     return Tally(Way.UNKNOWN, pairs, chosen, held + 3 * 8 * chosen * d, held)
 
 
-def _of_mismatch(operator: MismatchOperator, *, compiled: bool) -> Tally:
+def _of_hourglass(operator: HourglassOperator, *, compiled: bool) -> Tally:
     own = operator.tally
-    if not (compiled and isinstance(operator, MismatchProducts)):
+    if not (compiled and isinstance(operator, HourglassProducts)):
         return own
     # The compiled loop makes sweeps of it: H, near pairs, and the stress in return.
-    n, d = operator.mismatch.body.particles.positions.shape
-    pairs = 2 * ((operator.jet.nnz - n) // d) + len(operator.mismatch.columns)
-    return attrs.evolve(own, way=Way.MISMATCH_SWEEPS, pairs=pairs)
+    n, d = operator.pairs.body.particles.positions.shape
+    pairs = 2 * ((operator.jet.nnz - n) // d) + len(operator.pairs.columns)
+    return attrs.evolve(own, way=Way.HOURGLASS_SWEEPS, pairs=pairs)
 
 
 def _own_fields(simulation: Simulation) -> int:
     """Numbers a particle in fields that conditions record, taken to be two each."""
-    return sum(2 for one in simulation.conditions if isinstance(one, FieldCondition))
+    return sum(2 for one in simulation.terms if isinstance(one, FieldTerm))
 
 
 def _compilations(
@@ -133,15 +133,15 @@ def _compilations(
     fixed, moving = ways.intersection(_COMPILED), ways.intersection(_MOVING)
     threaded = any(part.threaded for part in tally)
     precision = min((part.precision for part in tally), default=8)
-    laws = {(type(body.material), type(body.formulation)) for body in simulation.setting.bodies}
+    laws = {(type(body.material), type(body.formulation)) for body in simulation.model.bodies}
 
     def one(piece: Piece, key: object = None) -> Compilation:
         return Compilation(piece, d, threaded, key)
 
     if fixed:
         yield Compilation(Piece.ENGINE, 0, False)
-        staged = any(isinstance(c, StressCondition) for c in simulation.conditions) or any(
-            not body.formulation.divergence.adjoint for body in simulation.setting.bodies
+        staged = any(isinstance(c, StressTerm) for c in simulation.terms) or any(
+            not body.formulation.divergence.adjoint for body in simulation.model.bodies
         )
         for law in laws:
             yield one(Piece.STAGED if staged else Piece.FORCES, (law, precision))
@@ -150,22 +150,22 @@ def _compilations(
         yield Compilation(Piece.MOVING_ENGINE, d, False)
         for law in laws:
             yield one(Piece.MOVING, law)
-    if Way.MISMATCH_SWEEPS in ways and not compiled:
+    if Way.HOURGLASS_SWEEPS in ways and not compiled:
         yield one(Piece.SWEEPS)
     if compiled:
-        kinds = tuple(sorted(type(c).__name__ for c in simulation.conditions))
+        kinds = tuple(sorted(type(c).__name__ for c in simulation.terms))
         yield one(Piece.STEPS, (type(simulation.integrator), *laws, precision, kinds))
         for load in simulation.dynamics.loads:
             match load:
-                case PairForce():
+                case PairLoad():
                     yield one(Piece.PAIR_LOAD, type(load))
-                case MismatchForce():
-                    yield one(Piece.MISMATCH_LOAD, type(load))
-                case PointwiseForce():
+                case HourglassLoad():
+                    yield one(Piece.HOURGLASS_LOAD, type(load))
+                case PointwiseLoad():
                     yield one(Piece.LOAD, type(load))
                 case _:
                     yield one(Piece.LOAD)
-        if any(isinstance(one, ExtensionCondition) for one in simulation.dynamics.motions):
+        if any(isinstance(one, GhostConstraint) for one in simulation.dynamics.constraints):
             yield one(Piece.EXTENSION)
 
 
@@ -173,20 +173,20 @@ def _of_statics(simulation: Simulation, wanted: StaticsScene) -> StaticWork:
     particles = simulation.particles
     d = particles.dimension
     held = np.zeros(particles.positions.shape, dtype=np.bool_)
-    for motion in simulation.dynamics.motions:
+    for motion in simulation.dynamics.constraints:
         held |= motion.held
     free = int((~held & ~particles.ghosts[:, None]).sum())
-    linear = all(not body.material.objective for body in simulation.setting.bodies)
+    linear = all(not body.material.objective for body in simulation.model.bodies)
     iterations = 1 if linear else ITERATIONS
     factors = [
         dissected(_cells(body), 2.0 * body.smoothing.support_radius / _spacing(body), d)
-        for body in simulation.setting.bodies
+        for body in simulation.model.bodies
     ]
     return StaticWork(
         load_steps=wanted.load_steps,
         iterations=wanted.load_steps * iterations,
         freedoms=free,
-        entries=sum(_coupled(body) for body in simulation.setting.bodies) * d * d,
+        entries=sum(_coupled(body) for body in simulation.model.bodies) * d * d,
         fill=sum(one.fill for one in factors),
         multiplications=sum(one.multiplications for one in factors),
     )

@@ -10,7 +10,7 @@ import attrs
 from solidsph.costs import terms
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.coefficients import COEFFICIENTS
-from solidsph.costs.terms import Term, Yard
+from solidsph.costs.terms import CostTerm, Yard
 from solidsph.costs.work import Compilation, Loop, Work
 from solidsph.interfaces.operation_count import Way
 
@@ -130,11 +130,11 @@ def _memory(work: Work, machine: Calibration, built: Built | None) -> int:
     return machine.bare + ceil(max(build, left + run))
 
 
-def _seconds(some: Iterable[Term], machine: Calibration) -> float:
+def _seconds(some: Iterable[CostTerm], machine: Calibration) -> float:
     return _sum(some, machine)
 
 
-def _sum(some: Iterable[Term], machine: Calibration) -> float:
+def _sum(some: Iterable[CostTerm], machine: Calibration) -> float:
     return sum(coefficient(one.name) * one.count * _unit(one.yard, machine) for one in some)
 
 

@@ -11,9 +11,9 @@ from solidsph.costs.counted import counted
 from solidsph.costs.model import predicted
 from solidsph.costs.timed import timed
 from solidsph.engines.history import remembering
-from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.engine import InternalForces
+from solidsph.interfaces.terms import StressTerm
 from solidsph.run.stable_step import step_by_rates
 from solidsph.simulation import Simulation
 
@@ -31,7 +31,7 @@ def shares(simulation: Simulation, machine: Calibration) -> Mapping[str, Share]:
     work = counted(simulation)
     apart = timed(simulation, work)
     whole = predicted(apart.rest(work, simulation), machine, besides=apart.seconds).steps
-    bodies, effects = simulation.setting.bodies, simulation.effects
+    bodies, effects = simulation.model.bodies, simulation.effects
     rates = {n: (e.stiffness_rate(bodies), e.damping_rate(bodies)) for n, e in effects.items()}
     step = step_by_rates(simulation.integrator, rates.values(), bodies)
     found = {}
@@ -59,7 +59,7 @@ def without(simulation: Simulation, label: str) -> Simulation:
     return attrs.evolve(
         simulation,
         effects=effects,
-        conditions=[one for one in simulation.conditions if one.label != label],
+        terms=[one for one in simulation.terms if one.label != label],
         dynamics=attrs.evolve(dynamics, loads=loads, internal=internal),
     )
 
@@ -71,9 +71,9 @@ def _acts_within(effect: Effect) -> bool:
 
 def _internal(simulation: Simulation, effects: Mapping[str, Effect]) -> InternalForces:
     """The internal forces as these effects let them act."""
-    setting = simulation.setting
-    stresses = [c for c in simulation.conditions if isinstance(c, StressCondition)]
-    internal = simulation.engine.prepare(setting.bodies, stresses, simulation.steps)
+    model = simulation.model
+    stresses = [c for c in simulation.terms if isinstance(c, StressTerm)]
+    internal = simulation.engine.prepare(model.bodies, stresses, simulation.steps)
     for effect in effects.values():
-        internal = effect.within(internal, setting, stresses)
-    return remembering(internal, setting.bodies, stresses)
+        internal = effect.within(internal, model, stresses)
+    return remembering(internal, model.bodies, stresses)

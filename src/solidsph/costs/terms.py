@@ -39,7 +39,7 @@ class Yard(Enum):
 
 
 @attrs.frozen
-class Term:
+class CostTerm:
     """A count, and the name of the coefficient that it is to be multiplied by."""
 
     name: str
@@ -47,127 +47,127 @@ class Term:
     yard: Yard
 
 
-def build_terms(work: Work) -> Iterator[Term]:
+def build_terms(work: Work) -> Iterator[CostTerm]:
     """Of making particles and operators, and compiling what that takes."""
     d, kind = work.dimension, _kind(work)
-    yield Term("build", 1.0, Yard.CALLS)
-    yield Term(f"build particle {d}D", work.particles, Yard.SPARSE)
-    yield Term(f"build pair {kind} {d}D", work.pairs, Yard.SPARSE)
+    yield CostTerm("build", 1.0, Yard.CALLS)
+    yield CostTerm(f"build particle {d}D", work.particles, Yard.SPARSE)
+    yield CostTerm(f"build pair {kind} {d}D", work.pairs, Yard.SPARSE)
     for part in work.tally:
-        if part.way is Way.MISMATCH_PRODUCTS or part.way is Way.MISMATCH_SWEEPS:
-            yield Term(f"build mismatch {d}D", part.pairs, Yard.SPARSE)
+        if part.way is Way.HOURGLASS_PRODUCTS or part.way is Way.HOURGLASS_SWEEPS:
+            yield CostTerm(f"build hourglass {d}D", part.pairs, Yard.SPARSE)
         if part.way is Way.PAIR_ARRAYS or part.way is Way.PAIR_LOOPS:
-            yield Term(f"build force {d}D", part.pairs, Yard.SPARSE)
+            yield CostTerm(f"build force {d}D", part.pairs, Yard.SPARSE)
     yield from _pieces(work, of_build=True)
 
 
-def compile_terms(work: Work) -> Iterator[Term]:
+def compile_terms(work: Work) -> Iterator[CostTerm]:
     """Of compiling what a run takes beyond its build."""
     yield from _pieces(work, of_build=False)
 
 
-def step_terms(work: Work) -> Iterator[Term]:
+def step_terms(work: Work) -> Iterator[CostTerm]:
     """Of one evaluation of the forces and the step around it."""
     d, n = work.dimension, work.particles
     loop = "compiled step" if work.loop is Loop.COMPILED else "step"
-    yield Term(f"{loop} {d}D", 1.0, Yard.CALLS)
-    yield Term(f"{loop} particle {d}D", n, Yard.SPARSE)
+    yield CostTerm(f"{loop} {d}D", 1.0, Yard.CALLS)
+    yield CostTerm(f"{loop} particle {d}D", n, Yard.SPARSE)
     loads = work.conditions - work.motions
     if work.loop is Loop.COMPILED:  # where what acts on some particles costs nothing on others
         own = [part for part in work.tally if part.way is Way.UNKNOWN and not part.pairs]
         loads -= len(own)
         count = sum(part.particles for part in own)
-        yield Term(f"{loop} loaded particle {d}D", count, Yard.SPARSE)
+        yield CostTerm(f"{loop} loaded particle {d}D", count, Yard.SPARSE)
     for kind, count in (("motion", work.motions), ("load", loads)):
-        yield Term(f"{loop} {kind} {d}D", count, Yard.CALLS)
-        yield Term(f"{loop} {kind} particle {d}D", count * n, Yard.SPARSE)
+        yield CostTerm(f"{loop} {kind} {d}D", count, Yard.CALLS)
+        yield CostTerm(f"{loop} {kind} particle {d}D", count * n, Yard.SPARSE)
     for part in work.tally:
         if part.way is Way.UNKNOWN and not part.pairs:
             continue  # a load on particles, which is among the conditions
         if work.loop is Loop.STEPS:
-            yield Term(f"{part.way.name} call", 1.0, Yard.CALLS)
+            yield CostTerm(f"{part.way.name} call", 1.0, Yard.CALLS)
         yield from _sum_terms(part, d)
 
 
-def shared_terms(work: Work) -> Iterator[Term]:
+def shared_terms(work: Work) -> Iterator[CostTerm]:
     """Those terms of a step that threads share."""
     d = work.dimension
     if work.loop is Loop.COMPILED and _PER_PARTICLE * work.particles >= _WORTH_A_THREAD:
-        yield Term(f"compiled step particle {d}D", work.particles, Yard.SPARSE)
+        yield CostTerm(f"compiled step particle {d}D", work.particles, Yard.SPARSE)
     for part in work.tally:
         if part.threaded:
             yield from _sum_terms(part, d)
 
 
-def output_terms(work: Work) -> Iterator[Term]:
+def output_terms(work: Work) -> Iterator[CostTerm]:
     """Of one observation and its record."""
     d, n = work.dimension, work.particles
-    yield Term("output", 1.0, Yard.APPENDING)
-    yield Term("output condition", work.conditions, Yard.CALLS)
-    yield Term(f"output particle {_kind(work)} {d}D", n, Yard.SPARSE)
-    yield Term("output byte", work.record_bytes / work.outputs, Yard.FILING)
+    yield CostTerm("output", 1.0, Yard.APPENDING)
+    yield CostTerm("output condition", work.conditions, Yard.CALLS)
+    yield CostTerm(f"output particle {_kind(work)} {d}D", n, Yard.SPARSE)
+    yield CostTerm("output byte", work.record_bytes / work.outputs, Yard.FILING)
     if 8 * n * d * d >= _LARGE:
-        yield Term(f"output large particle {d}D", n, Yard.SPARSE)
+        yield CostTerm(f"output large particle {d}D", n, Yard.SPARSE)
     for part in work.tally:
-        if part.way in (Way.MISMATCH_PRODUCTS, Way.MISMATCH_SWEEPS):
-            yield Term("output mismatch pair", part.pairs, Yard.SPARSE)
+        if part.way in (Way.HOURGLASS_PRODUCTS, Way.HOURGLASS_SWEEPS):
+            yield CostTerm("output hourglass pair", part.pairs, Yard.SPARSE)
 
 
-def start_terms(work: Work) -> Iterator[Term]:
+def start_terms(work: Work) -> Iterator[CostTerm]:
     """Of what is done once besides: the file, and its reference data."""
-    yield Term("file", 1.0, Yard.APPENDING)
-    yield Term("file particle", work.particles, Yard.SPARSE)
+    yield CostTerm("file", 1.0, Yard.APPENDING)
+    yield CostTerm("file particle", work.particles, Yard.SPARSE)
 
 
-def iteration_terms(work: Work) -> Iterator[Term]:
+def iteration_terms(work: Work) -> Iterator[CostTerm]:
     """Of an iteration of Newton's method."""
     statics, d = work.statics, work.dimension
     assert statics is not None
-    yield Term("iteration", 1.0, Yard.CALLS)
-    yield Term(f"tangent pair {d}D", work.pairs, Yard.SPARSE)
-    yield Term(f"tangent entry {d}D", statics.entries, Yard.SPARSE)
-    yield Term(f"factor entry {d}D", statics.fill, Yard.SPARSE)
-    yield Term(f"factor multiplication {d}D", statics.multiplications, Yard.SPARSE)
+    yield CostTerm("iteration", 1.0, Yard.CALLS)
+    yield CostTerm(f"tangent pair {d}D", work.pairs, Yard.SPARSE)
+    yield CostTerm(f"tangent entry {d}D", statics.entries, Yard.SPARSE)
+    yield CostTerm(f"factor entry {d}D", statics.fill, Yard.SPARSE)
+    yield CostTerm(f"factor multiplication {d}D", statics.multiplications, Yard.SPARSE)
 
 
-def build_memory(work: Work) -> Iterator[Term]:
+def build_memory(work: Work) -> Iterator[CostTerm]:
     """Bytes at the peak of the build, beyond imports."""
     d, kind = work.dimension, _kind(work)
-    yield Term("memory of a build", 1.0, Yard.BYTES)
-    yield Term(f"memory particle {kind} {d}D", work.particles, Yard.BYTES)
+    yield CostTerm("memory of a build", 1.0, Yard.BYTES)
+    yield CostTerm(f"memory particle {kind} {d}D", work.particles, Yard.BYTES)
     if kind == "compiled":  # pairs are listed some rows at a time: what is kept counts
-        yield Term(f"memory held {d}D", work.held, Yard.BYTES)
+        yield CostTerm(f"memory held {d}D", work.held, Yard.BYTES)
     else:
-        yield Term(f"memory pair {kind} {d}D", work.pairs, Yard.BYTES)
+        yield CostTerm(f"memory pair {kind} {d}D", work.pairs, Yard.BYTES)
     for one in work.compilations:
         if one.piece in _OF_BUILD:
-            yield Term(f"memory of {one.piece.name}", 1.0, Yard.BYTES)
+            yield CostTerm(f"memory of {one.piece.name}", 1.0, Yard.BYTES)
 
 
-def left_memory(work: Work) -> Iterator[Term]:
+def left_memory(work: Work) -> Iterator[CostTerm]:
     """Bytes that a build leaves, beyond imports and the engine's arrays."""
-    yield Term("memory of a build", 1.0, Yard.BYTES)
+    yield CostTerm("memory of a build", 1.0, Yard.BYTES)
     for one in work.compilations:
         if one.piece in _OF_BUILD:
-            yield Term(f"memory of {one.piece.name}", 1.0, Yard.BYTES)
+            yield CostTerm(f"memory of {one.piece.name}", 1.0, Yard.BYTES)
 
 
-def run_memory(work: Work) -> Iterator[Term]:
+def run_memory(work: Work) -> Iterator[CostTerm]:
     """Bytes that a run adds to what a build leaves."""
     d = work.dimension
-    yield Term("memory of a run", 1.0, Yard.BYTES)
+    yield CostTerm("memory of a run", 1.0, Yard.BYTES)
     # The file's library keeps what it knows of past outputs, up to a limit of its own.
-    yield Term("memory of a file", 1.0 - exp(-work.outputs / _REMEMBERED), Yard.BYTES)
-    yield Term(f"memory of a run, particle {_kind(work)} {d}D", work.particles, Yard.BYTES)
+    yield CostTerm("memory of a file", 1.0 - exp(-work.outputs / _REMEMBERED), Yard.BYTES)
+    yield CostTerm(f"memory of a run, particle {_kind(work)} {d}D", work.particles, Yard.BYTES)
     for part in work.tally:
         if part.way is Way.PRODUCTS_ANEW or part.way is Way.PAIR_ARRAYS:
-            yield Term(f"memory of a run, pair {part.way.name} {d}D", part.pairs, Yard.BYTES)
+            yield CostTerm(f"memory of a run, pair {part.way.name} {d}D", part.pairs, Yard.BYTES)
     for one in work.compilations:
         if one.piece not in _OF_BUILD:
-            yield Term(f"memory of {one.piece.name}{_threads(one.threaded)}", 1.0, Yard.BYTES)
+            yield CostTerm(f"memory of {one.piece.name}{_threads(one.threaded)}", 1.0, Yard.BYTES)
     if work.statics is not None:
-        yield Term(f"memory of a tangent entry {d}D", work.statics.entries, Yard.BYTES)
-        yield Term(f"memory of a factor entry {d}D", work.statics.fill, Yard.BYTES)
+        yield CostTerm(f"memory of a tangent entry {d}D", work.statics.entries, Yard.BYTES)
+        yield CostTerm(f"memory of a factor entry {d}D", work.statics.fill, Yard.BYTES)
 
 
 def together(threads: int) -> float:
@@ -175,17 +175,17 @@ def together(threads: int) -> float:
     return 1.0 if threads == 1 else _TOGETHER * threads
 
 
-def _sum_terms(part: Tally, d: int) -> Iterator[Term]:
+def _sum_terms(part: Tally, d: int) -> Iterator[CostTerm]:
     precision = f" float{8 * part.precision}" if part.precision != 8 else ""
-    yield Term(f"{part.way.name} {d}D{precision} pair", part.pairs, Yard.SPARSE)
+    yield CostTerm(f"{part.way.name} {d}D{precision} pair", part.pairs, Yard.SPARSE)
     if part.way in (Way.STENCILS, Way.ROWS):  # the law, which is in double precision always
-        yield Term(f"{part.way.name} {d}D particle", part.particles, Yard.SPARSE)
+        yield CostTerm(f"{part.way.name} {d}D particle", part.particles, Yard.SPARSE)
 
 
-def _pieces(work: Work, *, of_build: bool) -> Iterator[Term]:
+def _pieces(work: Work, *, of_build: bool) -> Iterator[CostTerm]:
     for one in work.compilations:
         if (one.piece in _OF_BUILD) == of_build:
-            yield Term(f"compile {one.piece.name}{_threads(one.threaded)}", 1.0, Yard.COMPILING)
+            yield CostTerm(f"compile {one.piece.name}{_threads(one.threaded)}", 1.0, Yard.COMPILING)
 
 
 def _threads(threaded: bool) -> str:

@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from solidsph.costs.work import Loop, Work
-from solidsph.interfaces.declared import DECLARED_LOADS
+from solidsph.interfaces.compilable_terms import COMPILABLE_LOADS
 from solidsph.interfaces.operation_count import Way
 from solidsph.simulation import Simulation
 
@@ -58,7 +58,7 @@ def timed(simulation: Simulation, work: Work) -> Timed:
     loads = {
         load.label: _seconds(partial(load.advance, step, step, x, v, {}))
         for load in dynamics.loads
-        if not isinstance(load, DECLARED_LOADS)
+        if not isinstance(load, COMPILABLE_LOADS)
     }
     internal = dynamics.internal
     by_arrays = not any(part.way in _COMPILED for part in internal.tally)

@@ -30,8 +30,8 @@ class Piece(Enum):
     STEPS = "the time loop"
     LOAD = "a load in the time loop"
     PAIR_LOAD = "forces of pairs in the time loop"
-    MISMATCH_LOAD = "mismatches in the time loop"
-    SWEEPS = "mismatches outside of it"
+    HOURGLASS_LOAD = "hourglass forces in the time loop"
+    SWEEPS = "hourglass forces outside of it"
     EXTENSION = "ghosts that follow in the time loop"
 
 

@@ -9,11 +9,11 @@ import attrs
 import numpy as np
 
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import FieldCondition, Observation, StressCondition
 from solidsph.interfaces.engine import InternalForces, StressFields
 from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.interfaces.law import Law, memory_name
 from solidsph.interfaces.operation_count import Tally
+from solidsph.interfaces.terms import FieldTerm, Observation, StressTerm
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import components_first, particles_first
 
@@ -43,7 +43,7 @@ class ArrayLaw(Law):
 
 
 def remembering(
-    internal: InternalForces, bodies: Sequence[Body], conditions: Sequence[StressCondition]
+    internal: InternalForces, bodies: Sequence[Body], conditions: Sequence[StressTerm]
 ) -> InternalForces:
     """Forces that also advance what the bodies' materials remember, where there are such."""
     asked = internal.advances_histories
@@ -63,7 +63,7 @@ class HistoryForces(InternalForces):
 
     sums: InternalForces
     laws: Sequence[Law]
-    conditions: Sequence[StressCondition]
+    conditions: Sequence[StressTerm]
 
     @property
     def pair_count(self) -> int:
@@ -125,7 +125,7 @@ class HistoryForces(InternalForces):
 
 @final
 @attrs.frozen(eq=False)
-class HistoryFields(FieldCondition):
+class HistoryFields(FieldTerm):
     """Shows what the materials of some bodies remember."""
 
     bodies: Sequence[Body]

@@ -13,10 +13,10 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from solidsph.interfaces.body import Body, part_of
-from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.engine import Engine, InternalForces, StressFields
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.operation_count import Tally, Way, array_bytes, vectors
+from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Indices, Mask, Tensor
 from solidsph.maths.tensors import identity, particles_first
 from solidsph.model.neighbours import Pairs, neighbour_pairs
@@ -135,7 +135,7 @@ class MatrixForces(InternalForces):
     """Internal forces by sparse products."""
 
     parts: Sequence[_FixedBody | _FollowedBody]
-    conditions: Sequence[StressCondition]
+    conditions: Sequence[StressTerm]
     pair_count: int
 
     @property
@@ -246,7 +246,7 @@ def _without_ghosts(F: Tensor, ghosts: Mask) -> Tensor:
 
 
 def fixed_forces(
-    bodies: Sequence[Body], constant: Sequence[Operators], conditions: Sequence[StressCondition]
+    bodies: Sequence[Body], constant: Sequence[Operators], conditions: Sequence[StressTerm]
 ) -> MatrixForces:
     """Internal forces of bodies by matrices that are given."""
     parts = [_FixedBody(body, own) for body, own in zip(bodies, constant, strict=True)]
@@ -261,7 +261,7 @@ class MatrixEngine(Engine):
     def prepare(
         self,
         bodies: Sequence[Body],
-        conditions: Sequence[StressCondition],
+        conditions: Sequence[StressTerm],
         evaluations: int = 1,
     ) -> InternalForces:
         parts: list[_FixedBody | _FollowedBody] = []

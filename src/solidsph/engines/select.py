@@ -12,11 +12,15 @@ import numpy as np
 from solidsph.engines.matrix import MatrixEngine
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.engine import Engine, InternalForces
 from solidsph.interfaces.formulation import Configuration
-from solidsph.interfaces.mismatch import Mismatch, MismatchOperator, MismatchProducts
+from solidsph.interfaces.hourglass_energy import (
+    HourglassOperator,
+    HourglassPairs,
+    HourglassProducts,
+)
 from solidsph.interfaces.smoothing_kernel import UNIT_SPHERE
+from solidsph.interfaces.terms import StressTerm
 
 # What the matrix engine takes for a step and for each pair in it, if the pairs stay and if they
 # are found anew, and what compilation takes, all [s], about; beside them the compiled engine's own
@@ -25,7 +29,7 @@ _STEP, _PAIR = 1e-4, 25e-9
 _MOVING_STEP, _MOVING_PAIR = 1e-3, 400e-9
 _COMPILATION = 10.0
 
-# Compiled sweeps over a mismatch take some 10 s to compile, and products some 30 ns a pair more
+# Compiled sweeps over these pairs take some 10 s to compile, and products some 30 ns a pair more
 # than they do: from here on they pay within about a thousand evaluations.
 _PAIRS_FOR_PRODUCTS = 300_000
 
@@ -41,7 +45,7 @@ class AutomaticEngine(Engine):
     def prepare(
         self,
         bodies: Sequence[Body],
-        conditions: Sequence[StressCondition],
+        conditions: Sequence[StressTerm],
         evaluations: int = 1,
     ) -> InternalForces:
         work = evaluations * sum(_matrix_time(body) for body in bodies)
@@ -57,13 +61,15 @@ def _matrix_time(body: Body) -> float:
     return _MOVING_STEP + _MOVING_PAIR * _expected_pairs(body)
 
 
-def mismatch_operator(mismatch: Mismatch) -> MismatchOperator:
-    """The operator of a mismatch that suits the size of its body."""
-    if _expected_pairs(mismatch.body) < _PAIRS_FOR_PRODUCTS:
-        return MismatchProducts.of(mismatch)
-    from solidsph.engines.compiled.mismatch import MismatchSweeps  # brings the compiler with it
+def hourglass_operator(pairs: HourglassPairs) -> HourglassOperator:
+    """The operator of these pairs that suits the size of its body."""
+    if _expected_pairs(pairs.body) < _PAIRS_FOR_PRODUCTS:
+        return HourglassProducts.of(pairs)
+    from solidsph.engines.compiled.hourglass_sweeps import (
+        HourglassSweeps,  # brings the compiler with it
+    )
 
-    return MismatchSweeps.of(mismatch)
+    return HourglassSweeps.of(pairs)
 
 
 def _expected_pairs(body: Body) -> float:

@@ -6,21 +6,21 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar
 
-from solidsph.interfaces.condition import Condition
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import Term
 
 
 class BoundaryHandler(ABC):
     """Parameters of what is imposed; `bind` makes it act on particles.
 
     An implementation is a frozen attrs class whose fields are the TOML keys of the handler. One
-    that loads a surface says so, and takes what `Setting.surface` finds at its `where`.
+    that loads a surface says so, and takes what `DiscreteModel.surface` finds at its `where`.
     """
 
     loads_surface: ClassVar[bool] = False
 
     @abstractmethod
-    def bind(self, setting: Setting, label: str) -> Sequence[Condition]:
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         """The conditions that impose it, reporting under `label`.
 
         Raises:

@@ -1,4 +1,4 @@
-"""Setting: what a part sees of the discrete problem when it is bound to it."""
+"""DiscreteModel: what a part sees of the discrete problem when it is bound to it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from solidsph.model.surface import Conditions, Pieces
 
 
 @attrs.frozen(eq=False)
-class Setting:
+class DiscreteModel:
     """The particles of all bodies, their masses, and the bodies themselves."""
 
     particles: Particles

@@ -8,8 +8,8 @@ from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
 
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import ForceCondition, StressCondition
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import Load, StressTerm
 
 if TYPE_CHECKING:
     from solidsph.interfaces.engine import InternalForces
@@ -44,15 +44,15 @@ class Effect(ABC):
     empty for something else. None does not say: beside it nothing is said to be lacking."""
 
     @abstractmethod
-    def bind(self, setting: Setting, label: str) -> ForceCondition:
+    def bind(self, model: DiscreteModel, label: str) -> Load:
         """The term acting on particles; its energy account is called `label`.
 
         Raises:
-            SceneError: it matches no particle, or its parameters do not fit the setting.
+            SceneError: it matches no particle, or its parameters do not fit the model.
         """
 
     @abstractmethod
-    def arrays(self, setting: Setting) -> Mapping[str, int]:
+    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
         """Arrays that it keeps, by name, in bytes."""
 
     @abstractmethod
@@ -64,14 +64,14 @@ class Effect(ABC):
         """Angular frequency that its stiffness adds at most [rad/s]; 0 if none."""
 
     def within(
-        self, internal: InternalForces, setting: Setting, conditions: Sequence[StressCondition]
+        self, internal: InternalForces, model: DiscreteModel, conditions: Sequence[StressTerm]
     ) -> InternalForces:
         """The internal forces as the effect lets them act: itself, unless it changes how bodies act
         on themselves.
 
         Args:
             internal: by the scene's engine, or by an effect before this one.
-            setting: the bodies.
+            model: the bodies.
             conditions: what changes the stress before forces are formed.
         """
         return internal

@@ -11,11 +11,11 @@ import attrs
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.law import Law
 from solidsph.interfaces.operation_count import Tally, Way
+from solidsph.interfaces.terms import StressTerm
 from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.maths.arrays import Array, Indices
 
@@ -143,7 +143,7 @@ class Engine(ABC):
     def prepare(
         self,
         bodies: Sequence[Body],
-        conditions: Sequence[StressCondition],
+        conditions: Sequence[StressTerm],
         evaluations: int = 1,
     ) -> InternalForces:
         """The internal forces of `bodies`, which together hold all particles, in order.

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import attrs
 
-from solidsph.interfaces.condition import ForceCondition, MotionCondition
+from solidsph.interfaces.terms import Constraint, Load
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import Particles
 
@@ -30,8 +30,8 @@ class EquationOfMotion(ABC):
 
     particles: Particles
     masses: Array  # (n,) [kg]
-    motions: Sequence[MotionCondition]
-    loads: Sequence[ForceCondition]
+    constraints: Sequence[Constraint]
+    loads: Sequence[Load]
 
     @abstractmethod
     def place(self, time: float, positions: Array) -> Array:

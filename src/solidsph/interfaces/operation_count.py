@@ -21,8 +21,8 @@ class Way(Enum):
     WEIGHTS = "compiled, moving neighbours, weights by arrays"
     PAIR_ARRAYS = "forces of pairs, by arrays"
     PAIR_LOOPS = "forces of pairs, compiled"
-    MISMATCH_PRODUCTS = "mismatches, as products of sparse matrices"
-    MISMATCH_SWEEPS = "mismatches, compiled"
+    HOURGLASS_PRODUCTS = "hourglass forces, as products of sparse matrices"
+    HOURGLASS_SWEEPS = "hourglass forces, compiled"
     UNKNOWN = "of a way that is not known here"
 
 

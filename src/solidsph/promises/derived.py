@@ -8,24 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from solidsph.interfaces.condition import ForceCondition
-from solidsph.interfaces.declared import (
+from solidsph.interfaces.compilable_terms import (
+    HourglassLoad,
     LinearExtension,
-    MismatchForce,
-    PairForce,
-    PointwiseForce,
-    ScheduledForce,
-    ScheduledMotion,
+    PairLoad,
+    PointwiseLoad,
+    ScheduledConstraint,
+    ScheduledLoad,
 )
 from solidsph.interfaces.integrator import PointwiseIntegrator
+from solidsph.interfaces.terms import Load
 
 _DERIVED: Mapping[type, tuple[str, ...]] = {
-    ScheduledMotion: ("held", "impose"),
+    ScheduledConstraint: ("held", "impose"),
     LinearExtension: ("held", "impose", "return_forces", "impose_stress"),
-    ScheduledForce: ("forces", "advance"),
-    PointwiseForce: ("forces", "advance"),
-    PairForce: ("particles", "forces", "advance"),
-    MismatchForce: ("particles", "forces", "advance"),
+    ScheduledLoad: ("forces", "advance"),
+    PointwiseLoad: ("forces", "advance"),
+    PairLoad: ("particles", "forces", "advance"),
+    HourglassLoad: ("particles", "forces", "advance"),
     PointwiseIntegrator: ("start", "advance"),
 }
 
@@ -36,7 +36,7 @@ def overridden(part: object) -> str:
         if not isinstance(part, kind):
             continue
         for name in names:
-            original = getattr(kind, name, None) or getattr(ForceCondition, name)
+            original = getattr(kind, name, None) or getattr(Load, name)
             if getattr(type(part), name) is not original:
                 return f"{type(part).__name__} is a {kind.__name__}, and overrides {name}"
     return ""

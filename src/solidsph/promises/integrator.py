@@ -9,9 +9,9 @@ from typing import final
 import attrs
 import numpy as np
 
-from solidsph.interfaces.condition import ForceCondition, MotionCondition, Observation
 from solidsph.interfaces.engine import InternalForces, StressFields
 from solidsph.interfaces.integrator import Integrator
+from solidsph.interfaces.terms import Constraint, Load, Observation
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.particles import Particles, State
 from solidsph.promises.check import Check, Verdict, at_most, check, more_than
@@ -59,7 +59,7 @@ class _Spring(InternalForces):
 
 @final
 @attrs.frozen(eq=False)
-class _Damper(ForceCondition):
+class _Damper(Load):
     """f = -c v on the first particle."""
 
     @property
@@ -79,7 +79,7 @@ class _Damper(ForceCondition):
 
 @final
 @attrs.frozen(eq=False)
-class _Shaker(MotionCondition):
+class _Shaker(Constraint):
     """u = sin t of the first particle."""
 
     @property
@@ -112,7 +112,7 @@ def _dynamics(*conditions: _Damper | _Shaker) -> Dynamics:
         particles=particles,
         masses=_MASS * unit,
         internal=_Spring(),
-        motions=[one for one in conditions if isinstance(one, _Shaker)],
+        constraints=[one for one in conditions if isinstance(one, _Shaker)],
         loads=[one for one in conditions if isinstance(one, _Damper)],
     )
 

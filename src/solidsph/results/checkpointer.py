@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from solidsph.errors import RecordError
-from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.terms import Observation
 from solidsph.model.particles import State
 from solidsph.results.checkpoint import Checkpoint, checkpoint_path, write_checkpoint
 from solidsph.results.circumstances import circumstances

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solidsph.errors import RecordError, SceneError
-from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.terms import Observation
 from solidsph.results.left import check_no_other_file
 from solidsph.results.record import Record
 from solidsph.results.record_writer import EarlierStep, Field, PluginUsed, RecordWriter
@@ -17,7 +17,7 @@ from solidsph.results.shown import OWN, history, parted
 from solidsph.results.shown import fields as shown_fields
 from solidsph.run.energy import KINETIC, STRAIN, kinetic_energy, strain_energy
 from solidsph.run.hooks import implementation
-from solidsph.run.restart_point import Resumption
+from solidsph.run.restart_point import RestartPoint
 
 if TYPE_CHECKING:
     from solidsph.maths.arrays import Array
@@ -34,7 +34,7 @@ _REPEATED = ("velocity", "cauchy_stress")
 class Recorder:
     """Writes every observation to one HDF5 file, behind those of an earlier run if it has any."""
 
-    def __init__(self, path: Path, since: Resumption | None = None) -> None:
+    def __init__(self, path: Path, since: RestartPoint | None = None) -> None:
         self._path = path
         self._since = since
         self._writer: RecordWriter | None = None
@@ -62,7 +62,7 @@ class Recorder:
             self._writer = self._open(simulation, observation)
         state = observation.state
         fields = _fields(observation) | {
-            name: values for name, _, values in shown_fields(observation, simulation.conditions)
+            name: values for name, _, values in shown_fields(observation, simulation.terms)
         }
         columns = self._history(simulation, observation)
         self.final.update(columns)
@@ -104,7 +104,7 @@ class Recorder:
                 ),
                 *(
                     Field(name, values.shape[1:], unit)
-                    for name, unit, values in shown_fields(observation, simulation.conditions)
+                    for name, unit, values in shown_fields(observation, simulation.terms)
                 ),
             ],
             columns={name: parted(name)[1] for name in columns},
@@ -156,7 +156,7 @@ class Recorder:
             )
 
     def _history(self, simulation: BuiltScene, observation: Observation) -> dict[str, float]:
-        return history(observation, self._initial_energy, simulation.conditions)
+        return history(observation, self._initial_energy, simulation.terms)
 
 
 def _steps(record: Record, until: float) -> Iterator[EarlierStep]:

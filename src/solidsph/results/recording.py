@@ -9,11 +9,11 @@ from pathlib import Path
 from solidsph.results.checkpointer import Checkpointer
 from solidsph.results.recorder import Recorder
 from solidsph.results.sole_writer import sole_writer
-from solidsph.run.restart_point import Resumption
+from solidsph.run.restart_point import RestartPoint
 
 
 @contextmanager
-def recording(record: Path, since: Resumption | None) -> Iterator[tuple[Checkpointer, Recorder]]:
+def recording(record: Path, since: RestartPoint | None) -> Iterator[tuple[Checkpointer, Recorder]]:
     """Listeners of a run that write `record`; within it, no other run does.
 
     Raises:

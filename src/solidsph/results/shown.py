@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from solidsph.errors import PluginError, RecordError
-from solidsph.interfaces.condition import (
-    Condition,
-    FieldCondition,
+from solidsph.interfaces.terms import (
+    EnergyTerm,
+    FieldTerm,
     Observation,
-    StoringCondition,
+    Term,
 )
 from solidsph.maths.arrays import Array
 from solidsph.results.layout import field_name, static_fields, tag_name
@@ -24,7 +24,7 @@ OWN = {"velocity": "m/s", "cauchy_stress": "Pa", "volume_ratio": "-"}
 
 
 def history(
-    observation: Observation, initial: float, conditions: Sequence[Condition]
+    observation: Observation, initial: float, conditions: Sequence[Term]
 ) -> dict[str, float]:
     """Columns "quantity [unit]": the ledger, then what conditions report.
 
@@ -49,11 +49,11 @@ def history(
 
 
 def fields(
-    observation: Observation, conditions: Sequence[Condition]
+    observation: Observation, conditions: Sequence[Term]
 ) -> Iterator[tuple[str, str, Array]]:
     """Name, unit and values of every field that conditions have to show."""
     for condition in conditions:
-        if isinstance(condition, FieldCondition):
+        if isinstance(condition, FieldTerm):
             for name, values in condition.fields(observation).items():
                 quantity, unit = parted(name)
                 yield field_name(quantity), unit, values
@@ -65,7 +65,7 @@ def parted(name: str) -> tuple[str, str]:
     return quantity, unit.rstrip("]")
 
 
-def clashes(at_rest: Observation, conditions: Sequence[Condition]) -> Iterator[str]:
+def clashes(at_rest: Observation, conditions: Sequence[Term]) -> Iterator[str]:
     """Names that two fields or two columns would have, each with its remedy.
 
     Args:
@@ -78,14 +78,14 @@ def clashes(at_rest: Observation, conditions: Sequence[Condition]) -> Iterator[s
     taken |= {tag_name(tag): f"tag {tag!r}" for tag in at_rest.particles.tags}
     for condition in conditions:
         whose = repr(condition.label)
-        if isinstance(condition, StoringCondition) and condition.label in BY_BODY:
+        if isinstance(condition, EnergyTerm) and condition.label in BY_BODY:
             yield _clash(f"column '{condition.label} energy [J]'", "the energies", whose)
             continue
         for name in _names(condition.report, at_rest):
             if name in columns:
                 yield _clash(f"column {name!r}", columns[name], whose)
             columns[name] = whose
-        if isinstance(condition, FieldCondition):
+        if isinstance(condition, FieldTerm):
             for name in _names(condition.fields, at_rest):
                 field = field_name(parted(name)[0])
                 if field in taken:

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from solidsph.errors import RecordError
-from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array
 from solidsph.run.energy import residual, total_energy
 

@@ -13,16 +13,16 @@ import numpy as np
 import pluggy
 
 from solidsph.errors import BuildError, DivergedError, SceneError
-from solidsph.interfaces.condition import Condition, Observation
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.engine import Engine
 from solidsph.interfaces.integrator import Integrator
+from solidsph.interfaces.terms import Observation, Term
 from solidsph.model.particles import Particles, State, read_only
 from solidsph.registry.registry import Entry
 from solidsph.run.dynamics import Dynamics
 from solidsph.run.outcome import Result
-from solidsph.run.restart_point import Resumption
+from solidsph.run.restart_point import RestartPoint
 from solidsph.scene.scene import Scene
 
 
@@ -31,9 +31,9 @@ class BuiltScene(ABC):
     """Everything that a run needs. Running does not change it, so it can be run again."""
 
     scene: Scene
-    setting: Setting
+    model: DiscreteModel
     dynamics: Dynamics
-    conditions: Sequence[Condition]
+    terms: Sequence[Term]
     effects: Mapping[str, Effect]
     integrator: Integrator
     engine: Engine
@@ -50,7 +50,7 @@ class BuiltScene(ABC):
         *,
         record: Path | str | None = None,
         observers: Sequence[object] = (),
-        since: Resumption | None = None,
+        since: RestartPoint | None = None,
     ) -> Result:
         """Find the equilibrium if the scene has [statics], follow the motion if not."""
 

@@ -12,12 +12,12 @@ from typing import final
 import attrs
 import numpy as np
 
-from solidsph.interfaces.condition import (
-    ExtensionCondition,
-    Observation,
-)
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import NOTHING, EquationOfMotion, Response
+from solidsph.interfaces.terms import (
+    GhostConstraint,
+    Observation,
+)
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.particles import Particles, State, shut
 
@@ -44,23 +44,23 @@ class Dynamics(EquationOfMotion):
 
     @held.default
     def _held_by_each(self) -> Sequence[Mask]:
-        return [motion.held for motion in self.motions]
+        return [motion.held for motion in self.constraints]
 
     def place(self, time: float, positions: Array) -> Array:
         """Positions (n, d) with every imposed motion applied at `time` [s]."""
-        if not self.motions:
+        if not self.constraints:
             return positions
         displacements = positions - self.particles.positions
-        for motion in self.motions:
+        for motion in self.constraints:
             motion.impose(time, 0, displacements)
         return self.particles.positions + displacements
 
     def carry(self, time: float, velocities: Array) -> Array:
         """Velocities (n, d) with every imposed motion applied at `time` [s]."""
-        if not self.motions:
+        if not self.constraints:
             return velocities
         carried = velocities.copy()
-        for motion in self.motions:
+        for motion in self.constraints:
             motion.impose(time, 1, carried)
         return carried
 
@@ -80,26 +80,26 @@ class Dynamics(EquationOfMotion):
         displacements = positions - self.particles.positions
         internal, kept = self.internal.advance(time, step, displacements, memory)
         remembered = dict(kept)
-        applied = {c.label: np.zeros_like(positions) for c in (*self.loads, *self.motions)}
+        applied = {c.label: np.zeros_like(positions) for c in (*self.loads, *self.constraints)}
         total = internal.copy()
         for load in self.loads:
             force, kept = load.advance(time, step, positions, velocities, memory)
             remembered |= kept
             applied[load.label][load.particles] += force
             total[load.particles] += force
-        for motion in self.motions:
-            if isinstance(motion, ExtensionCondition):
+        for motion in self.constraints:
+            if isinstance(motion, GhostConstraint):
                 before = total.copy()
                 motion.return_forces(total)
                 applied[motion.label] += total - before
         real = ~self.particles.ghosts
         accelerations = np.zeros_like(positions)
         accelerations[real] = total[real] / self.masses[real, None]
-        for motion in self.motions:
+        for motion in self.constraints:
             motion.impose(time, 2, accelerations)
-        if self.motions:
+        if self.constraints:
             missing = self.masses[:, None] * accelerations - total
-        for motion, held in zip(self.motions, self.held, strict=True):
+        for motion, held in zip(self.constraints, self.held, strict=True):
             applied[motion.label] += np.where(held, missing, 0.0)
         return Response(accelerations, applied, remembered)
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from solidsph.interfaces.condition import Condition, Observation, StoringCondition
+from solidsph.interfaces.terms import EnergyTerm, Observation, Term
 
 KINETIC, STRAIN, RESIDUAL = "kinetic energy [J]", "strain energy [J]", "energy residual [J]"
 DISSIPATED = "dissipated energy [J]"
@@ -50,7 +50,7 @@ def residual(observation: Observation, initial: float) -> float:
 
 
 def ledger(
-    observation: Observation, initial: float, conditions: Sequence[Condition] = ()
+    observation: Observation, initial: float, conditions: Sequence[Term] = ()
 ) -> Mapping[str, float]:
     """Columns "quantity [unit]" of the accounts; `initial` is the energy at the start [J].
 
@@ -69,7 +69,7 @@ def ledger(
     }
 
 
-def _by_body(observation: Observation, conditions: Sequence[Condition]) -> Mapping[str, float]:
+def _by_body(observation: Observation, conditions: Sequence[Term]) -> Mapping[str, float]:
     particles = observation.particles
     if len(particles.bodies) < 2:
         return {}
@@ -77,7 +77,7 @@ def _by_body(observation: Observation, conditions: Sequence[Condition]) -> Mappi
     strain = np.where(particles.ghosts, 0.0, particles.volumes * observation.energy_densities)
     energies = {
         **dict(zip(BY_BODY, (kinetic, strain), strict=True)),
-        **{c.label: c.energies(observation) for c in conditions if isinstance(c, StoringCondition)},
+        **{c.label: c.energies(observation) for c in conditions if isinstance(c, EnergyTerm)},
     }
     return {
         f"{name} energy of {body} [J]": float(values[rows].sum())

@@ -14,7 +14,7 @@ from traceback import walk_tb
 import pluggy
 
 from solidsph.errors import DivergedError, PluginError
-from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 from solidsph.registry.registry import hook_points

@@ -11,7 +11,7 @@ from solidsph.registry.origin import culprit
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.hooks import heard_by
 from solidsph.run.outcome import Result
-from solidsph.run.restart_point import Resumption
+from solidsph.run.restart_point import RestartPoint
 from solidsph.run.session import session
 from solidsph.run.step_by_step import steps_of
 
@@ -28,7 +28,7 @@ def time_loop(simulation: BuiltScene) -> TimeLoop:
 def run_motion(
     simulation: BuiltScene,
     listeners: Sequence[object],
-    since: Resumption | None = None,
+    since: RestartPoint | None = None,
     *,
     judge: Callable[[BuiltScene], None] = lambda simulation: None,
 ) -> Result:

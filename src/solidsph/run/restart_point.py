@@ -1,4 +1,4 @@
-"""Resumption: where an earlier run is gone on from."""
+"""RestartPoint: where an earlier run is gone on from."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from solidsph.model.particles import State
 
 
 @attrs.frozen(eq=False)
-class Resumption:
+class RestartPoint:
     """What a run takes over from an earlier one that was recorded in the same file."""
 
     state: State | None = None  # an output to go on from; None: all is carried out again

@@ -12,16 +12,16 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import (
-    ForceCondition,
-    MotionCondition,
-    StressCondition,
-    SurfaceLoad,
-)
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.shape import Shape
+from solidsph.interfaces.terms import (
+    Constraint,
+    Load,
+    StressTerm,
+    SurfaceLoad,
+)
 from solidsph.model.particles import Particles
 from solidsph.model.regions import AXES, EVERYWHERE, variable
 from solidsph.registry.problems import MOST_OF_A_KIND
@@ -232,7 +232,7 @@ def apart(shapes: Mapping[str, Shape], sets: Mapping[str, Particles]) -> Iterato
         yield f"{passed_over} more pairs of bodies, whose boxes overlap, were not looked at"
 
 
-def motions(held_by: Sequence[MotionCondition], particles: Particles) -> Iterator[str]:
+def motions(held_by: Sequence[Constraint], particles: Particles) -> Iterator[str]:
     """No degree of freedom determined twice, and no ghost left adrift."""
     # By freedom: the number of the first motion that determines it, or -1.
     first_of = np.full(particles.positions.shape, -1)
@@ -261,9 +261,7 @@ def motions(held_by: Sequence[MotionCondition], particles: Particles) -> Iterato
         )
 
 
-def loads(
-    loaded: Sequence[ForceCondition], particles: Particles, formulation: Formulation
-) -> Iterator[str]:
+def loads(loaded: Sequence[Load], particles: Particles, formulation: Formulation) -> Iterator[str]:
     """No surface is loaded through which ghosts carry the stress on."""
     if not (formulation.divergence.uses_ghost_stress and particles.ghosts.any()):
         return
@@ -286,12 +284,12 @@ def loads(
             )
 
 
-def stresses(imposed: Sequence[StressCondition], formulation: Formulation) -> Iterator[str]:
+def stresses(imposed: Sequence[StressTerm], formulation: Formulation) -> Iterator[str]:
     """Stress imposed on ghosts must be of use to the formulation."""
     if formulation.divergence.uses_ghost_stress:
         return
     for condition in imposed:
-        if not isinstance(condition, MotionCondition):
+        if not isinstance(condition, Constraint):
             yield (
                 f"{condition.label!r} sets the stress of ghosts, which the formulation's "
                 f"divergence ({type(formulation.divergence).__name__}) does not use; take "

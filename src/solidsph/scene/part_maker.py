@@ -1,4 +1,4 @@
-"""Making: the parts that the names of a scene stand for, as far as they can be understood."""
+"""PartMaker: the parts that the names of a scene stand for, as far as they can be understood."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Parts:
     sets: Mapping[str, Particles]
 
 
-class Making:
+class PartMaker:
     """Makes the parts of one scene, and notes what is wrong with them among its `problems`."""
 
     def __init__(self, scene: SceneData) -> None:

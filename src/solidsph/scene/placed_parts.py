@@ -13,7 +13,7 @@ from solidsph.model.particles import Particles
 from solidsph.model.regions import Where, select
 from solidsph.model.surface import Conditions
 from solidsph.scene import compatibility
-from solidsph.scene.part_maker import Making
+from solidsph.scene.part_maker import PartMaker
 from solidsph.scene.scene_data import SceneData
 
 
@@ -36,7 +36,7 @@ class PlacedParts:
 
     def __init__(self, scene: SceneData) -> None:
         self._scene = scene
-        making = Making(scene)
+        making = PartMaker(scene)
         self.problems = making.problems
         self.labels = making.labels  # of the accounts of boundaries and effects
         self.used = making.used  # plugins in the order of their use, each once

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import Condition, ForceCondition, MotionCondition
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.material import Material
+from solidsph.interfaces.terms import Constraint, Load, Term
 from solidsph.model.particles import Particles
 from solidsph.registry.origin import described
 from solidsph.registry.registry import entry_of
@@ -80,22 +80,22 @@ def conditions(kind: str, label: str, part: object, found: Any) -> Iterator[str]
     """Bound parts: one force of an effect, conditions of a boundary handler."""
     who = f"{described(entry_of(kind, part))}, label {label!r}"
     if kind == "effects":
-        if not isinstance(found, ForceCondition):
-            yield f"{who}: `bind` returned {found!r}; a ForceCondition is expected"
-    elif not isinstance(found, Sequence) or not all(isinstance(one, Condition) for one in found):
+        if not isinstance(found, Load):
+            yield f"{who}: `bind` returned {found!r}; a Load is expected"
+    elif not isinstance(found, Sequence) or not all(isinstance(one, Term) for one in found):
         yield f"{who}: `bind` returned {found!r}; a list of Conditions is expected"
 
 
-def shapes(found: Condition, count: int, dimension: int) -> Iterator[str]:
+def shapes(found: Term, count: int, dimension: int) -> Iterator[str]:
     """Masks and indices that fit the particles of the scene."""
-    if isinstance(found, MotionCondition):
+    if isinstance(found, Constraint):
         held = np.asarray(found.held)
         if held.shape != (count, dimension) or held.dtype != np.bool_:
             yield (
                 f"{found.label!r}: `held` is {held.dtype} of the shape {held.shape}; bool of the "
                 f"shape {(count, dimension)} is expected"
             )
-    if isinstance(found, ForceCondition):
+    if isinstance(found, Load):
         chosen = np.asarray(found.particles)
         if chosen.ndim != 1 or (chosen.size and chosen.dtype.kind not in "iu"):
             told = f"{chosen.dtype} {chosen.shape}"
@@ -105,7 +105,7 @@ def shapes(found: Condition, count: int, dimension: int) -> Iterator[str]:
             yield f"{found.label!r}: `particles` must lie from 0 to {count - 1}, got {told}"
 
 
-def force(found: ForceCondition, force: Any, dimension: int) -> str:
+def force(found: Load, force: Any, dimension: int) -> str:
     """What is wrong with a force that was handed back; nothing if all is well."""
     expected = (len(found.particles), dimension)
     if np.shape(force) != expected:
@@ -117,7 +117,7 @@ def force(found: ForceCondition, force: Any, dimension: int) -> str:
     return ""
 
 
-def kept(found: ForceCondition, kept: Any) -> str:
+def kept(found: Load, kept: Any) -> str:
     """What is wrong with what is to be remembered of a step; nothing if all is well."""
     if not isinstance(kept, Mapping):
         return f"{found.label!r}: `advance` returned {kept!r}; a mapping of arrays is expected"

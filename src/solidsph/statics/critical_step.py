@@ -50,7 +50,7 @@ def highest_frequency(simulation: BuiltScene, state: State | None = None) -> flo
     rest = np.zeros_like(positions)
     spacing = float(dynamics.particles.spacings.min())
     free = np.repeat(~dynamics.particles.ghosts[:, None], positions.shape[1], axis=1)
-    for motion in dynamics.motions:
+    for motion in dynamics.constraints:
         free &= ~motion.held
     count = int(free.sum())
     if count == 0:
@@ -94,7 +94,7 @@ def critical_step(simulation: BuiltScene, state: State | None = None) -> StableS
     """
     frequency = highest_frequency(simulation, state)
     rate = sum(
-        effect.damping_rate(simulation.setting.bodies) for effect in simulation.effects.values()
+        effect.damping_rate(simulation.model.bodies) for effect in simulation.effects.values()
     )
     limit = simulation.integrator.stability_limit
     total = frequency + rate

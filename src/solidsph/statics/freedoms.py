@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 from scipy.sparse import csr_array, eye_array
 
-from solidsph.interfaces.condition import ExtensionCondition
+from solidsph.interfaces.terms import GhostConstraint
 from solidsph.maths.arrays import Array, Mask
 from solidsph.run.dynamics import Dynamics
 from solidsph.statics.linear_part import linear_part
@@ -47,21 +47,21 @@ def freedoms(dynamics: Dynamics) -> Freedoms:
     """
     free = np.repeat(~dynamics.particles.ghosts[:, None], dynamics.particles.dimension, axis=1)
     returning = np.zeros_like(free)
-    for motion in dynamics.motions:
+    for motion in dynamics.constraints:
         free &= ~motion.held
-        if isinstance(motion, ExtensionCondition):
+        if isinstance(motion, GhostConstraint):
             returning |= motion.held
     selection = csr_array(eye_array(free.size, format="csr")[:, np.flatnonzero(free.ravel())])
 
     def following(values: Array) -> Array:
         displacements = np.zeros(free.shape)
         displacements[free] = values
-        for motion in dynamics.motions:
+        for motion in dynamics.constraints:
             motion.impose(0.0, 0, displacements)
         displacements[free] = 0.0
         return displacements.ravel()
 
-    labels = [motion.label for motion in dynamics.motions]
+    labels = [motion.label for motion in dynamics.constraints]
     followed = linear_part(following, int(free.sum()), labels)
     # Only those that give forces back hand them to whom they follow.
     kept = csr_array(followed.multiply(returning.reshape(-1, 1)))

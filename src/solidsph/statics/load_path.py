@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from solidsph.engines.matrix import MatrixEngine, MatrixForces
-from solidsph.interfaces.condition import ExtensionCondition, StressCondition
+from solidsph.interfaces.terms import GhostConstraint, StressTerm
 from solidsph.maths.arrays import Array, Mask
 from solidsph.run.built_scene import BuiltScene
 
@@ -48,7 +48,7 @@ class LoadPath:
         rest = np.zeros_like(particles.positions)
         held = np.zeros(rest.shape, dtype=np.bool_)
         offset = rest.copy()
-        for motion in dynamics.motions:
+        for motion in dynamics.constraints:
             motion.impose(0.0, 0, offset)
             held |= motion.held
         return cls(
@@ -68,7 +68,7 @@ class LoadPath:
     def placed(self, displacements: Array, factor: float) -> Array:
         """Displacements (n, d) with the motions of this factor imposed."""
         placed = displacements.copy()
-        for motion in self.simulation.dynamics.motions:
+        for motion in self.simulation.dynamics.constraints:
             motion.impose(self.time(factor), 0, placed)
         return placed - (1.0 - factor) * self.offset
 
@@ -86,10 +86,10 @@ class LoadPath:
             )
             applied[load.label] = force
             total = total + force
-        for motion in dynamics.motions:
-            if isinstance(motion, ExtensionCondition):
+        for motion in dynamics.constraints:
+            if isinstance(motion, GhostConstraint):
                 motion.return_forces(total)
-        for motion in dynamics.motions:
+        for motion in dynamics.constraints:
             applied[motion.label] = np.where(motion.held & self.held, -total, 0.0)
         return Forces(total, applied)
 
@@ -106,7 +106,7 @@ def _double_precision(simulation: BuiltScene) -> MatrixForces:
     internal = simulation.dynamics.internal
     if isinstance(internal, MatrixForces):
         return internal
-    conditions = [c for c in simulation.conditions if isinstance(c, StressCondition)]
-    prepared = MatrixEngine().prepare(simulation.setting.bodies, conditions)
+    conditions = [c for c in simulation.terms if isinstance(c, StressTerm)]
+    prepared = MatrixEngine().prepare(simulation.model.bodies, conditions)
     assert isinstance(prepared, MatrixForces)
     return prepared

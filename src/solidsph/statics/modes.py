@@ -48,7 +48,7 @@ def frequencies(simulation: BuiltScene, count: int, state: State | None = None) 
         SceneError: there are not so many modes.
         SolidsphError: the forces have no energy, or the state is unstable.
     """
-    particles, setting = simulation.particles, simulation.setting
+    particles, model = simulation.particles, simulation.model
     own = freedoms(simulation.dynamics)
     if not (own.adjoint and is_symmetric(simulation)):
         raise SolidsphError(
@@ -64,9 +64,9 @@ def frequencies(simulation: BuiltScene, count: int, state: State | None = None) 
     if state is not None:
         u = state.positions - particles.positions
     K = own.reduced(tangent(simulation, u))
-    mass = np.repeat(setting.masses, particles.dimension)[own.free.ravel()]
+    mass = np.repeat(model.masses, particles.dimension)[own.free.ravel()]
     extent = float(np.ptp(particles.positions, axis=0).max())
-    speed = min(body.material.wave_speed for body in setting.bodies)
+    speed = min(body.material.wave_speed for body in model.bodies)
     shift = (_SHIFT * speed / extent) ** 2
     try:
         factors = factorised(csr_array(K + shift * diags_array(mass)), symmetric=True)
@@ -104,6 +104,6 @@ def _unstable() -> SolidsphError:
 
 
 def _smoothness(simulation: BuiltScene, shapes: Array) -> Array:
-    W = simulation.setting.smoothing_matrix()
+    W = simulation.model.smoothing_matrix()
     sums = W.sum(axis=1)[:, None]
     return np.array([np.linalg.norm(W @ u / sums) / np.linalg.norm(u) for u in shapes])

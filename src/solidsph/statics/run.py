@@ -10,7 +10,7 @@ import attrs
 from solidsph.model.particles import State
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.outcome import Result
-from solidsph.run.restart_point import Resumption
+from solidsph.run.restart_point import RestartPoint
 from solidsph.run.session import session
 from solidsph.scene.scene_data import StaticsScene
 from solidsph.statics.equilibrium import equilibrium
@@ -20,7 +20,7 @@ def run_statics(
     simulation: BuiltScene,
     wanted: StaticsScene,
     listeners: Sequence[object],
-    since: Resumption | None = None,
+    since: RestartPoint | None = None,
 ) -> Result:
     """Find the equilibrium; the unloaded body and every load step are outputs.
 

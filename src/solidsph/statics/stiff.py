@@ -11,7 +11,7 @@ from solidsph.maths.arrays import Array
 
 @runtime_checkable
 class Stiff(Protocol):
-    """A ForceCondition whose force depends on the displacement.
+    """A Load whose force depends on the displacement.
 
     A load that does not implement it is taken as constant in displacement: the equilibrium found
     is still the right one, but more slowly, or not at all if that load matters to stability.

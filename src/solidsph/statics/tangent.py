@@ -12,8 +12,8 @@ from scipy.sparse import block_diag, bsr_array, csr_array, diags_array
 from solidsph.engines.matrix import Operators, operators
 from solidsph.errors import SolidsphError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import ForceCondition, StressCondition
 from solidsph.interfaces.formulation import Configuration, Formulation
+from solidsph.interfaces.terms import Load, StressTerm
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import components_first, particles_first
 from solidsph.run.built_scene import BuiltScene
@@ -96,7 +96,7 @@ class Tangent:
     """K of a scene; what does not change with the displacements is kept."""
 
     bodies: Sequence[_BodyTangent]
-    loads: Sequence[ForceCondition]
+    loads: Sequence[Load]
 
     @classmethod
     def of(cls, simulation: BuiltScene) -> Tangent:
@@ -105,10 +105,10 @@ class Tangent:
         Raises:
             SolidsphError: a formulation is not of the reference configuration, or its own.
         """
-        bodies = simulation.setting.bodies
+        bodies = simulation.model.bodies
         for body in bodies:
             _check_form(body.formulation, simulation.particles.dimension)
-        conditions = [c for c in simulation.conditions if isinstance(c, StressCondition)]
+        conditions = [c for c in simulation.terms if isinstance(c, StressTerm)]
         return cls(
             [
                 _BodyTangent(
@@ -184,7 +184,7 @@ def tangent(simulation: BuiltScene, displacements: Array) -> csr_array:
 
 def is_symmetric(simulation: BuiltScene) -> bool:
     """Whether the internal forces derive from an energy, so that K is symmetric."""
-    return all(body.formulation.divergence.adjoint for body in simulation.setting.bodies)
+    return all(body.formulation.divergence.adjoint for body in simulation.model.bodies)
 
 
 def _moduli(body: Body, F: Array) -> Array:
@@ -230,7 +230,7 @@ def _check_form(formulation: Formulation, d: int) -> None:
 
 
 def _stress_extension(
-    body: Body, simulation: BuiltScene, conditions: Sequence[StressCondition]
+    body: Body, simulation: BuiltScene, conditions: Sequence[StressTerm]
 ) -> csr_array | None:
     """How the stress of ghosts follows that of the body's real particles; None if it is unused."""
     if not (conditions and body.formulation.divergence.uses_ghost_stress):

@@ -15,14 +15,14 @@ import numpy as np
 
 from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.interfaces.condition import (
-    Condition,
-    ExtensionCondition,
-    FieldCondition,
-    ForceCondition,
-    MotionCondition,
+from solidsph.interfaces.terms import (
+    Constraint,
+    FieldTerm,
+    GhostConstraint,
+    Load,
     Observation,
-    StressCondition,
+    StressTerm,
+    Term,
 )
 from solidsph.maths.arrays import Array, Mask
 from solidsph.promises.check import Check, Verdict, at_most, check, not_promised, worst
@@ -61,15 +61,15 @@ class _Sample:
     @property
     def adjoint(self) -> bool:
         """Whether the forces have an energy."""
-        return self.simulation.setting.bodies[0].formulation.divergence.adjoint
+        return self.simulation.model.bodies[0].formulation.divergence.adjoint
 
     @property
-    def conditions(self) -> Sequence[Condition]:
-        return [one for one in self.simulation.conditions if one.label == _LABEL]
+    def conditions(self) -> Sequence[Term]:
+        return [one for one in self.simulation.terms if one.label == _LABEL]
 
     @property
-    def motions(self) -> Sequence[MotionCondition]:
-        return [one for one in self.conditions if isinstance(one, MotionCondition)]
+    def motions(self) -> Sequence[Constraint]:
+        return [one for one in self.conditions if isinstance(one, Constraint)]
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -139,7 +139,7 @@ def conditions(handler: BoundaryHandler) -> Verdict:
     """Some body is accepted, any other refused with a remedy; bound, the handler is one condition
     or more under the label that it was given."""
     for sample in _samples(handler):
-        bound = handler.bind(sample.simulation.setting, _LABEL)
+        bound = handler.bind(sample.simulation.model, _LABEL)
         if not bound or any(one.label != _LABEL for one in bound):
             return Verdict(False, f"{[(type(one).__name__, one.label) for one in bound]}")
     kinds = {type(one).__name__ for one in bound}
@@ -197,7 +197,7 @@ def virtual_power(handler: BoundaryHandler) -> Verdict:
     motion, with nothing left on ghosts."""
     errors, acts = [0.0], False
     for sample, motion in _of_motion(handler):
-        if not isinstance(motion, ExtensionCondition):
+        if not isinstance(motion, GhostConstraint):
             continue
         acts = True
         ghosts = sample.simulation.particles.ghosts[:, None]
@@ -222,7 +222,7 @@ def stresses(handler: BoundaryHandler) -> Verdict:
         particles = sample.simulation.particles
         inside = ~particles.ghosts & ~np.any(particles.area_vectors != 0.0, axis=1)
         for condition in sample.conditions:
-            if not isinstance(condition, StressCondition):
+            if not isinstance(condition, StressTerm):
                 continue
             acts = True
             d = particles.dimension
@@ -243,7 +243,7 @@ def forces(handler: BoundaryHandler) -> Verdict:
     acts = False
     for sample in _samples(handler):
         for condition in sample.conditions:
-            if not isinstance(condition, ForceCondition):
+            if not isinstance(condition, Load):
                 continue
             acts = True
             problem = force_problem(sample.simulation, condition, sample.random())
@@ -313,13 +313,13 @@ CHECKS: tuple[Check, ...] = (
 )
 
 
-def _of_motion(handler: BoundaryHandler) -> Iterator[tuple[_Sample, MotionCondition]]:
+def _of_motion(handler: BoundaryHandler) -> Iterator[tuple[_Sample, Constraint]]:
     for sample in _samples(handler):
         for motion in sample.motions:
             yield sample, motion
 
 
-def _imposed(motion: MotionCondition, time: float, derivative: int, free: Array) -> Array:
+def _imposed(motion: Constraint, time: float, derivative: int, free: Array) -> Array:
     values = free.copy()
     motion.impose(time, derivative, values)
     return values
@@ -344,7 +344,7 @@ def residual(simulation: Simulation) -> float:
     return max(abs(one["energy residual [J]"]) for one in accounts) / moved
 
 
-def force_problem(simulation: Simulation, condition: ForceCondition, u: Array) -> str:
+def force_problem(simulation: Simulation, condition: Load, u: Array) -> str:
     """What is wrong with the forces of a condition at displacements `u` (n, d); nothing if all is
     well."""
     particles = simulation.particles
@@ -370,9 +370,9 @@ def force_problem(simulation: Simulation, condition: ForceCondition, u: Array) -
     return "; ".join(problem for problem, present in problems.items() if present)
 
 
-def field_verdict(simulation: Simulation, conditions: Sequence[Condition]) -> Verdict:
+def field_verdict(simulation: Simulation, conditions: Sequence[Term]) -> Verdict:
     """Whether the fields of `conditions` are such as a record can hold."""
-    shown = [one for one in conditions if isinstance(one, FieldCondition)]
+    shown = [one for one in conditions if isinstance(one, FieldTerm)]
     if not shown:
         return not_promised("it shows no field")
     n, d = simulation.particles.positions.shape

@@ -15,9 +15,9 @@ import numpy as np
 
 from solidsph.build.builder import Builder
 from solidsph.errors import BuildError, SceneError
-from solidsph.interfaces.condition import ForceCondition, Observation, StoringCondition
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.engine import InternalForces
+from solidsph.interfaces.terms import EnergyTerm, Load, Observation
 from solidsph.maths.arrays import Array
 from solidsph.promises.check import Check, Verdict, at_most, check, more_than, not_promised, worst
 from solidsph.promises.derived import overridden
@@ -56,7 +56,7 @@ class _Sample:
     engines: list[InternalForces] = attrs.field(factory=list)  # the plain one, once it is asked for
 
     @property
-    def condition(self) -> ForceCondition:
+    def condition(self) -> Load:
         (one,) = [load for load in self.simulation.dynamics.loads if load.label == _LABEL]
         return one
 
@@ -96,7 +96,7 @@ class _Sample:
         """Internal forces without it, (n, d) [N]."""
         if not self.engines:
             prepare = self.simulation.engine.prepare
-            self.engines.append(prepare(self.simulation.setting.bodies, ()))
+            self.engines.append(prepare(self.simulation.model.bodies, ()))
         return self.engines[0].forces(time, positions - self.simulation.particles.positions)
 
 
@@ -176,7 +176,7 @@ def bound(effect: Effect) -> Verdict:
     """Some body is accepted, any other refused with a remedy; bound, the effect has the label that
     it was given."""
     samples = _samples(effect)
-    labels = {effect.bind(sample.simulation.setting, _LABEL).label for sample in samples}
+    labels = {effect.bind(sample.simulation.model, _LABEL).label for sample in samples}
     told = f"{len(samples)} of {len(DIMENSIONS) * len(_FORMS)} bodies"
     return Verdict(labels == {_LABEL}, f"{told}, labels {', '.join(sorted(labels))}")
 
@@ -197,7 +197,7 @@ def arrays(effect: Effect) -> Verdict:
     """The arrays that it keeps are listed by name, in bytes."""
     listed: set[str] = set()
     for sample in _samples(effect):
-        for name, size in effect.arrays(sample.simulation.setting).items():
+        for name, size in effect.arrays(sample.simulation.model).items():
             if not isinstance(name, str) or not isinstance(size, (int, np.integer)) or size < 0:
                 return Verdict(False, f"{name!r}: {size!r}")
             listed.add(name)
@@ -231,7 +231,7 @@ def energy_account(effect: Effect) -> Verdict:
     errors = [
         residual(one.simulation)
         for one in _samples(effect)
-        if one.simulation.setting.bodies[0].formulation.configuration.value == "reference"
+        if one.simulation.model.bodies[0].formulation.configuration.value == "reference"
     ]
     return at_most(max(errors), 1e-3) if errors else not_promised("it refuses forms with an energy")
 
@@ -243,7 +243,7 @@ def stored_energy(effect: Effect) -> Verdict:
     told: list[str] = []
     for sample in _samples(effect):
         simulation = sample.simulation
-        if effect.damping_rate(simulation.setting.bodies) > 0.0:
+        if effect.damping_rate(simulation.model.bodies) > 0.0:
             x, v = sample.positions + sample.smooth(), 50.0 * sample.smooth()
             still = sample.forces(x, np.zeros_like(v))
             power = float(np.vdot(sample.forces(x, v) - still, v))
@@ -351,14 +351,14 @@ CHECKS: tuple[Check, ...] = (
 def _energy(sample: _Sample, u: Array) -> float | None:
     """What the effect stores, or else reports as its energy, at displacements u (n, d) [J]."""
     observation = _observed(sample, u)
-    if isinstance(sample.condition, StoringCondition):
+    if isinstance(sample.condition, EnergyTerm):
         return float(np.sum(sample.condition.energies(observation)))
     return sample.condition.report(observation).get(_ENERGY)
 
 
 def _energy_problem(sample: _Sample, u: Array) -> str:
     """What is wrong with the energies as such; nothing if all is well or there are none."""
-    if not isinstance(sample.condition, StoringCondition):
+    if not isinstance(sample.condition, EnergyTerm):
         return ""
     observation = _observed(sample, u)
     energies = sample.condition.energies(observation)
@@ -385,7 +385,7 @@ def _bounded(
 ) -> Verdict:
     excess, told = [], []
     for sample in _samples(effect):
-        rate, found = declared(sample.simulation.setting.bodies), float(measure(sample))
+        rate, found = declared(sample.simulation.model.bodies), float(measure(sample))
         told.append(f"{found:.3g} of {rate:.3g}")
         # Differences, and an estimate of the largest eigenvalue from below, each leave some 1e-6 of
         # the scale, that of the fastest waves.
@@ -424,7 +424,7 @@ def _stiffness(sample: _Sample) -> float:
 def _derivative(sample: _Sample, forces: Callable[[Array], Array], step: float) -> Array:
     """Accelerations by one coordinate after another, (n d, n d)."""
     n, d = sample.positions.shape
-    masses = sample.simulation.setting.masses[:, None]
+    masses = sample.simulation.model.masses[:, None]
     columns = []
     for k in range(n * d):
         change = np.zeros(n * d)

@@ -48,7 +48,7 @@ class _Sample:
 
     @property
     def body(self) -> Body:
-        return self.simulation.setting.bodies[0]
+        return self.simulation.model.bodies[0]
 
     @property
     def positions(self) -> Array:

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.condition import Observation
 from solidsph.interfaces.formulation import Configuration
+from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.run.accounts import Accounts
 from solidsph.watch.symptom import Finding, Symptom, graded
@@ -34,7 +34,7 @@ class CollapsingNeighbours(Symptom):
         self, simulation: BuiltScene, observation: Observation, accounts: Accounts
     ) -> Finding | None:
         found, part = 0, np.inf
-        for body in simulation.setting.bodies:
+        for body in simulation.model.bodies:
             a, b, first = _nearest(body)
             if not len(a):
                 continue
@@ -59,7 +59,7 @@ class CollapsingNeighbours(Symptom):
 
 def _help(simulation: BuiltScene, particle: int) -> str:
     """Against what brings particles of this body together."""
-    bodies = simulation.setting.bodies
+    bodies = simulation.model.bodies
     body = next(one for one in bodies if one.extent.start <= particle < one.extent.stop)
     if body.formulation.configuration is Configuration.CURRENT:
         return (

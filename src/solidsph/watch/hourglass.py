@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.interfaces.condition import Observation, StoringCondition
 from solidsph.interfaces.effect import Need
+from solidsph.interfaces.terms import EnergyTerm, Observation
 from solidsph.run.accounts import Accounts
 from solidsph.run.energy import strain_energy
 from solidsph.watch.soundness import rounding
@@ -33,10 +33,10 @@ class StoredBesides(Symptom):
         self, simulation: BuiltScene, observation: Observation, accounts: Accounts
     ) -> Finding | None:
         strain = strain_energy(observation)
-        for condition in simulation.conditions:
+        for condition in simulation.terms:
             effect = simulation.effects.get(condition.label)
             controls = effect is not None and Need.UNSEEN_MOTIONS in (effect.answers or ())
-            if not (controls and isinstance(condition, StoringCondition)):
+            if not (controls and isinstance(condition, EnergyTerm)):
                 continue
             energies = condition.energies(observation)
             own = float(energies.sum())

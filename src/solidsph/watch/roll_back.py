@@ -13,7 +13,7 @@ from solidsph.errors import DivergedError, UnsoundError
 from solidsph.model.particles import State
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.outcome import Result
-from solidsph.run.restart_point import Resumption
+from solidsph.run.restart_point import RestartPoint
 from solidsph.watch.symptom import Finding, Symptom
 from solidsph.watch.watchdog import SYMPTOMS, Watchdog
 
@@ -45,7 +45,7 @@ def run_watched(
         UnsoundError: its energies did not add up once more than that.
     """
     path = Path(record)
-    since: Resumption | None = None
+    since: RestartPoint | None = None
     notes: list[str] = []
     while True:
         picture = path.with_name(f"{path.stem}-watchdog.png")
@@ -63,10 +63,10 @@ def run_watched(
                 f"{simulation.step_size:.9g} s: {_told(failed)}"
             )
             if good is None:
-                since = Resumption(until=-inf, notes=tuple(notes))
+                since = RestartPoint(until=-inf, notes=tuple(notes))
             else:
                 state = restarted(simulation, good.state)
-                since = Resumption(state, good.kept, until=back, notes=tuple(notes))
+                since = RestartPoint(state, good.kept, until=back, notes=tuple(notes))
 
 
 def _told(failed: DivergedError | UnsoundError) -> str:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solidsph.errors import DivergedError, RecordError, UnsoundError
-from solidsph.interfaces.condition import Observation
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.history import HistoryMaterial
+from solidsph.interfaces.terms import Observation
 from solidsph.run.accounts import Accounts
 from solidsph.run.hooks import implementation
 from solidsph.scene.scene_data import OFF
@@ -160,13 +160,13 @@ def rounding(simulation: BuiltScene) -> float:
     """An energy below which everything is rounding [J]."""
     strain = _ROUNDED * simulation.dynamics.internal.precision
     return (strain**2 + _CANCELLED) * sum(
-        float(body.masses.sum()) * body.material.wave_speed**2 for body in simulation.setting.bodies
+        float(body.masses.sum()) * body.material.wave_speed**2 for body in simulation.model.bodies
     )
 
 
 def _explained(simulation: BuiltScene) -> tuple[str, str]:
     """The likely cause, and a remedy."""
-    formulations = [body.formulation for body in simulation.setting.bodies]
+    formulations = [body.formulation for body in simulation.model.bodies]
     for one in formulations:
         if one.configuration is Configuration.CURRENT:
             return (
@@ -191,14 +191,14 @@ def _explained(simulation: BuiltScene) -> tuple[str, str]:
             if simulation.scene.time_step is None
             else f"a time_step of {0.8 * margin * simulation.step_size:.3g} s",
         )
-    if any(isinstance(body.material, HistoryMaterial) for body in simulation.setting.bodies):
+    if any(isinstance(body.material, HistoryMaterial) for body in simulation.model.bodies):
         return (
             "steps in which the material's history changes by much, or vibrations that they do "
             "not resolve",
             "half the time step",
         )
     controlled = any(
-        effect.stiffness_rate(simulation.setting.bodies) > 0.0
+        effect.stiffness_rate(simulation.model.bodies) > 0.0
         for effect in simulation.effects.values()
     )
     if not controlled and any(one.gradient.exact_degree >= 1 for one in formulations):

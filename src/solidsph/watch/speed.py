@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, final
 import attrs
 import numpy as np
 
-from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.terms import Observation
 from solidsph.run.accounts import Accounts
 from solidsph.watch.symptom import Finding, Symptom, graded
 
@@ -27,7 +27,7 @@ class FasterThanSound(Symptom):
         self, simulation: BuiltScene, observation: Observation, accounts: Accounts
     ) -> Finding | None:
         found, part = 0, 0.0
-        for body in simulation.setting.bodies:
+        for body in simulation.model.bodies:
             # The mean is no faster than the fastest.
             fastest = 2.0 * np.sqrt(observation.squared_speeds[body.extent].max())
             if fastest < self.warning * body.material.wave_speed:

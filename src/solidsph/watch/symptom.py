@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import attrs
 
-from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.terms import Observation
 from solidsph.run.accounts import Accounts
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, final
 import attrs
 import numpy as np
 
-from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.terms import Observation
 from solidsph.run.accounts import Accounts
 from solidsph.watch.symptom import Finding, Grade, Symptom
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import attrs
 
 from solidsph.errors import DivergedError, RecordError
-from solidsph.interfaces.condition import Observation
+from solidsph.interfaces.terms import Observation
 from solidsph.model.particles import State
 from solidsph.run.accounts import Accounts
 from solidsph.run.hooks import implementation

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from solidsph import BuildError, SceneError, Simulation
-from solidsph.interfaces.condition import MotionCondition
-from solidsph.interfaces.discrete_model import Setting
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import Constraint
 from solidsph.maths.arrays import Array
 from solidsph.run.energy import kinetic_energy, strain_energy
 from solidsph_builtin.boundaries.approximate_neumann import ApproximateNeumann
@@ -28,7 +28,7 @@ FUNCTIONS: dict[int, Callable[[Array], Array]] = {
 }
 
 
-def lattice_setting(d: int, cover: float, cells: int) -> Setting:
+def lattice_model(d: int, cover: float, cells: int) -> DiscreteModel:
     """Particles on the boundary of the unit box, as the paper has them, with full supports."""
     shape = {"type": "interval", "length": 1.0} if d == 1 else {"type": "box", "lengths": [1.0] * d}
     return (
@@ -45,24 +45,24 @@ def lattice_setting(d: int, cover: float, cells: int) -> Setting:
         .boundary("ghost-extension")
         .duration(1.0)
         .build()
-        .setting
+        .model
     )
 
 
-def approximation_errors(setting: Setting, handler: object | None) -> tuple[float, float]:
+def approximation_errors(model: DiscreteModel, handler: object | None) -> tuple[float, float]:
     """Largest error of <f> at the boundary particles, and at the interior ones near them."""
-    particles = setting.particles
+    particles = model.particles
     d = particles.dimension
     f = FUNCTIONS[d](particles.positions)
     values = np.zeros_like(particles.positions)
     values[:, 0] = f
     if handler is not None:
-        (condition,) = handler.bind(setting, "boundary")  # type: ignore[attr-defined]
+        (condition,) = handler.bind(model, "boundary")  # type: ignore[attr-defined]
         condition.impose(0.0, 0, values)
-    errors = np.abs(setting.smoothing_matrix() @ values[:, 0] - f)
+    errors = np.abs(model.smoothing_matrix() @ values[:, 0] - f)
     X = particles.positions
     depth = np.minimum(X, 1.0 - X).min(axis=1)
-    radius = setting.bodies[0].smoothing.support_radius
+    radius = model.bodies[0].smoothing.support_radius
     near = ~particles.ghosts & (depth > 1e-9) & (depth < radius)
     boundary = ~particles.ghosts & (depth <= 1e-9)
     return float(errors[boundary].max()), float(errors[near].max())
@@ -76,9 +76,9 @@ def dirichlet(kind: type, d: int) -> object:
 @pytest.mark.parametrize("cover", COVERS)
 @pytest.mark.parametrize("d", [1, 2])
 def test_exact_dirichlet(d: int, cover: float) -> None:
-    setting = lattice_setting(d, cover, {1: 40, 2: 20}[d])
-    exact, beside = approximation_errors(setting, dirichlet(ExactDirichlet, d))
-    _, beside_plain = approximation_errors(setting, None)
+    model = lattice_model(d, cover, {1: 40, 2: 20}[d])
+    exact, beside = approximation_errors(model, dirichlet(ExactDirichlet, d))
+    _, beside_plain = approximation_errors(model, None)
     # Values are of order one; a sum over some hundred neighbours rounds to this.
     assert exact < 1e-14
     assert beside <= beside_plain
@@ -87,9 +87,9 @@ def test_exact_dirichlet(d: int, cover: float) -> None:
 @pytest.mark.parametrize("cover", COVERS)
 @pytest.mark.parametrize("d", [1, 2])
 def test_the_full_solve_is_exact_too_but_spoils_what_is_beside_it(d: int, cover: float) -> None:
-    setting = lattice_setting(d, cover, {1: 40, 2: 20}[d])
-    exact, beside = approximation_errors(setting, dirichlet(FullDirichlet, d))
-    _, beside_minimum = approximation_errors(setting, dirichlet(ExactDirichlet, d))
+    model = lattice_model(d, cover, {1: 40, 2: 20}[d])
+    exact, beside = approximation_errors(model, dirichlet(FullDirichlet, d))
+    _, beside_minimum = approximation_errors(model, dirichlet(ExactDirichlet, d))
     # Its condition number reaches some thousands, squared in 2D.
     assert exact < 1e-12
     if cover >= 3.5:
@@ -98,17 +98,17 @@ def test_the_full_solve_is_exact_too_but_spoils_what_is_beside_it(d: int, cover:
 
 def test_the_literal_form_misses_as_the_notes_on_the_paper_say() -> None:
     """41 particles, cover 5.5: the boundary value comes out 0.0787 instead of 0.0625."""
-    setting = lattice_setting(1, 5.5, 40)
-    miss, _ = approximation_errors(setting, dirichlet(LiteralDirichlet, 1))
+    model = lattice_model(1, 5.5, 40)
+    miss, _ = approximation_errors(model, dirichlet(LiteralDirichlet, 1))
     # The notes give four decimals.
     assert miss == pytest.approx(0.0787 - 0.0625, abs=5e-5)
 
 
 @pytest.mark.parametrize("cover", COVERS)
 def test_dirichlet_without_a_known_extension_is_exact_as_well(cover: float) -> None:
-    setting = lattice_setting(2, cover, 20)
+    model = lattice_model(2, cover, 20)
     handler = ExactDirichlet(where="surface", displacement={"x": FORMULAS[2]})
-    exact, _ = approximation_errors(setting, handler)
+    exact, _ = approximation_errors(model, handler)
     assert exact < 1e-14
 
 
@@ -130,12 +130,12 @@ def test_dirichlet_reports_its_miss_in_a_run(kind: type) -> None:
     state = simulation.run().state
     observation = simulation.dynamics.observe(state)
     report = {}
-    for condition in simulation.conditions:
+    for condition in simulation.terms:
         report |= condition.report(observation)
     asked = 0.01 * np.sin(200 * state.time)
     u = (state.positions - simulation.particles.positions)[:, 0]
     left = simulation.particles.tagged("left")
-    achieved = (simulation.setting.smoothing_matrix() @ u)[left][0]
+    achieved = (simulation.model.smoothing_matrix() @ u)[left][0]
     # The same sum of values of 1e-2, in another order.
     assert report["drive miss [m]"] == pytest.approx(abs(achieved - asked), abs=1e-15)
     if kind is LiteralDirichlet:
@@ -146,15 +146,15 @@ def test_dirichlet_reports_its_miss_in_a_run(kind: type) -> None:
 
 def test_neumann_is_exact_in_one_dimension_and_at_flat_faces() -> None:
     for d, where, traction in ((1, "left", {"x": 2e3}), (2, "right", {"x": 1e3, "y": -5e2})):
-        setting = lattice_setting(d, 3.5, 12)
+        model = lattice_model(d, 3.5, 12)
         handler = ApproximateNeumann(where=where, traction=traction, ghosts=f"{where}-ghosts")
-        (condition,) = handler.bind(setting, "load")
+        (condition,) = handler.bind(model, "load")
         rng = np.random.default_rng(d)
-        stress = rng.standard_normal((d, d, setting.particles.count)) * 1e4
-        stress[:, :, setting.particles.ghosts] = 0.0
+        stress = rng.standard_normal((d, d, model.particles.count)) * 1e4
+        stress[:, :, model.particles.ghosts] = 0.0
         condition.impose_stress(0.0, stress)  # type: ignore[attr-defined]
-        smoothed = setting.smoothing_matrix() @ stress.transpose(2, 0, 1).reshape(-1, d * d)
-        face = setting.particles.faces[where].particles
+        smoothed = model.smoothing_matrix() @ stress.transpose(2, 0, 1).reshape(-1, d * d)
+        face = model.particles.faces[where].particles
         normal = np.zeros(d)
         normal[0] = -1.0 if where == "left" else 1.0
         achieved = smoothed.reshape(-1, d, d)[face] @ normal
@@ -165,14 +165,14 @@ def test_neumann_is_exact_in_one_dimension_and_at_flat_faces() -> None:
 
 def test_neumann_where_one_normal_stands_for_two_faces_is_approximate() -> None:
     """At a corner the condition holds for the mean of the two normals, not for each."""
-    setting = lattice_setting(2, 3.5, 12)
+    model = lattice_model(2, 3.5, 12)
     handler = ApproximateNeumann(where="surface", traction={"x": 1e3, "y": 0.0})
-    (condition,) = handler.bind(setting, "load")
-    stress = np.zeros((2, 2, setting.particles.count))
+    (condition,) = handler.bind(model, "load")
+    stress = np.zeros((2, 2, model.particles.count))
     condition.impose_stress(0.0, stress)  # type: ignore[attr-defined]
-    smoothed = setting.smoothing_matrix() @ stress.transpose(2, 0, 1).reshape(-1, 4)
-    X = setting.particles.positions
-    corner = np.flatnonzero((np.abs(X - 1.0) < 1e-9).all(axis=1) & ~setting.particles.ghosts)
+    smoothed = model.smoothing_matrix() @ stress.transpose(2, 0, 1).reshape(-1, 4)
+    X = model.particles.positions
+    corner = np.flatnonzero((np.abs(X - 1.0) < 1e-9).all(axis=1) & ~model.particles.ghosts)
     P = smoothed.reshape(-1, 2, 2)[corner][0]
     diagonal = np.array([1.0, 1.0]) / np.sqrt(2.0)
     # Two passes through an ill-conditioned solve; asked is 1e3.
@@ -199,7 +199,7 @@ def test_reaction_balances_the_load(d: int) -> None:
     state = simulation.run().state
     observation = simulation.dynamics.observe(state)
     report = {}
-    for condition in simulation.conditions:
+    for condition in simulation.terms:
         report |= condition.report(observation)
     assert state.applied["pull"][:, 0].sum() == pytest.approx(1e4, rel=1e-12)
     # At rest but for what damping leaves of the transient, e^(-50 * 0.35).
@@ -217,7 +217,7 @@ def test_uniaxial_strain_under_dead_load_matches_the_closed_form() -> None:
     """P(s) = mu (s - 1/s) + lambda ln s / s, so the mean stretch follows from the load."""
     simulation = static_bar(1)
     state = simulation.run().state
-    lam, mu = simulation.setting.bodies[0].material.lame_parameters
+    lam, mu = simulation.model.bodies[0].material.lame_parameters
     observation = simulation.dynamics.observe(state)
     stretches = observation.deformation_gradients[:, 0, 0]
     from scipy.optimize import brentq
@@ -282,16 +282,16 @@ def test_planes_with_particles_and_ghosts_report_their_reaction_once() -> None:
     builder.boundary("symmetry", axis="x").boundary("symmetry", axis="y")
     simulation = builder.boundary("traction", where="right", traction={"x": 1e3}).build()
     observation = simulation.dynamics.observe(simulation.start())
-    columns = [name for one in simulation.conditions for name in one.report(observation)]
+    columns = [name for one in simulation.terms for name in one.report(observation)]
     assert columns.count("symmetry reaction x [N]") == 1
     assert columns.count("symmetry' reaction y [N]") == 1
     assert len(columns) == len(set(columns))
 
 
 def test_symmetry_needs_something_to_act_on() -> None:
-    setting = box(2).build().setting
+    model = box(2).build().model
     with pytest.raises(SceneError, match="no particle lies on the plane"):
-        Symmetry("x").bind(setting, "plane")
+        Symmetry("x").bind(model, "plane")
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
@@ -303,12 +303,12 @@ def test_ghost_extension_continues_linear_fields_exactly(d: int, on_boundary: bo
         .build()
     )
     particles = simulation.particles
-    (condition,) = GhostExtension().bind(simulation.setting, "ghosts")
+    (condition,) = GhostExtension().bind(simulation.model, "ghosts")
     rng = np.random.default_rng(d)
     slope, constant = rng.standard_normal((d, d)), rng.standard_normal(d)
     linear = particles.positions @ slope + constant
     values = np.where(particles.ghosts[:, None], 0.0, linear)
-    assert isinstance(condition, MotionCondition)
+    assert isinstance(condition, Constraint)
     condition.impose(0.0, 0, values)
     # Images of ghosts beyond a corner lie off the lattice: a fit, of condition about 1e2.
     assert np.abs(values - linear).max() < 1e-12
@@ -321,7 +321,7 @@ def test_returned_forces_are_the_transpose_of_the_extension() -> None:
         .boundary("ghost-extension")
         .build()
     )
-    (condition,) = GhostExtension().bind(simulation.setting, "ghosts")
+    (condition,) = GhostExtension().bind(simulation.model, "ghosts")
     rng = np.random.default_rng(0)
     forces = rng.standard_normal(simulation.particles.positions.shape)
     velocities = rng.standard_normal(forces.shape)
@@ -341,7 +341,7 @@ def test_the_reaction_of_a_moving_wall_holds_the_inertia_of_what_it_moves() -> N
     )
     state = simulation.run().state
     observation = simulation.dynamics.observe(state)
-    report = simulation.conditions[0].report(observation)
+    report = simulation.terms[0].report(observation)
     # The whole bar, 1000 kg/m^2, rigidly at 3 m/s^2; differences in time cost eight digits.
     assert report["lift reaction x [N]"] == pytest.approx(3000.0, rel=1e-6)
     assert state.velocities[:, 0] == pytest.approx(3.0 * 0.05, rel=1e-9)
@@ -353,7 +353,7 @@ def report_of(simulation: Simulation) -> dict[str, float]:
     """Everything that the conditions report at the end of a run."""
     observation = simulation.dynamics.observe(simulation.run().state)
     report: dict[str, float] = {}
-    for condition in simulation.conditions:
+    for condition in simulation.terms:
         report |= condition.report(observation)
     return report
 
@@ -515,7 +515,7 @@ def test_in_the_papers_form_the_reaction_is_read_off_the_stress() -> None:
         .duration(1e-3)
         .build()
     )
-    lam, mu = simulation.setting.bodies[0].material.lame_parameters
+    lam, mu = simulation.model.bodies[0].material.lame_parameters
     stress = mu * (1.01 - 1 / 1.01) + lam * np.log(1.01) / 1.01
     # The plain sum with cover 3 has a slope within 2 % of the true one.
     assert report_of(simulation)["wall reaction x [N]"] == pytest.approx(-stress, rel=0.02)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from solidsph import Simulation, carry_out
+from solidsph import Simulation, solve
 from solidsph.errors import BuildError
 from solidsph.scene.scene_builder import SceneBuilder
 
@@ -42,9 +42,9 @@ def test_pressure_all_round_makes_the_cauchy_stress_hydrostatic() -> None:
         .duration(1.0)
         .build()
     )
-    state = carry_out(made).state
+    state = solve(made).state
     observation = made.dynamics.observe(state)
-    lam, mu = made.setting.bodies[0].material.lame_parameters
+    lam, mu = made.model.bodies[0].material.lame_parameters
 
     def sigma(s: float) -> float:
         return (mu * (s**2 - 1.0) + 2.0 * lam * np.log(s)) / s**2
@@ -54,7 +54,7 @@ def test_pressure_all_round_makes_the_cauchy_stress_hydrostatic() -> None:
     assert np.abs(observation.deformation_gradients - s * np.eye(2)).max() < 1e-7
     # A dead load of the same size would not be a pressure any more: 18 % less area.
     assert abs(s - 1.0) > 0.1
-    reports = [c.report(observation) for c in made.conditions if "pressure" in c.label]
+    reports = [c.report(observation) for c in made.terms if "pressure" in c.label]
     for one in reports:
         asked, achieved = (
             next(v for k, v in one.items() if w in k) for w in ("asked [Pa]", "stress [Pa]")
@@ -85,7 +85,7 @@ def test_a_thick_ring_under_inner_pressure_is_lames() -> None:
         .duration(1.0)
         .build()
     )
-    state = carry_out(made).state
+    state = solve(made).state
     X = made.particles.positions
     r = np.linalg.norm(X, axis=1)
     u = np.einsum("ni,ni->n", state.positions - X, X) / r

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from solidsph import BuildError, Simulation
-from solidsph.interfaces.condition import ForceCondition
+from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array
 from tests.helpers.scenes import SOFT, box
 
 JITTERED = {"type": "jittered-lattice", "amplitude": 0.2, "seed": 4}
 
 
-def viscous(d: int, cells: int, **strengths: float) -> tuple[Simulation, ForceCondition]:
+def viscous(d: int, cells: int, **strengths: float) -> tuple[Simulation, Load]:
     simulation = box(d, cells).effect("artificial-viscosity", **strengths).build()
     (load,) = simulation.dynamics.loads
     return simulation, load
@@ -31,7 +31,7 @@ def test_a_uniform_compression_meets_the_pressure_it_says(
     v = -rate * (X - 0.5)
     forces = load.forces(0.0, X, v)
     # Power of the pairs by particle: half of each pair's, from the forces of one particle alone.
-    spacing, c = 1.0 / cells, simulation.setting.bodies[0].material.wave_speed
+    spacing, c = 1.0 / cells, simulation.model.bodies[0].material.wave_speed
     pressure = (
         0.5 * SOFT["density"] * (linear * c * spacing * rate + quadratic * (spacing * rate) ** 2)
     )
@@ -46,7 +46,7 @@ def test_a_uniform_compression_meets_the_pressure_it_says(
     pulls = load.pull((X[q] - X[p]).T, (v[q] - v[p]).T, pairs.values[own].T)  # type: ignore[attr-defined]
     virial = -0.5 * float(pulls @ np.sum((X[q] - X[p]) ** 2, axis=1))
     V = simulation.particles.volumes[p]
-    smoothing = simulation.setting.bodies[0].smoothing
+    smoothing = simulation.model.bodies[0].smoothing
     R = np.linalg.norm(X[q] - X[p], axis=1)
     sum_of_slopes = float(V * R @ np.abs(smoothing.slope(R)))  # the integral of it is d
     assert sum_of_slopes == pytest.approx(d, rel=0.01)  # a lattice's sum, three spacings wide
@@ -99,7 +99,7 @@ def test_the_declared_rate_bounds_the_true_one() -> None:
     masses = np.repeat(simulation.dynamics.masses, 2)
     true = np.linalg.eigvals(damping / masses[:, None]).real.max()
     (effect,) = simulation.effects.values()
-    declared = effect.damping_rate(simulation.setting.bodies)
+    declared = effect.damping_rate(simulation.model.bodies)
     assert true <= declared < 2.5 * true
 
 

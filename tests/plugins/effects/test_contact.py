@@ -80,7 +80,7 @@ def flying(d: int = 2, cells: int = 6, **contact: Any) -> SceneBuilder:
 def test_momenta_stay_and_the_ledger_closes(d: int, friction: float, tmp_path: Path) -> None:
     simulation = flying(d, {1: 10, 2: 6, 3: 4}[d], friction=friction).build()
     simulation.run(record=tmp_path / "run.h5")
-    m = simulation.setting.masses
+    m = simulation.model.masses
     with Record(tmp_path / "run.h5") as record:
         x, v, history = record.positions[:], record.field("velocity")[:], record.history
     assert history["contact touching pairs [-]"].max() > 0.0
@@ -325,7 +325,7 @@ def test_the_force_told_is_what_changes_the_momentum(friction: float, bodies: in
     """Nothing else acts on a body as a whole: the forces on it that are told, with friction, are
     mass times acceleration of all its particles."""
     simulation = rubbing(friction, bodies)
-    state, loop, m = simulation.start(), simulation.time_loop(), simulation.setting.masses
+    state, loop, m = simulation.start(), simulation.time_loop(), simulation.model.masses
     one, rubbed = condition(simulation), 0.0
     for step in (0, 1, 5, 20):
         state = loop.advance(state, step) if step else state
@@ -407,9 +407,9 @@ def test_the_declared_frequency_holds_however_they_meet() -> None:
     """Also deep, and at a lattice's worst; the kit looks at bodies at rest."""
     for d, cells in ((1, 8), (2, 5)):
         simulation = touching(d, cells, discretisation=JITTERED).effect("contact").build()
-        bodies: list[Body] = list(simulation.setting.bodies)
+        bodies: list[Body] = list(simulation.model.bodies)
         (effect,) = simulation.effects.values()
-        s, m = 1.0 / cells, simulation.setting.masses
+        s, m = 1.0 / cells, simulation.model.masses
         for gap in (-0.1, -0.5, -0.8):
             x = apart(simulation, gap * s, 0.3 * s)
             step, columns = 1e-5 * s, []

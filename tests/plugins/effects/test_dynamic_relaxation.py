@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solidsph import Simulation, carry_out
+from solidsph import Simulation, solve
 from solidsph.errors import BuildError
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.statics import frequencies
@@ -25,7 +25,7 @@ def hanging() -> SceneBuilder:
 
 
 def test_it_comes_to_rest_at_the_equilibrium() -> None:
-    at_rest = carry_out(hanging().statics().build()).state.positions
+    at_rest = solve(hanging().statics().build()).state.positions
     made = hanging().build()
     sag = np.abs(at_rest - made.particles.positions).max()
     left = {}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from solidsph import Record, Simulation, carry_out
+from solidsph import Record, Simulation, solve
 from solidsph.errors import BuildError
 from solidsph.scene.scene_builder import SceneBuilder
 
@@ -79,7 +79,7 @@ def test_heat_is_conserved_and_flows_in_every_direction(d: int) -> None:
     begun, done = made.start(), made.run().state
     (name,) = [key for key in begun.memory if "temperature" in key]
     before, after = begun.memory[name], done.memory[name]
-    masses = made.setting.masses
+    masses = made.model.masses
     assert masses @ after == pytest.approx(masses @ before, rel=1e-12)
     assert np.ptp(after) < 0.7 * np.ptp(before)
     assert after.max() <= before.max()  # no place gets hotter than the hottest
@@ -98,7 +98,7 @@ def test_a_hindered_bar_has_the_stress_of_the_law() -> None:
     (heat,) = made.dynamics.loads
     X = made.particles.positions
     force = heat.forces(0.0, X, np.zeros_like(X))
-    material = made.setting.bodies[0].material
+    material = made.model.bodies[0].material
     g = 1.0 + expansion * T
     F = np.eye(3)[:, :, None] / g
     P = g**2 * np.asarray(material.first_piola(F, material.params)[0][0])
@@ -131,8 +131,8 @@ def test_a_free_sheet_swells_without_stress_in_its_plane() -> None:
         .duration(1.0)
         .build()
     )
-    state = carry_out(made).state
-    lam, mu = made.setting.bodies[0].material.lame_parameters
+    state = solve(made).state
+    lam, mu = made.model.bodies[0].material.lame_parameters
     g = 1.0 + expansion * T
 
     def stress(s: float) -> float:

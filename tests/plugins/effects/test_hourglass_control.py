@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solidsph import BuildError, Record, Simulation
-from solidsph.engines.compiled.mismatch import MismatchSweeps
-from solidsph.interfaces.condition import ForceCondition
-from solidsph.interfaces.mismatch import MismatchProducts
+from solidsph.engines.compiled.hourglass_sweeps import HourglassSweeps
+from solidsph.interfaces.hourglass_energy import HourglassProducts
+from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.statics import equilibrium
@@ -35,7 +35,7 @@ def block(d: int, gradient: str = "corrected") -> SceneBuilder:
     )
 
 
-def penalty_of(simulation: Simulation) -> ForceCondition:
+def penalty_of(simulation: Simulation) -> Load:
     (load,) = simulation.dynamics.loads
     return load
 
@@ -116,7 +116,7 @@ def test_a_checkerboard_is_no_longer_free(d: int) -> None:
         signs = np.where(np.rint(X / spacing - 0.5).sum(axis=1) % 2, -1.0, 1.0)
         u = 1e-6 * spacing * signs[:, None] * np.ones(d)
         response = simulation.dynamics.respond(0.0, X + u, np.zeros_like(X))
-        material = simulation.setting.bodies[0].material
+        material = simulation.model.bodies[0].material
         speed = np.sqrt(material.lame_parameters[1] / material.density)
         # Two supports inside, no sum reaches a particle whose own sums reach the surface.
         inside = np.minimum(X, 1.0 - X).min(axis=1) > 6.0 * spacing
@@ -208,10 +208,10 @@ def test_sweeps_products_and_the_matrix_are_the_same(d: int, gradient: str) -> N
     )
     simulation = builder.build()
     assert simulation.particles.ghosts.any()
-    (body,) = simulation.setting.bodies
+    (body,) = simulation.model.bodies
     u = random_motion(simulation) - simulation.particles.positions
-    mismatch = penalised(body, 0.3)
-    products, sweeps = MismatchProducts.of(mismatch), MismatchSweeps.of(mismatch)
+    pairs = penalised(body, 0.3)
+    products, sweeps = HourglassProducts.of(pairs), HourglassSweeps.of(pairs)
     expected = -(products.matrix() @ u)
     assert np.abs(expected[simulation.particles.ghosts]).max() > 0.0  # by the gradient's adjoint
     # Sums of some hundred terms in another order.
@@ -220,7 +220,7 @@ def test_sweeps_products_and_the_matrix_are_the_same(d: int, gradient: str) -> N
         assert np.abs(operator.forces(u) - expected).max() < allowed
     state = attrs.evolve(simulation.initial, positions=simulation.particles.positions + u)
     H = simulation.dynamics.observe(state).deformation_gradients - np.eye(d)
-    energy = 0.25 * mismatch.squares(u, H).sum()
+    energy = 0.25 * pairs.squares(u, H).sum()
     assert energy == pytest.approx(-0.5 * float(np.vdot(u, expected)), rel=1e-12)
     total = sweeps.forces(u).sum(axis=0)
     assert np.abs(total).max() < 1e-14 * np.abs(expected).sum()
@@ -249,9 +249,9 @@ def test_the_declared_stiffness_bounds_the_true_one_closely(
             .build()
         )
         effect = HourglassControl(strength=0.3)
-        bodies = simulation.setting.bodies
+        bodies = simulation.model.bodies
         declared = effect.stiffness_rate(bodies)
-        K = MismatchProducts.of(penalised(bodies[0], 0.3)).matrix().toarray()
+        K = HourglassProducts.of(penalised(bodies[0], 0.3)).matrix().toarray()
     scaling = 1.0 / np.sqrt(bodies[0].masses)
     true = np.sqrt(np.linalg.eigvalsh(scaling[:, None] * K * scaling)[-1])
     assert true <= declared <= 1.02 * true
@@ -275,7 +275,7 @@ def test_a_column_thrown_to_the_side_needs_it() -> None:
             builder = builder.effect("hourglass-control", strength=strength)
         simulation = builder.build()
         u = simulation.run().state.positions - simulation.particles.positions
-        W = simulation.setting.smoothing_matrix()
+        W = simulation.model.smoothing_matrix()
         away = u - W @ u / W.sum(axis=1)[:, None]
         return float(9.0 * np.linalg.norm(away, axis=1).max())
 

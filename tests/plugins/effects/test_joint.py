@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from solidsph import Simulation, carry_out
+from solidsph import Simulation, solve
 from solidsph.errors import BuildError
 from solidsph.maths.arrays import Array
 from solidsph.scene.scene_builder import SceneBuilder
@@ -72,7 +72,7 @@ def test_two_bars_in_series(ratio: float) -> None:
             .build()
         )
         X = made.particles.positions[:, 0]
-        u = carry_out(made).state.positions[:, 0] - X
+        u = solve(made).state.positions[:, 0] - X
         # Between a particle well inside each bar, what the ends do is left out.
         i, j = np.argmin(np.abs(X - 0.5)), np.argmin(np.abs(X - 1.5))
         expected = sigma * ((1 - X[i]) / modulus(ratio * E) + (X[j] - 1) / modulus(E))
@@ -112,7 +112,7 @@ def _divided(ratio: float, particles: int) -> Array:
         .build()
     )
     state = made.run().state
-    momentum, start = (made.setting.masses @ one.velocities for one in (state, made.initial))
+    momentum, start = (made.model.masses @ one.velocities for one in (state, made.initial))
     assert momentum == pytest.approx(start, rel=1e-9)
     X, v = made.particles.positions[:, 0], state.velocities[:, 0]
     back, beyond = v[(X > 0.5) & (X < 0.9)], v[X > 1.0]
@@ -144,7 +144,7 @@ def test_joined_blocks_keep_momentum_and_energy_when_they_spin() -> None:
         .build()
     )
     state = made.run().state
-    m, x, v = made.setting.masses, state.positions, state.velocities
+    m, x, v = made.model.masses, state.positions, state.velocities
     start = made.initial
     spin, before = (
         float(m @ (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]))
@@ -158,7 +158,7 @@ def test_joined_blocks_keep_momentum_and_energy_when_they_spin() -> None:
     # The step's own error, of the second order: 4e-4 at this step.
     assert energy[0] + strain - state.work["joint"] == pytest.approx(energy[1], rel=1e-3)
     # Still one body: without the joint the halves part.
-    centres = [x[b.extent].mean(axis=0) for b in made.setting.bodies]
+    centres = [x[b.extent].mean(axis=0) for b in made.model.bodies]
     assert np.linalg.norm(np.subtract(*centres)) < 0.6
 
 

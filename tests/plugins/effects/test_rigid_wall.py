@@ -184,7 +184,7 @@ def test_a_body_touches_where_its_surface_is(height: float, discretisation: Any)
         .duration(0.01)
         .build()
     )
-    wall = simulation.conditions[0]
+    wall = simulation.terms[0]
     X = simulation.particles.positions
 
     def pressure(moved: float) -> float:
@@ -220,7 +220,7 @@ def test_a_disc_touches_at_its_lowest_point() -> None:
         .duration(0.01)
         .build()
     )
-    wall = simulation.conditions[0]
+    wall = simulation.terms[0]
     X = simulation.particles.positions
     # Rounding, as above. Where rows are closer than a spacing, half of one is more than there is.
     assert np.abs(wall.forces(0.0, X, np.zeros_like(X))).max() <= 1e-8  # type: ignore[attr-defined]

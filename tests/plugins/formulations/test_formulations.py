@@ -142,7 +142,7 @@ def test_formulations_approach_each_other_under_refinement(one: str, other: str)
 
 def stirred(simulation: Simulation, speed: float) -> State:
     """A random velocity of every particle, of `speed` in units of the wave speed."""
-    wave_speed = simulation.setting.bodies[0].material.wave_speed
+    wave_speed = simulation.model.bodies[0].material.wave_speed
     noise = np.random.default_rng(7).normal(size=simulation.initial.positions.shape)
     return attrs.evolve(simulation.initial, velocities=speed * wave_speed * noise)
 
@@ -184,7 +184,7 @@ def test_energy_error_falls_with_the_square_of_the_step(integrator: str) -> None
     body = free_body("total-lagrangian", lengths=LENGTHS[2], integrator=integrator)
     X, m = body.particles.positions, body.dynamics.masses
     volumes = body.particles.volumes
-    wave_speed = body.setting.bodies[0].material.wave_speed
+    wave_speed = body.model.bodies[0].material.wave_speed
     start = attrs.evolve(
         body.initial, velocities=0.02 * wave_speed * np.sin(3.0 * X[:, ::-1]) * [1.0, -1.0]
     )

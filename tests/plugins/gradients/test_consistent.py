@@ -50,7 +50,7 @@ def gradients(body: Body, values: Array) -> Array:
 
 def sums(simulation: Built) -> Array:
     """Sum over q of V_q g_qp, less the area of p, (n, d): 0 where parts are integrated exactly."""
-    (body,) = simulation.setting.bodies
+    (body,) = simulation.model.bodies
     pairs, V = body.pairs(), body.particles.volumes
     slopes = body.smoothing.gradient(pairs.offsets, pairs.distances)
     weights = body.formulation.gradient.weights(pairs, slopes, body.particles.cells)
@@ -68,11 +68,11 @@ def test_linear_fields_are_exact_at_every_particle(
     gradient = example_part("gradients", name)
     if gradient.exact_degree < 1:
         # Broken once to see it: the standard one misses by the whole slope at a corner.
-        body = block(dimension, gradient).build().setting.bodies[0]
+        body = block(dimension, gradient).build().model.bodies[0]
         wrong = gradients(body, body.particles.positions[:, 0])
         assert np.abs(wrong - np.eye(dimension)[0]).max() > 1e-2
         return
-    body = block(dimension, gradient, discretisation).build().setting.bodies[0]
+    body = block(dimension, gradient, discretisation).build().model.bodies[0]
     slope = np.array([1.0, -2.0, 0.5])[:dimension]
     found = gradients(body, 3.0 + body.particles.positions @ slope)
     # What the project asks for; rounding alone is far below.
@@ -114,7 +114,7 @@ def test_without_consistency_they_do_not(of: str) -> None:
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_quadratic_fields_stay_exact(dimension: int) -> None:
-    body = block(dimension, "consistent").build().setting.bodies[0]
+    body = block(dimension, "consistent").build().model.bodies[0]
     X = body.particles.positions
     values = 1.0 + X[:, 0] - 2.0 * X[:, 1] + X[:, 0] * X[:, 1] - 0.5 * X[:, 1] ** 2
     exact = np.zeros_like(X)
@@ -160,7 +160,7 @@ def test_a_constant_stress_is_uniform_up_to_the_loaded_edge() -> None:
 
 def test_weights_are_found_row_by_row() -> None:
     """An engine may ask for some rows at a time: what is added depends on these rows alone."""
-    body = block(3, "consistent").build().setting.bodies[0]
+    body = block(3, "consistent").build().model.bodies[0]
     pairs, gradient = body.pairs(), body.formulation.gradient
     slopes = body.smoothing.gradient(pairs.offsets, pairs.distances)
     whole = gradient.weights(pairs, slopes, body.particles.cells)

@@ -28,7 +28,7 @@ def block(lengths: list[float], spacing: float, gradient: str, jitter: float = 0
         .formulation("total-lagrangian", gradient=gradient)
         .duration(1.0)
         .build()
-        .setting.bodies[0]
+        .model.bodies[0]
     )
 
 

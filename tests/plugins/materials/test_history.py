@@ -80,7 +80,7 @@ def test_every_engine_remembers_the_same(name: str, d: int) -> None:
     # Rounding, which some hundred steps of a smooth motion carry on without much growth.
     assert np.abs(one.positions - other.positions).max() < 1e-11 * motion
     assert set(one.memory) == set(other.memory)
-    history = memory_name(block(d, VISCOELASTIC).build().setting.bodies[0])
+    history = memory_name(block(d, VISCOELASTIC).build().model.bodies[0])
     scale = np.maximum(np.abs(one.memory[history]).max(axis=0), 1e-12)
     assert np.abs((one.memory[history] - other.memory[history]) / scale).max() < 1e-9
 

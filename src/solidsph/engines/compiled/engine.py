@@ -24,13 +24,13 @@ from solidsph.engines.compiled.shares import (
 )
 from solidsph.engines.matrix import MatrixEngine
 from solidsph.interfaces.body import Body, part_of
-from solidsph.interfaces.condition import StressCondition
 from solidsph.interfaces.engine import Engine, InternalForces, StressFields
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.law import Law
 from solidsph.interfaces.operation_count import Tally
+from solidsph.interfaces.terms import StressTerm
 from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.maths.arrays import Array, Indices
 from solidsph.maths.tensors import components_first, particles_first
@@ -60,7 +60,7 @@ class CompiledEngine(Engine):
     def prepare(
         self,
         bodies: Sequence[Body],
-        conditions: Sequence[StressCondition],
+        conditions: Sequence[StressTerm],
         evaluations: int = 1,
     ) -> InternalForces:
         try:
@@ -82,7 +82,7 @@ class CompiledForces(InternalForces):
     """Internal forces by compiled sweeps."""
 
     parts: Sequence[CompiledBody | MovingBody]
-    conditions: Sequence[StressCondition]
+    conditions: Sequence[StressTerm]
 
     @property
     def pair_count(self) -> int:

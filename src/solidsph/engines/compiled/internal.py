@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from solidsph.engines.compiled.chain import chain
 from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.engines.compiled.rows import Rows
-from solidsph.interfaces.condition import StressCondition
-from solidsph.interfaces.declared import LinearExtension
+from solidsph.interfaces.compilable_terms import LinearExtension
+from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Indices
 
 if TYPE_CHECKING:
@@ -65,9 +65,7 @@ class Internal(NamedTuple):
     data: Any
 
 
-def internal_forces(
-    parts: Sequence[CompiledBody], conditions: Sequence[StressCondition]
-) -> Internal:
+def internal_forces(parts: Sequence[CompiledBody], conditions: Sequence[StressTerm]) -> Internal:
     """The internal forces of prepared bodies under these conditions.
 
     Raises:

@@ -12,25 +12,25 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
 from solidsph.engines.compiled.chain import chain
-from solidsph.engines.compiled.mismatch import MismatchSweeps, Sweeps, body_sweep
+from solidsph.engines.compiled.hourglass_sweeps import HourglassSweeps, Sweeps, body_sweep
 from solidsph.engines.compiled.pointwise import (
     NotCompilableError,
     compiled_function,
     numbers_type,
 )
 from solidsph.engines.compiled.vectors import ROW, moved
-from solidsph.interfaces.condition import ForceCondition
-from solidsph.interfaces.declared import (
-    MismatchForce,
-    PairForce,
-    PointwiseForce,
-    ScheduledForce,
+from solidsph.interfaces.compilable_terms import (
+    HourglassLoad,
+    PairLoad,
+    PointwiseLoad,
+    ScheduledLoad,
 )
-from solidsph.interfaces.mismatch import MismatchOperator
+from solidsph.interfaces.hourglass_energy import HourglassOperator
+from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array, Indices
 
 
-class Load(NamedTuple):
+class LoadData(NamedTuple):
     """What the loop holds of one load; `own` is what its kind needs."""
 
     particles: Indices  # (k,)
@@ -61,8 +61,8 @@ class Paired(NamedTuple):
     values: Array  # (m, k)
 
 
-class Mismatched(NamedTuple):
-    """Forces of mismatches."""
+class HourglassData(NamedTuple):
+    """Hourglass forces."""
 
     bodies: tuple[Sweeps, ...]
     now: Scheduled  # those of the step in hand
@@ -75,7 +75,7 @@ class LoadPass(NamedTuple):
     own: Callable[[Array], Any]  # times (t,) at which the steps to come end -> what its kind needs
 
 
-def load_pass(load: ForceCondition, reference: Array, threaded: bool) -> LoadPass:
+def load_pass(load: Load, reference: Array, threaded: bool) -> LoadPass:
     """The pass of a load on particles whose X is `reference` (n, d) [m].
 
     Raises:
@@ -83,27 +83,27 @@ def load_pass(load: ForceCondition, reference: Array, threaded: bool) -> LoadPas
     """
     d = reference.shape[1]
     match load:
-        case ScheduledForce():
+        case ScheduledLoad():
             return LoadPass(
                 _accounted(_scheduled(d), d, threaded),
                 lambda times: Scheduled(np.ascontiguousarray(load.schedule(times))),
             )
-        case MismatchForce():
+        case HourglassLoad():
             sweeps = [_sweeps(operator) for operator in load.operators]
-            own = Mismatched(
+            own = HourglassData(
                 tuple(one.arrays for one in sweeps), Scheduled(np.zeros((1, *reference.shape)))
             )
             each = chain(tuple(body_sweep(one.sweep) for one in sweeps))
             account = _accounted(_scheduled(d), d, threaded)
-            return LoadPass(_mismatch(each, account), lambda times: own)
-        case PairForce():
+            return LoadPass(_hourglass(each, account), lambda times: own)
+        case PairLoad():
             table = load.pairs
             count = table.values.shape[1]
             vector = numbers_type(d)
             pull = compiled_function(load.pull, vector, vector, numbers_type(count))
             paired = Paired(reference, table.starts, table.columns, table.values)
             return LoadPass(_accounted(_paired(pull, d, count), d, threaded), lambda times: paired)
-        case PointwiseForce():
+        case PointwiseLoad():
             values = np.ascontiguousarray(load.values)
             count = values.shape[1]
             vector = numbers_type(d)
@@ -151,12 +151,12 @@ def _scheduled(dimension: int) -> Any:
 
 
 @cache
-def _mismatch(each: Any, account: Any) -> Any:
+def _hourglass(each: Any, account: Any) -> Any:
     @njit
     def apply(load, step, u, v, path, total):
         own = load.own
         each(own.bodies, u, own.now.table[0])
-        account(Load(load.particles, load.before, load.work, own.now), 0, u, v, path, total)
+        account(LoadData(load.particles, load.before, load.work, own.now), 0, u, v, path, total)
 
     return apply
 
@@ -182,10 +182,10 @@ def _paired(pull: Any, dimension: int, count: int) -> Any:
     return fill
 
 
-def _sweeps(operator: MismatchOperator) -> MismatchSweeps:
-    if isinstance(operator, MismatchSweeps):
+def _sweeps(operator: HourglassOperator) -> HourglassSweeps:
+    if isinstance(operator, HourglassSweeps):
         return operator
-    return MismatchSweeps.of(operator.mismatch)
+    return HourglassSweeps.of(operator.pairs)
 
 
 @cache

@@ -12,7 +12,7 @@ from numba import njit, prange, types
 
 from solidsph.engines.compiled.chain import chain
 from solidsph.engines.compiled.internal import Internal, internal_forces
-from solidsph.engines.compiled.loads import Load, LoadPass, load_pass
+from solidsph.engines.compiled.loads import LoadData, LoadPass, load_pass
 from solidsph.engines.compiled.motions import (
     Following,
     MotionWords,
@@ -22,16 +22,16 @@ from solidsph.engines.compiled.motions import (
 )
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function
 from solidsph.engines.compiled.shares import thread_count
-from solidsph.interfaces.condition import ExtensionCondition, StressCondition
-from solidsph.interfaces.declared import (
-    DECLARED_LOADS,
+from solidsph.interfaces.compilable_terms import (
+    COMPILABLE_LOADS,
     LinearExtension,
-    ScheduledForce,
-    ScheduledMotion,
+    ScheduledConstraint,
+    ScheduledLoad,
 )
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
+from solidsph.interfaces.terms import GhostConstraint, StressTerm
 from solidsph.interfaces.time_loop import NOT_FINITE, StepError, TimeLoop
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
@@ -62,27 +62,29 @@ class _Moving(NamedTuple):
 
 def are_declared(
     bodies: Sequence[CompiledBody],
-    conditions: Sequence[StressCondition],
+    conditions: Sequence[StressTerm],
     equation: EquationOfMotion,
     integrator: Integrator,
 ) -> bool:
     """Whether everything in a step is of a kind that this loop knows; then only a formula that
     does not compile can be in its way."""
-    labels = [c.label for c in (*equation.loads, *equation.motions)]
+    labels = [c.label for c in (*equation.loads, *equation.constraints)]
     fused = not conditions and all(body.fused for body in bodies)
     alone = len(bodies) == 1 and all(isinstance(one, LinearExtension) for one in conditions)
     return (
         isinstance(integrator, PointwiseIntegrator)
         and (fused or alone)
-        and all(isinstance(load, DECLARED_LOADS) for load in equation.loads)
+        and all(isinstance(load, COMPILABLE_LOADS) for load in equation.loads)
         and all(labels.count(load.label) == 1 for load in equation.loads)
-        and all(isinstance(one, (ScheduledMotion, LinearExtension)) for one in equation.motions)
+        and all(
+            isinstance(one, (ScheduledConstraint, LinearExtension)) for one in equation.constraints
+        )
     )
 
 
 def compiled_loop(
     bodies: Sequence[CompiledBody],
-    conditions: Sequence[StressCondition],
+    conditions: Sequence[StressTerm],
     sums: InternalForces,
     equation: EquationOfMotion,
     integrator: Integrator,
@@ -104,7 +106,7 @@ def compiled_loop(
         body.gradient_shares.check()
     internal = internal_forces(bodies, conditions)
     loads = [load_pass(load, particles.positions, threads > 1) for load in equation.loads]
-    words = [motion_words(motion, d) for motion in equation.motions]
+    words = [motion_words(motion, d) for motion in equation.constraints]
     by_word = [tuple(one[k] for one in words) for k in range(len(MotionWords._fields))]
     steps = _steps(
         d,
@@ -142,12 +144,12 @@ class CompiledLoop(TimeLoop):
         return max(1, min(_TABLE // max(1, width), int(_AT_ONCE / work)))
 
     @property
-    def _scheduled_loads(self) -> Sequence[ScheduledForce]:
-        return [c for c in self.equation.loads if isinstance(c, ScheduledForce)]
+    def _scheduled_loads(self) -> Sequence[ScheduledLoad]:
+        return [c for c in self.equation.loads if isinstance(c, ScheduledLoad)]
 
     @property
-    def _scheduled_motions(self) -> Sequence[ScheduledMotion]:
-        return [c for c in self.equation.motions if isinstance(c, ScheduledMotion)]
+    def _scheduled_motions(self) -> Sequence[ScheduledConstraint]:
+        return [c for c in self.equation.constraints if isinstance(c, ScheduledConstraint)]
 
     def advance(self, state: State, stop: int) -> State:
         equation, X = self.equation, self.equation.particles.positions
@@ -220,27 +222,27 @@ class _Accounts:
         handed = _handed_on(sums, equation, state.time, u, loads)
         reactions = [
             (state.applied[motion.label] - handed.get(motion.label, 0.0))[motion.entries]
-            if isinstance(motion, ScheduledMotion)
+            if isinstance(motion, ScheduledConstraint)
             else np.empty(0)
-            for motion in equation.motions
+            for motion in equation.constraints
         ]
         return cls(sums, equation, dict(state.work), loads, reactions)
 
-    def loads(self, own: Sequence[Any], threads: int) -> tuple[Load, ...]:
+    def loads(self, own: Sequence[Any], threads: int) -> tuple[LoadData, ...]:
         """What the loop holds of the loads, with what each kind needs."""
         each = zip(self.equation.loads, self.load_forces, own, strict=True)
         return tuple(
-            Load(load.particles, before, np.zeros(threads), one) for load, before, one in each
+            LoadData(load.particles, before, np.zeros(threads), one) for load, before, one in each
         )
 
     def motions(self, times: Array) -> tuple[Scheduled | Following, ...]:
         """What the loop holds of the motions."""
-        pairs = zip(self.equation.motions, self.reactions, strict=True)
+        pairs = zip(self.equation.constraints, self.reactions, strict=True)
         return tuple(motion_data(motion, times, before) for motion, before in pairs)
 
-    def settle(self, loads: Sequence[Load], motions: Sequence[Scheduled | Following]) -> None:
+    def settle(self, loads: Sequence[LoadData], motions: Sequence[Scheduled | Following]) -> None:
         """Take back what the loop has done with them."""
-        conditions = (*self.equation.loads, *self.equation.motions)
+        conditions = (*self.equation.loads, *self.equation.constraints)
         for condition, part in zip(conditions, (*loads, *motions), strict=True):
             self.work[condition.label] += float(part.work.sum())
         # The arrays `before` are the ones handed out: the loop has written on them.
@@ -248,11 +250,11 @@ class _Accounts:
     def applied(self, time: float, u: Array) -> Mapping[str, Array]:
         """Force of every account on every particle, (n, d) [N], at displacements u (n, d)."""
         equation = self.equation
-        applied = {c.label: np.zeros_like(u) for c in (*equation.loads, *equation.motions)}
+        applied = {c.label: np.zeros_like(u) for c in (*equation.loads, *equation.constraints)}
         for load, force in zip(equation.loads, self.load_forces, strict=True):
             applied[load.label][load.particles] += force
-        for motion, reaction in zip(equation.motions, self.reactions, strict=True):
-            if isinstance(motion, ScheduledMotion):
+        for motion, reaction in zip(equation.constraints, self.reactions, strict=True):
+            if isinstance(motion, ScheduledConstraint):
                 applied[motion.label][motion.entries] += reaction
         for label, force in _handed_on(self.sums, equation, time, u, self.load_forces).items():
             applied[label] += force
@@ -267,7 +269,7 @@ def _handed_on(
     load_forces: Sequence[Array],
 ) -> Mapping[str, Array]:
     """What ghosts take from themselves and give to those they follow, (n, d) [N] by account."""
-    extensions = [c for c in equation.motions if isinstance(c, ExtensionCondition)]
+    extensions = [c for c in equation.constraints if isinstance(c, GhostConstraint)]
     if not extensions:
         return {}
     with np.errstate(all="ignore"):

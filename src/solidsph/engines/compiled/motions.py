@@ -10,8 +10,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from solidsph.engines.compiled.pointwise import NotCompilableError
-from solidsph.interfaces.condition import MotionCondition
-from solidsph.interfaces.declared import LinearExtension, ScheduledMotion
+from solidsph.interfaces.compilable_terms import LinearExtension, ScheduledConstraint
+from solidsph.interfaces.terms import Constraint
 from solidsph.maths.arrays import Array, Indices
 
 
@@ -47,27 +47,27 @@ class MotionWords(NamedTuple):
     react: Any
 
 
-def motion_words(motion: MotionCondition, dimension: int) -> MotionWords:
+def motion_words(motion: Constraint, dimension: int) -> MotionWords:
     """The words of a motion's kind.
 
     Raises:
         NotCompilableError: it is not of a declared kind.
     """
     match motion:
-        case ScheduledMotion():
+        case ScheduledConstraint():
             return _scheduled()
         case LinearExtension():
             return _following(dimension)
     raise NotCompilableError(f"motion {motion.label!r} is not of a declared kind")
 
 
-def motion_data(motion: MotionCondition, times: Array, before: Array) -> Scheduled | Following:
+def motion_data(motion: Constraint, times: Array, before: Array) -> Scheduled | Following:
     """What the loop holds of a motion over steps that end at `times` (t,) [s].
 
     `before` (m,) is its reaction at the start [N].
     """
     match motion:
-        case ScheduledMotion():
+        case ScheduledConstraint():
             particles, axes = motion.entries
             u, v, a = (np.ascontiguousarray(motion.schedule(times, k)) for k in range(3))
             return Scheduled(particles, axes, u, v, a, before, np.zeros(1))

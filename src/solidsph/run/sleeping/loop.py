@@ -10,7 +10,7 @@ import numpy as np
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body, part_of
-from solidsph.interfaces.declared import MismatchForce, ScheduledForce, ScheduledMotion
+from solidsph.interfaces.compilable_terms import HourglassLoad, ScheduledConstraint, ScheduledLoad
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
 from solidsph.interfaces.time_loop import StepError, TimeLoop
 from solidsph.maths.arrays import Array, Indices, Mask
@@ -42,7 +42,7 @@ def check_sleep(simulation: BuiltScene) -> None:
     """Raise SceneError if a part of the scene cannot sleep."""
     dynamics = simulation.dynamics
     dynamics.internal.check_parts()
-    for condition in [*dynamics.motions, *dynamics.loads]:
+    for condition in [*dynamics.constraints, *dynamics.loads]:
         check_restrictable(condition)
     if not isinstance(simulation.integrator, PointwiseIntegrator):
         raise SceneError(
@@ -56,9 +56,9 @@ def sleeping_loop(simulation: BuiltScene) -> SleepingLoop:
     wanted = simulation.scene.sleep
     assert wanted is not None
     check_sleep(simulation)
-    (body,) = simulation.setting.bodies
+    (body,) = simulation.model.bodies
     slabs = Slabs.across(simulation.particles, wanted.slabs)
-    mismatched = any(isinstance(one, MismatchForce) for one in simulation.dynamics.loads)
+    controlled = any(isinstance(one, HourglassLoad) for one in simulation.dynamics.loads)
     fastest = body.material.wave_speed * simulation.step_size
     steps = max(1, int(_CROSSED * slabs.width / fastest))
     spacing = float(body.particles.spacings.max())
@@ -72,9 +72,9 @@ def sleeping_loop(simulation: BuiltScene) -> SleepingLoop:
         steps_at_once=steps,
         reach=steps * fastest + _PRECURSOR * spacing,
         highest=lattice_frequency([body]),
-        # Forces are right where the neighbours of the neighbours are there too; those of a mismatch
+        # Forces are right where the neighbours of the neighbours are there too; hourglass forces
         # need them of the partners of the neighbours.
-        halo=(4.0 if mismatched else 2.0) * body.smoothing.support_radius,
+        halo=(4.0 if controlled else 2.0) * body.smoothing.support_radius,
     )
 
 
@@ -151,12 +151,12 @@ class SleepingLoop(TimeLoop):
         """Slabs on which something that is imposed changes in the next steps."""
         found = np.zeros(self.slabs.count, dtype=np.bool_)
         times = time + self.step_size * np.arange(count + 1, dtype=np.float64)
-        for motion in self.dynamics.motions:
-            assert isinstance(motion, ScheduledMotion)
+        for motion in self.dynamics.constraints:
+            assert isinstance(motion, ScheduledConstraint)
             values = motion.schedule(times, 0)
             found |= self.slabs.marked(motion.entries[0][np.ptp(values, axis=0) > 0.0])
         for load in self.dynamics.loads:
-            if isinstance(load, ScheduledForce):
+            if isinstance(load, ScheduledLoad):
                 changes = np.ptp(load.schedule(times), axis=0).max(axis=1) > 0.0
                 found |= self.slabs.marked(load.particles[changes])
         return found
@@ -177,14 +177,14 @@ class SleepingLoop(TimeLoop):
         u = full.x[chosen.particles] - whole.particles.positions[chosen.particles]
         motions = [
             chosen.motion(motion, asleep)
-            for motion in whole.motions
-            if isinstance(motion, ScheduledMotion)
+            for motion in whole.constraints
+            if isinstance(motion, ScheduledConstraint)
         ]
         dynamics = Dynamics(
             particles=part_of(self.body, chosen.particles).particles,
             masses=whole.masses[chosen.particles],
             internal=internal,
-            motions=[Frozen.of(still, u), *motions],
+            constraints=[Frozen.of(still, u), *motions],
             loads=[chosen.load(load) for load in whole.loads],
         )
         loop = steps_of(dynamics, self.integrator, self.step_size)

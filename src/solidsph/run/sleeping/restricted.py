@@ -9,26 +9,26 @@ import attrs
 import numpy as np
 
 from solidsph.errors import SceneError
-from solidsph.interfaces.condition import Condition, ForceCondition, Observation
-from solidsph.interfaces.declared import (
-    MismatchForce,
-    PairForce,
+from solidsph.interfaces.compilable_terms import (
+    HourglassLoad,
+    PairLoad,
     PairTable,
-    PointwiseForce,
-    ScheduledForce,
-    ScheduledMotion,
+    PointwiseLoad,
+    ScheduledConstraint,
+    ScheduledLoad,
 )
-from solidsph.interfaces.mismatch import MismatchOperator
+from solidsph.interfaces.hourglass_energy import HourglassOperator
+from solidsph.interfaces.terms import Load, Observation, Term
 from solidsph.maths.arrays import Array, Indices, Mask
 
 ASLEEP = "asleep"
 """Account of what holds particles that sleep; it does no work, and is told to nobody."""
 
 
-_KINDS = (ScheduledMotion, ScheduledForce, PointwiseForce, PairForce, MismatchForce)
+_KINDS = (ScheduledConstraint, ScheduledLoad, PointwiseLoad, PairLoad, HourglassLoad)
 
 
-def check_restrictable(condition: Condition) -> None:
+def check_restrictable(condition: Term) -> None:
     """Raise SceneError unless a condition can act on some of the particles alone."""
     if not isinstance(condition, _KINDS):
         raise SceneError(
@@ -50,26 +50,26 @@ class Chosen:
         places[particles] = np.arange(len(particles))
         return cls(particles, places)
 
-    def motion(self, whole: ScheduledMotion, held: Mask) -> ScheduledMotion:
+    def motion(self, whole: ScheduledConstraint, held: Mask) -> ScheduledConstraint:
         """The motion of those of the chosen that are not `held` (n,) as they are."""
         particles, axes = whole.entries
         kept = np.flatnonzero((self.places[particles] >= 0) & ~held[particles])
         shape = (len(self.particles), whole.shape[1])
         return _Motion(whole, kept, (self.places[particles[kept]], axes[kept]), shape)
 
-    def load(self, whole: ForceCondition) -> ForceCondition:
+    def load(self, whole: Load) -> Load:
         """The load on the chosen."""
         kept = np.flatnonzero(self.places[whole.particles] >= 0)
         own = self.places[whole.particles[kept]]
         match whole:
-            case ScheduledForce():
+            case ScheduledLoad():
                 return _Scheduled(whole, kept, own)
-            case PointwiseForce():
+            case PointwiseLoad():
                 return _Pointwise(whole.label, own, whole.values[kept], whole.force)
-            case MismatchForce():
+            case HourglassLoad():
                 operators = [one.part(self.particles) for one in whole.operators]
-                return _Mismatched(whole.label, whole.reference[self.particles], operators)
-            case PairForce():
+                return _Hourglass(whole.label, whole.reference[self.particles], operators)
+            case PairLoad():
                 return _Paired(whole.label, self._pairs(whole.pairs), whole.pull)
         raise AssertionError("`check_restrictable` has refused it")
 
@@ -91,7 +91,7 @@ class Chosen:
 
 @final
 @attrs.frozen(eq=False)
-class Frozen(ScheduledMotion):
+class Frozen(ScheduledConstraint):
     """Particles that stay where they are."""
 
     shape: tuple[int, ...]
@@ -118,8 +118,8 @@ class Frozen(ScheduledMotion):
 
 @final
 @attrs.frozen(eq=False)
-class _Motion(ScheduledMotion):
-    whole: ScheduledMotion
+class _Motion(ScheduledConstraint):
+    whole: ScheduledConstraint
     kept: Indices  # among its entries
     entries: tuple[Indices, Indices]
     shape: tuple[int, ...]
@@ -137,8 +137,8 @@ class _Motion(ScheduledMotion):
 
 @final
 @attrs.frozen(eq=False)
-class _Scheduled(ScheduledForce):
-    whole: ScheduledForce
+class _Scheduled(ScheduledLoad):
+    whole: ScheduledLoad
     kept: Indices  # among its particles
     particles: Indices
 
@@ -155,7 +155,7 @@ class _Scheduled(ScheduledForce):
 
 @final
 @attrs.frozen(eq=False)
-class _Pointwise(PointwiseForce):
+class _Pointwise(PointwiseLoad):
     label: str
     particles: Indices
     values: Array
@@ -167,7 +167,7 @@ class _Pointwise(PointwiseForce):
 
 @final
 @attrs.frozen(eq=False)
-class _Paired(PairForce):
+class _Paired(PairLoad):
     label: str
     pairs: PairTable
     pull: Callable[..., Any]
@@ -178,10 +178,10 @@ class _Paired(PairForce):
 
 @final
 @attrs.frozen(eq=False)
-class _Mismatched(MismatchForce):
+class _Hourglass(HourglassLoad):
     label: str
     reference: Array
-    operators: Sequence[MismatchOperator]
+    operators: Sequence[HourglassOperator]
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         return {}

@@ -1,4 +1,4 @@
-"""Forces of a mismatch as compiled sweeps over pairs, and within the compiled loop."""
+"""Hourglass forces as compiled sweeps over pairs, and within the compiled loop."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from solidsph.engines.compiled.pointwise import no_law
 from solidsph.engines.compiled.rows import Rows, compressed
 from solidsph.engines.compiled.shares import aligned, passes, shared, spread_pass, thread_count
 from solidsph.engines.compiled.threads import check_alive
-from solidsph.interfaces.mismatch import Mismatch, MismatchOperator
+from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassPairs
 from solidsph.interfaces.operation_count import Tally, Way, vectors
 from solidsph.maths.arrays import Array, Indices
 
@@ -44,37 +44,35 @@ class Sweeps(NamedTuple):
 
 @final
 @attrs.frozen(eq=False)
-class MismatchSweeps(MismatchOperator):
+class HourglassSweeps(HourglassOperator):
     """Three sweeps: gather H, pull the near pairs together, scatter the stress that they make.
 
     The first and the last are loops over rows that a lattice shares between particles.
     """
 
-    mismatch: Mismatch
+    pairs: HourglassPairs
     arrays: Sweeps
     sweep: Any  # compiled (arrays, displacements (n, d), forces (n, d))
 
     @classmethod
-    def of(cls, mismatch: Mismatch) -> MismatchSweeps:
-        """The operator of a mismatch."""
-        n, d = mismatch.body.particles.positions.shape
+    def of(cls, pairs: HourglassPairs) -> HourglassSweeps:
+        """The operator of these pairs."""
+        n, d = pairs.body.particles.positions.shape
         shortest_run = max(2, group(d, _DTYPE) // 2)
-        chunks = weighted_chunks(mismatch.body, np.ones(n, dtype=np.bool_))
-        return cls._by_rows(mismatch, compressed(chunks, d, _DTYPE, shortest_run))
+        chunks = weighted_chunks(pairs.body, np.ones(n, dtype=np.bool_))
+        return cls._by_rows(pairs, compressed(chunks, d, _DTYPE, shortest_run))
 
-    def part(self, chosen: Indices) -> MismatchSweeps:
-        count = self.mismatch.body.particles.count
-        return self._by_rows(
-            self.mismatch.part(chosen), part_of_rows(self.arrays.rows, chosen, count)
-        )
+    def part(self, chosen: Indices) -> HourglassSweeps:
+        count = self.pairs.body.particles.count
+        return self._by_rows(self.pairs.part(chosen), part_of_rows(self.arrays.rows, chosen, count))
 
     @classmethod
-    def _by_rows(cls, mismatch: Mismatch, rows: Rows) -> MismatchSweeps:
+    def _by_rows(cls, pairs: HourglassPairs, rows: Rows) -> HourglassSweeps:
         """By rows of the gradient's weights."""
-        body = mismatch.body
+        body = pairs.body
         n, d = body.particles.positions.shape
         # Beside the near pairs there are those of the gradient, twice.
-        threads = thread_count(3 * len(mismatch.columns))
+        threads = thread_count(3 * len(pairs.columns))
         shares = shared(rows, d, _DTYPE, threads)
         arrays = Sweeps(
             extent=(body.extent.start, body.extent.stop),
@@ -83,15 +81,15 @@ class MismatchSweeps(MismatchOperator):
             flat=aligned((n + group(d, _DTYPE)) * STRIDE[d], _DTYPE),
             factors=-body.particles.volumes,
             buffers=shares.buffers,
-            starts=mismatch.starts,
-            columns=mismatch.columns,
-            weights=mismatch.weights,
+            starts=pairs.starts,
+            columns=pairs.columns,
+            weights=pairs.weights,
             positions=body.particles.positions,
             jets=np.empty((n, d, 1 + d)),
             tensors=np.zeros((d, d, n)),
             pulls=np.zeros((n, d)),
         )
-        return cls(mismatch, arrays, mismatch_sweep(d, threads > 1))
+        return cls(pairs, arrays, hourglass_sweep(d, threads > 1))
 
     @property
     def bytes(self) -> int:
@@ -106,7 +104,7 @@ class MismatchSweeps(MismatchOperator):
         pairs = 2 * (rows.run_pairs + rows.row_pairs) + len(self.arrays.columns)
         threaded = len(self.arrays.table) > 1
         touched = self.bytes + vectors(n, d)
-        return Tally(Way.MISMATCH_SWEEPS, pairs, n, touched, self.bytes, threaded=threaded)
+        return Tally(Way.HOURGLASS_SWEEPS, pairs, n, touched, self.bytes, threaded=threaded)
 
     def forces(self, displacements: Array) -> Array:
         if len(self.arrays.table) > 1:
@@ -117,7 +115,7 @@ class MismatchSweeps(MismatchOperator):
 
 
 @cache
-def mismatch_sweep(dimension: int, threaded: bool) -> Any:
+def hourglass_sweep(dimension: int, threaded: bool) -> Any:
     """Compiled (arrays, displacements (n, d), forces (n, d)): the forces of one body."""
     d = dimension
     gather = passes(d, _DTYPE, no_law, threaded).stress

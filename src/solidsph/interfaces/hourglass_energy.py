@@ -1,4 +1,4 @@
-"""Mismatch: what remains of a neighbour's offset after the deformation gradients at both ends.
+"""Hourglass energy: of what the deformation gradients at both ends of a pair do not explain.
 
 With H the gradient of the displacement u, X_ab = X_b - X_a and symmetric weights c_ab,
 
@@ -34,8 +34,8 @@ _SMALL = 40
 
 
 @attrs.frozen(eq=False)
-class Mismatch:
-    """The pairs of one body whose mismatch costs energy, each both ways."""
+class HourglassPairs:
+    """The pairs of one body whose error vector costs energy, each both ways."""
 
     body: Body
     starts: Indices  # (n + 1,) those of particle a stand at starts[a] : starts[a + 1]
@@ -43,14 +43,14 @@ class Mismatch:
     weights: Array  # (k,) c_ab > 0 [N/m]
 
     @classmethod
-    def of(cls, body: Body, pairs: Pairs, weights: Array) -> Mismatch:
+    def of(cls, body: Body, pairs: Pairs, weights: Array) -> HourglassPairs:
         """Of all `pairs` of a body, those with weights (m,) that are not zero."""
         kept = weights > 0.0
         counts = np.bincount(pairs.rows[kept], minlength=pairs.row_count)
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
         return cls(body, starts, pairs.columns[kept].astype(np.int32), weights[kept])
 
-    def part(self, chosen: Indices) -> Mismatch:
+    def part(self, chosen: Indices) -> HourglassPairs:
         """That of the chosen particles (m,) alone, by the pairs both ends of which are chosen."""
         n = self.body.particles.count
         places = np.full(n, -1, dtype=np.intp)
@@ -60,7 +60,7 @@ class Mismatch:
         counts = np.bincount(rows[kept], minlength=len(chosen))
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
         body = part_of(self.body, chosen)
-        return Mismatch(body, starts, columns[kept].astype(np.int32), self.weights[kept])
+        return HourglassPairs(body, starts, columns[kept].astype(np.int32), self.weights[kept])
 
     @property
     def rows(self) -> Indices:
@@ -96,12 +96,12 @@ class Mismatch:
         return self.starts.nbytes + self.columns.nbytes + self.weights.nbytes
 
 
-class MismatchOperator(ABC):
-    """The forces of the mismatch of one body, linear in its displacements: -K u, by components."""
+class HourglassOperator(ABC):
+    """The hourglass forces of one body, linear in its displacements: -K u, by components."""
 
     @property
     @abstractmethod
-    def mismatch(self) -> Mismatch:
+    def pairs(self) -> HourglassPairs:
         """What exerts them."""
 
     @property
@@ -119,7 +119,7 @@ class MismatchOperator(ABC):
         """Forces (n, d) [N] from displacements (n, d) [m]."""
 
     @abstractmethod
-    def part(self, chosen: Indices) -> MismatchOperator:
+    def part(self, chosen: Indices) -> HourglassOperator:
         """Those of the chosen particles (m,) alone, numbered in their order.
 
         Right for those that stand deep enough among the chosen: the gradients of a particle's
@@ -132,7 +132,7 @@ class MismatchOperator(ABC):
         By Lanczos' iteration. A bound from sums of weights alone would be up to three times the
         frequency, since gradients lean on small differences of large weights.
         """
-        masses, d = self.mismatch.body.masses, self.mismatch.body.particles.dimension
+        masses, d = self.pairs.body.masses, self.pairs.body.particles.dimension
         moving = np.flatnonzero(masses > 0.0)
         scaling = 1.0 / np.sqrt(masses[moving])[:, None]
         u = np.zeros((len(masses), d))
@@ -160,40 +160,40 @@ class MismatchOperator(ABC):
 
 @final
 @attrs.frozen(eq=False)
-class MismatchProducts(MismatchOperator):
+class HourglassProducts(HourglassOperator):
     """As products of sparse matrices, K = J^T Z J: for bodies of few particles."""
 
-    mismatch: Mismatch
+    pairs: HourglassPairs
     jet: csr_array  # J, ((1 + d) n, n): u, then its derivative along each axis
     pull: csr_array  # Z, ((1 + d) n, (1 + d) n), symmetric: minus forces and stresses of a jet
 
     @classmethod
-    def of(cls, mismatch: Mismatch) -> MismatchProducts:
-        """The operator of a mismatch."""
-        return cls(mismatch, _jet(mismatch.body), _pull(mismatch))
+    def of(cls, pairs: HourglassPairs) -> HourglassProducts:
+        """The operator of these pairs."""
+        return cls(pairs, _jet(pairs.body), _pull(pairs))
 
     @property
     def bytes(self) -> int:
         own = [m.data.nbytes + m.indices.nbytes + m.indptr.nbytes for m in (self.jet, self.pull)]
-        return sum(own) + self.mismatch.bytes
+        return sum(own) + self.pairs.bytes
 
     @property
     def tally(self) -> Tally:
-        n, d = self.mismatch.body.particles.positions.shape
+        n, d = self.pairs.body.particles.positions.shape
         # J stands twice, d times with the gradient's pairs; Z is of jets.
         pairs = 2 * ((self.jet.nnz - n) // d) + self.pull.nnz // (1 + d)
-        return Tally(Way.MISMATCH_PRODUCTS, pairs, n, self.bytes + vectors(n, d), self.bytes)
+        return Tally(Way.HOURGLASS_PRODUCTS, pairs, n, self.bytes + vectors(n, d), self.bytes)
 
     def forces(self, displacements: Array) -> Array:
         forces: Array = -(self.jet.T @ (self.pull @ (self.jet @ displacements)))
         return forces
 
-    def part(self, chosen: Indices) -> MismatchOperator:
-        mismatch = self.mismatch.part(chosen)
-        n, d = self.mismatch.body.particles.positions.shape
+    def part(self, chosen: Indices) -> HourglassOperator:
+        pairs = self.pairs.part(chosen)
+        n, d = self.pairs.body.particles.positions.shape
         jets = np.concatenate([k * n + chosen for k in range(1 + d)])
         jet = csr_array(csr_array(self.jet[jets])[:, chosen])
-        return MismatchProducts(mismatch, jet, _pull(mismatch))
+        return HourglassProducts(pairs, jet, _pull(pairs))
 
     def matrix(self) -> csr_array:
         """K (n, n) [N/m], with neighbours of neighbours of neighbours: in 3D, large."""
@@ -209,15 +209,15 @@ def _jet(body: Body) -> csr_array:
     return csr_array(vstack([eye_array(pairs.row_count, format="csr"), *along], format="csr"))
 
 
-def _pull(mismatch: Mismatch) -> csr_array:
+def _pull(pairs: HourglassPairs) -> csr_array:
     """Z, ((1 + d) n, (1 + d) n) [N/m, N, N m]: the energy of jets q is q Z q / 2."""
-    once = np.flatnonzero(mismatch.rows < mismatch.columns)  # e_ba = -e_ab
-    a, b, X = mismatch.rows[once], mismatch.columns[once], mismatch.offsets[once]
-    count, n = len(once), mismatch.body.particles.count
+    once = np.flatnonzero(pairs.rows < pairs.columns)  # e_ba = -e_ab
+    a, b, X = pairs.rows[once], pairs.columns[once], pairs.offsets[once]
+    count, n = len(once), pairs.body.particles.count
     take_a, take_b = (
         csr_array((np.ones(count), (np.arange(count), end)), shape=(count, n)) for end in (a, b)
     )
     both = take_a + take_b
     halves = [diags_array(0.5 * X[:, axis]) @ both for axis in range(X.shape[1])]
     errors = csr_array(hstack([take_a - take_b, *halves], format="csr"))
-    return csr_array(errors.T @ diags_array(mismatch.weights[once]) @ errors)
+    return csr_array(errors.T @ diags_array(pairs.weights[once]) @ errors)

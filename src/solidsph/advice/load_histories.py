@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 import attrs
 import numpy as np
 
-from solidsph.interfaces.condition import ForceCondition, SurfaceLoad
-from solidsph.interfaces.declared import ScheduledForce, ScheduledMotion
+from solidsph.interfaces.compilable_terms import ScheduledConstraint, ScheduledLoad
+from solidsph.interfaces.terms import Load, SurfaceLoad
 from solidsph.maths.arrays import Array
 from solidsph.run.built_scene import BuiltScene
 
@@ -51,7 +51,7 @@ class Signal:
 
 
 @attrs.frozen(eq=False)
-class Load(Signal):
+class LoadHistory(Signal):
     """A force, by the stress or the acceleration that it makes."""
 
     stresses: Array  # (t,) largest force over the area that its particle owns [Pa]; 0 inside
@@ -64,7 +64,7 @@ class Motion(Signal):
     """A displacement imposed [m], with its velocity."""
 
     speeds: Array  # (t,) [m/s]
-    condition: ScheduledMotion
+    condition: ScheduledConstraint
 
     @property
     def jump(self) -> float:
@@ -72,7 +72,7 @@ class Motion(Signal):
         return float(self.speeds[0])
 
 
-def loads(simulation: BuiltScene) -> Iterator[Load]:
+def loads(simulation: BuiltScene) -> Iterator[LoadHistory]:
     """Of every force: at many times where it is a schedule, at a few where it is not.
 
     What answers to the motion is asked at the start, where nothing has moved.
@@ -82,11 +82,11 @@ def loads(simulation: BuiltScene) -> Iterator[Load]:
         yield _of_load(simulation, load, areas[load.particles])
 
 
-def _of_load(simulation: BuiltScene, load: ForceCondition, areas: Array) -> Load:
-    start, masses = simulation.initial, simulation.setting.masses[load.particles]
+def _of_load(simulation: BuiltScene, load: Load, areas: Array) -> LoadHistory:
+    start, masses = simulation.initial, simulation.model.masses[load.particles]
     ask = _asked(load, start.positions, start.velocities)
     times = _times(simulation, len(masses) * simulation.particles.dimension)
-    if not isinstance(load, ScheduledForce):
+    if not isinstance(load, ScheduledLoad):
         times = times[:: max(1, len(times) // 4)]
     owns, real = areas > 0.0, masses > 0.0
 
@@ -99,7 +99,7 @@ def _of_load(simulation: BuiltScene, load: ForceCondition, areas: Array) -> Load
 
     times, (sizes, pulls, pressed) = _refined(times, found(times), found)
     on_surface = isinstance(load, SurfaceLoad)
-    return Load(
+    return LoadHistory(
         label=load.label,
         times=times,
         sizes=sizes,
@@ -111,12 +111,12 @@ def _of_load(simulation: BuiltScene, load: ForceCondition, areas: Array) -> Load
 
 def motions(simulation: BuiltScene) -> Iterator[Motion]:
     """Of every motion that is a schedule."""
-    for motion in simulation.dynamics.motions:
-        if isinstance(motion, ScheduledMotion):
+    for motion in simulation.dynamics.constraints:
+        if isinstance(motion, ScheduledConstraint):
             yield _of_motion(simulation, motion)
 
 
-def _of_motion(simulation: BuiltScene, motion: ScheduledMotion) -> Motion:
+def _of_motion(simulation: BuiltScene, motion: ScheduledConstraint) -> Motion:
     times = _times(simulation, len(motion.entries[0]))
 
     def found(some: Array) -> tuple[Array, ...]:
@@ -127,9 +127,9 @@ def _of_motion(simulation: BuiltScene, motion: ScheduledMotion) -> Motion:
     return Motion(motion.label, times, sizes, speeds, motion)
 
 
-def _asked(load: ForceCondition, x: Array, v: Array) -> Callable[[Array], Array]:
+def _asked(load: Load, x: Array, v: Array) -> Callable[[Array], Array]:
     """Forces (t, k, d) at times (t,)."""
-    if isinstance(load, ScheduledForce):
+    if isinstance(load, ScheduledLoad):
 
         def scheduled(times: Array) -> Array:
             found = load.schedule(times)

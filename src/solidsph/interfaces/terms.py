@@ -1,6 +1,6 @@
 """Conditions: boundary handlers and effects once they are bound to particles.
 
-A handler or an effect is a frozen set of parameters; bound to a setting it becomes one or more
+A handler or an effect is a frozen set of parameters; bound to a model it becomes one or more
 conditions that hold arrays. What a condition can do is its type: determine motion, change the
 stress, add forces, or show fields. A run calls only those that are there.
 """
@@ -50,7 +50,7 @@ class Observation:
         return found
 
 
-class Condition(ABC):
+class Term(ABC):
     """Something imposed on some of the particles."""
 
     @property
@@ -63,7 +63,7 @@ class Condition(ABC):
         """What was asked for and what was achieved: columns "quantity [unit]" of numbers."""
 
 
-class StoringCondition(Condition):
+class EnergyTerm(Term):
     """Stores energy beside that of the strain."""
 
     @abstractmethod
@@ -71,7 +71,7 @@ class StoringCondition(Condition):
         """What it stores of every particle, (n,) [J]: minus its work, from where it was zero."""
 
 
-class FieldCondition(Condition):
+class FieldTerm(Term):
     """Has something to show of every particle."""
 
     @abstractmethod
@@ -82,7 +82,7 @@ class FieldCondition(Condition):
         """
 
 
-class MotionCondition(Condition):
+class Constraint(Term):
     """Determines the motion of some degrees of freedom."""
 
     @property
@@ -99,7 +99,7 @@ class MotionCondition(Condition):
         """
 
 
-class ExtensionCondition(MotionCondition):
+class GhostConstraint(Constraint):
     """Makes ghosts follow other particles, linearly: u_ghost = E u."""
 
     @abstractmethod
@@ -110,7 +110,7 @@ class ExtensionCondition(MotionCondition):
         """
 
 
-class StressCondition(Condition):
+class StressTerm(Term):
     """Determines the stress of some particles, ghosts among them."""
 
     @abstractmethod
@@ -118,7 +118,7 @@ class StressCondition(Condition):
         """Overwrite entries of `stress` (d, d, n) [Pa] in place, after the material's law."""
 
 
-class ForceCondition(Condition):
+class Load(Term):
     """Adds forces to some particles."""
 
     @property
@@ -148,7 +148,7 @@ class ForceCondition(Condition):
         return self.forces(time, positions, velocities), {}
 
 
-class SurfaceLoad(ForceCondition):
+class SurfaceLoad(Load):
     """Forces that are the weak form's natural condition of a surface.
 
     They do not go with ghosts that continue the stress beyond that surface: the two together

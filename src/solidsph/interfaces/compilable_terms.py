@@ -16,17 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_array, kron
 
-from solidsph.interfaces.condition import (
-    ExtensionCondition,
-    ForceCondition,
-    MotionCondition,
-    StressCondition,
+from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassProducts
+from solidsph.interfaces.terms import (
+    Constraint,
+    GhostConstraint,
+    Load,
+    StressTerm,
 )
-from solidsph.interfaces.mismatch import MismatchOperator, MismatchProducts
 from solidsph.maths.arrays import Array, Indices, Mask, Scalar, Vector
 
 
-class ScheduledMotion(MotionCondition):
+class ScheduledConstraint(Constraint):
     """Determines motion as a function of time alone."""
 
     @property
@@ -56,7 +56,7 @@ class ScheduledMotion(MotionCondition):
         values[self.entries] = self.schedule(np.array([time]), derivative)[0]
 
 
-class LinearExtension(ExtensionCondition, StressCondition):
+class LinearExtension(GhostConstraint, StressTerm):
     """Ghosts whose values are linear combinations of others', each component by itself.
 
     u_i = s_i A u_i and T_ik = s_i s_k B T_ik, with signs s that turn components over.
@@ -107,7 +107,7 @@ class LinearExtension(ExtensionCondition, StressCondition):
                 component[self.ghosts] = sign * (self.stress @ component)
 
 
-class ScheduledForce(ForceCondition):
+class ScheduledLoad(Load):
     """Forces that are a function of time alone."""
 
     @abstractmethod
@@ -120,7 +120,7 @@ class ScheduledForce(ForceCondition):
         return forces
 
 
-class PointwiseForce(ForceCondition):
+class PointwiseLoad(Load):
     """The force on a particle by its own position and velocity."""
 
     @property
@@ -153,7 +153,7 @@ class PairTable:
         return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
 
 
-class PairForce(ForceCondition):
+class PairLoad(Load):
     """Forces along the line between two particles, opposite at its ends.
 
     They keep momentum and angular momentum to rounding whatever the formula is.
@@ -188,8 +188,8 @@ class PairForce(ForceCondition):
         return np.column_stack(list(along))
 
 
-class MismatchForce(ForceCondition):
-    """Forces that resist the mismatch of neighbours (`interfaces.mismatch`), body by body."""
+class HourglassLoad(Load):
+    """Forces of the hourglass energy (`interfaces.hourglass_energy`), body by body."""
 
     @property
     @abstractmethod
@@ -198,7 +198,7 @@ class MismatchForce(ForceCondition):
 
     @property
     @abstractmethod
-    def operators(self) -> Sequence[MismatchOperator]:
+    def operators(self) -> Sequence[HourglassOperator]:
         """One for every body."""
 
     @property
@@ -209,14 +209,14 @@ class MismatchForce(ForceCondition):
         u = positions - self.reference
         forces = np.zeros_like(u)
         for operator in self.operators:
-            extent = operator.mismatch.body.extent
+            extent = operator.pairs.body.extent
             forces[extent] = operator.forces(u[extent])
         return forces
 
     @cached_property
     def matrix(self) -> csr_array:
         """K (n, n) [N/m]: the force is -K u in every component; large in 3D."""
-        blocks = [MismatchProducts.of(one.mismatch).matrix() for one in self.operators]
+        blocks = [HourglassProducts.of(one.pairs).matrix() for one in self.operators]
         return csr_array(block_diag(blocks, format="csr"))
 
     def stiffness(self, displacements: Array, time: float) -> csr_array:
@@ -224,5 +224,5 @@ class MismatchForce(ForceCondition):
         return csr_array(kron(self.matrix, np.eye(displacements.shape[1]), format="csr"))
 
 
-DECLARED_LOADS = (ScheduledForce, PointwiseForce, PairForce, MismatchForce)
+COMPILABLE_LOADS = (ScheduledLoad, PointwiseLoad, PairLoad, HourglassLoad)
 """Kinds of load that loops can be compiled of, and whose costs are known by count."""
