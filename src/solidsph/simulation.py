@@ -35,14 +35,6 @@ class Simulation(BuiltScene):
         """What carries out the steps."""
         return time_loop(self)
 
-    def halved(self) -> Simulation:
-        """The same scene, built anew with half the step."""
-        builder = self.builder(attrs.evolve(self.scene, time_step=0.5 * self.step_size))
-        finer = builder.build()
-        return attrs.evolve(
-            finer, scene=self.scene, steps=2 * self.steps, halvings=self.halvings + 1
-        )
-
     def run(
         self,
         *,

@@ -24,8 +24,10 @@ from tests.helpers.scenes import SOFT, box
 K = 1e3  # [N/m]
 
 
-class Load(Load):
+class OnAll(Load):
     """A force on every particle, of which subclasses say what it is."""
+
+    stiffness = 0.0
 
     def __init__(self, label: str, model: DiscreteModel) -> None:
         self._label = label
@@ -39,12 +41,18 @@ class Load(Load):
     def particles(self) -> Indices:
         return np.arange(len(self.X))
 
+    @property
+    def stiffness_rate(self) -> float:
+        return float(np.sqrt(self.stiffness / self.masses.min()))
+
     def report(self, observation: Observation) -> Mapping[str, float]:
         return {}
 
 
-class Floor(Load, EnergyTerm):
+class Floor(OnAll, EnergyTerm):
     """Pushes what is below the lowest particles at rest: each of those just touches it."""
+
+    stiffness = K
 
     def depth(self, positions: Array) -> Array:
         return np.maximum(self.X[:, 1].min() - positions[:, 1], 0.0)
@@ -56,7 +64,7 @@ class Floor(Load, EnergyTerm):
         return np.asarray(0.5 * K * self.depth(observation.state.positions) ** 2)
 
 
-class Hertzian(Load, EnergyTerm):
+class Hertzian(OnAll, EnergyTerm):
     """Springs whose force is a power of the extension, so that at rest they have no stiffness."""
 
     power = 3.0
@@ -71,7 +79,7 @@ class Hertzian(Load, EnergyTerm):
         return np.asarray(energies.sum(axis=1))
 
 
-class Weight(Load, EnergyTerm):
+class Weight(OnAll, EnergyTerm):
     """A potential that is no smallest at rest."""
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
@@ -81,14 +89,14 @@ class Weight(Load, EnergyTerm):
         return np.asarray(9.81 * self.masses * observation.state.positions[:, 1])
 
 
-class Shaken(Load):
+class Shaken(OnAll):
     """Depends on time alone."""
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         return self.masses[:, None] * np.array([np.sin(300.0 * time), 0.0])
 
 
-class QuadraticDrag(Load):
+class QuadraticDrag(OnAll):
     """Damps nothing that is slow."""
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
@@ -96,7 +104,7 @@ class QuadraticDrag(Load):
         return np.asarray(-5.0 * (self.masses * speeds)[:, None] * velocities)
 
 
-class Counts(Load):
+class Counts(OnAll):
     """Remembers, under its own name, how long it has been at work."""
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
@@ -121,8 +129,10 @@ class HalfTheHertzian(Hertzian):
         return 0.5 * super().energies(observation)
 
 
-class Turns(Load, EnergyTerm):
+class Turns(OnAll, EnergyTerm):
     """A force across the displacement, which no energy has."""
+
+    stiffness = K
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         u = positions - self.X
@@ -135,6 +145,7 @@ class Turns(Load, EnergyTerm):
 class HalfLater(Hertzian):
     """Honest only before the first step."""
 
+    stiffness = 1e2 * K
     power = 1.0
 
     def energies(self, observation: Observation) -> Array:
@@ -142,13 +153,13 @@ class HalfLater(Hertzian):
         return share * super().energies(observation)
 
 
-class Moves(Load):
+class Moves(OnAll):
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         positions += 1e-3
         return np.zeros_like(positions)
 
 
-class Complex(Load):
+class Complex(OnAll):
     def forces(self, time: float, positions: Array, velocities: Array) -> Any:
         return np.zeros(positions.shape, dtype=np.complex128)
 
@@ -173,16 +184,6 @@ class Loaded(Effect):
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
         return self.kind(label, model)
-
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        return {}
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.0
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        stiff = {Floor: K, HalfTheFloor: K, Turns: K, HalfLater: 1e2 * K}.get(self.kind, 0.0)
-        return float(np.sqrt(stiff / bodies[0].masses.min()))
 
 
 def scene(kind: type[Load]) -> SceneBuilder:

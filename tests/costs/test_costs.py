@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from itertools import count
 from math import inf, pi
 from pathlib import Path
@@ -31,7 +31,7 @@ from solidsph.costs.timed import timed
 from solidsph.costs.work import Loop, Piece
 from solidsph.errors import SceneError
 from solidsph.interfaces.effect import Effect
-from solidsph.interfaces.operation_count import Way
+from solidsph.interfaces.plan import Way
 from solidsph.interfaces.terms import Load
 from solidsph.run.stable_step import largest_step
 from tests.commands.test_cli import solidsph
@@ -72,7 +72,7 @@ def block(cells: int, d: int, cover: float = 2.6, **body):
 def test_a_bar_is_counted_as_by_hand() -> None:
     simulation = bar().build()
     work = counted(simulation)
-    (part,) = work.tally
+    (part,) = work.operations
     assert (work.particles, work.pairs, work.visited) == (10, PAIRS, PAIRS)
     assert work.evaluations == simulation.steps + 1  # one a step, and one at the start
     assert work.pair_evaluations == PAIRS * (simulation.steps + 1)
@@ -88,7 +88,7 @@ def test_a_bar_is_counted_as_by_hand() -> None:
 
 
 def test_moving_neighbours_are_counted_at_the_start() -> None:
-    (part,) = counted(bar(formulation="updated-lagrangian").build()).tally
+    (part,) = counted(bar(formulation="updated-lagrangian").build()).operations
     assert (part.way, part.pairs) == (Way.PRODUCTS_ANEW, PAIRS)
     assert part.held == 10 * 8  # the sums of the kernel; all else is formed anew
 
@@ -97,11 +97,11 @@ def test_moving_neighbours_are_counted_at_the_start() -> None:
 def test_the_compiled_engine_visits_the_same_pairs(engine: str, bytes_each: int) -> None:
     simulation = bar(engine).build()
     work = counted(simulation)
-    stencils, rows = work.tally
+    stencils, rows = work.operations
     assert (stencils.way, rows.way) == (Way.STENCILS, Way.ROWS)
     assert stencils.pairs + rows.pairs == work.pairs == PAIRS
     assert stencils.particles + rows.particles == 10
-    assert {part.precision for part in work.tally} == {bytes_each}
+    assert {part.precision for part in work.operations} == {bytes_each}
     assert work.held == sum(part.bytes for part in simulation.dynamics.internal.parts)
     assert work.loop is Loop.COMPILED
     pieces = {one.piece for one in work.compilations}
@@ -114,7 +114,7 @@ def test_effects_add_the_pairs_that_they_visit() -> None:
     assert counted(viscous).visited == counted(plain).visited + PAIRS - 10
     held = counted(bar().effect("hourglass-control").build())
     assert held.visited > 3 * PAIRS  # the gradient's twice, and the nearest between
-    assert held.tally[-1].way is Way.HOURGLASS_PRODUCTS
+    assert held.operations[-1].way is Way.HOURGLASS_PRODUCTS
 
 
 def test_counts_are_the_same_every_time(tmp_path: Path) -> None:
@@ -428,15 +428,6 @@ class Wind(Effect):
     def bind(self, model, label: str) -> Load:
         return _Blowing(label, np.arange(model.particles.count))
 
-    def arrays(self, model) -> Mapping[str, int]:
-        return {"chosen": 80}
-
-    def damping_rate(self, bodies: Sequence[object]) -> float:
-        return 0.0
-
-    def stiffness_rate(self, bodies: Sequence[object]) -> float:
-        return 0.0
-
 
 @attrs.frozen(eq=False)
 class _Blowing(Load):
@@ -453,7 +444,7 @@ class _Blowing(Load):
 def test_what_is_not_known_is_priced_by_defaults() -> None:
     simulation = bar().effect(Wind()).build()
     work = counted(simulation)
-    assert work.tally[-1].way is Way.UNKNOWN
+    assert work.operations[-1].way is Way.UNKNOWN
     assert work.visited == PAIRS  # it says of no pairs that it visits them
     prediction = told.of_run(simulation, None)
     assert prediction is not None
@@ -522,9 +513,11 @@ def test_only_what_is_of_no_declared_kind_is_timed(monkeypatch: pytest.MonkeyPat
     assert found.seconds == 1.0  # of one evaluation
     assert found.without("heat").seconds == 0.0
     # What is timed is not counted as well.
-    ways = {part.way for part in found.rest(counted(hot), hot).tally}
-    assert Way.UNKNOWN in {part.way for part in counted(hot).tally}
-    assert not any(p.way is Way.UNKNOWN and p.pairs for p in found.rest(counted(hot), hot).tally)
+    ways = {part.way for part in found.rest(counted(hot), hot).operations}
+    assert Way.UNKNOWN in {part.way for part in counted(hot).operations}
+    assert not any(
+        p.way is Way.UNKNOWN and p.pairs for p in found.rest(counted(hot), hot).operations
+    )
     assert Way.PRODUCTS in ways
 
 

@@ -12,16 +12,17 @@ import numpy as np
 import pytest
 
 from solidsph import Simulation
+from solidsph.engines.automatic import AutomaticEngine
 from solidsph.engines.compiled import shares
 from solidsph.engines.compiled.engine import CompiledEngine, CompiledForces
 from solidsph.engines.matrix import MatrixEngine, MatrixForces
-from solidsph.engines.select import AutomaticEngine, engine_named
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import Engine, InternalForces
 from solidsph.interfaces.material import Material
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Mask, Scalar, Tensor
 from solidsph.registry import registry
+from solidsph.registry.construct import construct
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.testing import example_part
 from tests.helpers.scenes import REFERENCE_ONLY, SOFT
@@ -326,7 +327,7 @@ def test_a_run_is_the_same_by_either_engine() -> None:
 
 
 def test_auto_compiles_where_there_is_much_to_do() -> None:
-    assert isinstance(engine_named("auto"), AutomaticEngine)
+    assert isinstance(construct("engines", "auto"), AutomaticEngine)
     bodies, stresses = parts_of(block(2, lengths=[0.8, 0.7]).build())
 
     def chosen(bodies: Sequence[Body], evaluations: int) -> InternalForces:

@@ -45,7 +45,7 @@ def loops(builder: SceneBuilder) -> tuple[Simulation, CompiledLoop, StepByStep]:
     simulation = stretched(builder.engine("compiled")).build()
     loop = simulation.time_loop()
     assert isinstance(loop, CompiledLoop)
-    parts = simulation.dynamics, simulation.integrator, simulation.step_size
+    parts = simulation.dynamics, simulation.integrator
     return simulation, loop, StepByStep(*parts)
 
 
@@ -213,7 +213,7 @@ def test_conditions_that_share_an_account_are_carried_out_step_by_step() -> None
     simulation = box(2, 7).effect(Custom(Formula)).engine("compiled").build()
     (load,) = simulation.dynamics.loads
     twice = attrs.evolve(simulation.dynamics, loads=[load, load])
-    loop = steps_of(twice, simulation.integrator, simulation.step_size)
+    loop = steps_of(twice, simulation.integrator)
     assert isinstance(loop, StepByStep)
 
 
@@ -224,7 +224,7 @@ def test_single_precision_in_the_loop() -> None:
     assert isinstance(loop, CompiledLoop)
     X = simulation.particles.positions
     ours = loop.advance(single.start(), STEPS).positions - X
-    parts = simulation.dynamics, simulation.integrator, simulation.step_size
+    parts = simulation.dynamics, simulation.integrator
     theirs = StepByStep(*parts).advance(simulation.start(), STEPS).positions - X
     # Forces are rounded to some 1e-7 of the largest; displacements have some steps to gather it.
     missed = np.abs(ours - theirs).max() / np.abs(theirs).max()
@@ -236,7 +236,7 @@ def test_it_stops_at_the_step_that_goes_wrong() -> None:
     builder = box(1, 24).initial(velocity={"x": "-40000*(X - 0.5)"})
     simulation = builder.engine("compiled").build()
     state = simulation.start()
-    parts = simulation.dynamics, simulation.integrator, simulation.step_size
+    parts = simulation.dynamics, simulation.integrator
     with pytest.raises(StepError) as ours:
         simulation.time_loop().advance(state, 1000)
     with pytest.raises(StepError) as theirs:
@@ -255,15 +255,6 @@ class Custom(Effect):
     def bind(self, model, label: str) -> Load:
         return self.condition(label, model.select("all"))
 
-    def arrays(self, model) -> Mapping[str, int]:
-        return {}
-
-    def damping_rate(self, bodies) -> float:
-        return 0.0
-
-    def stiffness_rate(self, bodies) -> float:
-        return 100.0
-
 
 @attrs.frozen(eq=False)
 class Formula(PointwiseLoad):
@@ -271,6 +262,7 @@ class Formula(PointwiseLoad):
 
     label: str
     particles: Indices
+    stiffness_rate = 100.0
 
     @property
     def values(self) -> Array:
@@ -290,6 +282,7 @@ class Opaque(Load):
 
     label: str
     particles: Indices
+    stiffness_rate = 100.0
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         return -10.0 * velocities[self.particles]

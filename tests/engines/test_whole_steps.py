@@ -43,6 +43,6 @@ def test_all_that_ask_get_one_answer(name: str) -> None:
     builder, expected = SCENES[name]
     made: SceneBuilder = builder
     simulation = made.build()
-    assert simulation.compiles_steps is expected
+    assert simulation.plan.compiles_steps is expected
     assert isinstance(simulation.time_loop(), StepByStep) is not expected
     assert (counted(simulation).loop is Loop.COMPILED) is expected

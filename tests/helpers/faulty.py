@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import attrs
 import numpy as np
 
 from solidsph import Discretisation, Effect, Particles, Shape
-from solidsph.interfaces.body import Body
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.terms import EnergyTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices, Tensor
@@ -29,6 +28,8 @@ class Springs(EnergyTerm, Load):
     indices: Indices
     origin: Array
     stiffness: float
+    damping_rate: Any = 0.0
+    stiffness_rate: float = 0.0
 
     @property
     def particles(self) -> Indices:
@@ -97,18 +98,15 @@ class Bed(Effect):
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
         X = model.particles.positions
-        return self.kind(label, np.arange(len(X)), X, self.stiffness)
-
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        return {}
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        found: float = self.damping
-        return found
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        lightest = min(float(one.masses[one.masses > 0.0].min()) for one in bodies)
-        return self.declared * float(np.sqrt(self.stiffness / lightest))
+        lightest = model.masses[model.masses > 0.0].min()
+        return self.kind(
+            label=label,
+            indices=np.arange(len(X)),
+            origin=X,
+            stiffness=self.stiffness,
+            damping_rate=self.damping,
+            stiffness_rate=self.declared * float(np.sqrt(self.stiffness / lightest)),
+        )
 
 
 class BindsNothing(Bed):

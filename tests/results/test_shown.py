@@ -64,15 +64,6 @@ class Showing(Effect):
     def bind(self, model, label):
         return _Showing(label, dict.fromkeys(self.shows, 1), dict.fromkeys(self.reports, 0.0))
 
-    def arrays(self, model):
-        return {}
-
-    def damping_rate(self, bodies):
-        return 0.0
-
-    def stiffness_rate(self, bodies):
-        return 0.0
-
 
 def small() -> SceneBuilder:
     return box(2, 6).outputs(1)

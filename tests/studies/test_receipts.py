@@ -94,7 +94,8 @@ def tips(toml: str, step: float) -> np.ndarray:
     """Displacement of the particle nearest to the tip, over ten outputs; by the loop itself."""
     scene = Scene.from_toml(toml.replace("spacing = 0.05", "spacing = 0.1"))
     simulation = Simulation.builder(attrs.evolve(scene, engine="matrix")).build()
-    loop, state = attrs.evolve(simulation, step_size=step).time_loop(), simulation.start()
+    dynamics = attrs.evolve(simulation.dynamics, step_size=step)
+    loop, state = attrs.evolve(simulation, dynamics=dynamics).time_loop(), simulation.start()
     X = simulation.particles.positions
     nearest = int(np.argmin(np.hypot(X[:, 0] - 1.0, X[:, 1] - 0.25)))
     found = [state.positions[nearest, 1] - X[nearest, 1]]
@@ -148,15 +149,6 @@ class Busy(Effect):
 
     def bind(self, model: Any, label: str) -> Load:
         return BusyForce(label, np.arange(1), self.clock, self.seconds)
-
-    def arrays(self, model: Any) -> Mapping[str, int]:
-        return {}
-
-    def damping_rate(self, bodies: Any) -> float:
-        return 0.0
-
-    def stiffness_rate(self, bodies: Any) -> float:
-        return 0.0
 
 
 @attrs.frozen(eq=False)

@@ -26,7 +26,6 @@ from solidsph import (
     Shape,
     State,
 )
-from solidsph.interfaces.body import Body
 from solidsph.interfaces.compilable_terms import PointwiseLoad, ScheduledLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.formulation import Configuration
@@ -875,7 +874,7 @@ class HeldInPlace(Constraint):
     label: str
     held: Mask
 
-    def impose(self, time: float, derivative: int, values: Array) -> None:
+    def impose(self, time: float, derivative: int, values: Array, step: float = 0.0) -> None:
         values[self.held] = 0.0
 
     def report(self, observation: Observation) -> dict[str, float]:
@@ -904,7 +903,7 @@ class BindsNothing(GoodHandler):
 
 
 class OneMore(HeldInPlace):
-    def impose(self, time: float, derivative: int, values: Array) -> None:
+    def impose(self, time: float, derivative: int, values: Array, step: float = 0.0) -> None:
         values[self.held] = 0.0
         values[-1] = 0.0
 
@@ -914,7 +913,7 @@ class HoldsOneMore(GoodHandler):
 
 
 class Running(HeldInPlace):
-    def impose(self, time: float, derivative: int, values: Array) -> None:
+    def impose(self, time: float, derivative: int, values: Array, step: float = 0.0) -> None:
         values[self.held] = 1e3 * time if derivative == 1 else 0.0
 
 
@@ -1032,6 +1031,11 @@ class Drag(Load):
     label: str
     particles: Indices
     resistance: Array  # (k, 1) [kg/s]
+    damping_rate = 1.0
+
+    @property
+    def arrays(self) -> Mapping[str, int]:
+        return {"resistance": self.resistance.nbytes}
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         return -self.resistance * velocities[self.particles]
@@ -1049,15 +1053,6 @@ class GoodEffect(Effect):
     def bind(self, model: DiscreteModel, label: str) -> Load:
         return self.condition(label, np.arange(model.particles.count), model.masses[:, None])
 
-    def arrays(self, model: DiscreteModel) -> dict[str, int]:
-        return {"resistance": model.masses.nbytes}
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        return 1.0
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.0
-
 
 class OtherLabel(GoodEffect):
     def bind(self, model: DiscreteModel, label: str) -> Load:
@@ -1074,9 +1069,14 @@ class MovesParticles(GoodEffect):
     condition = DragInPlace
 
 
-class NegativeSize(GoodEffect):
-    def arrays(self, model: DiscreteModel) -> dict[str, int]:
+class DragOfNegativeSize(Drag):
+    @property
+    def arrays(self) -> Mapping[str, int]:
         return {"resistance": -1}
+
+
+class NegativeSize(GoodEffect):
+    condition = DragOfNegativeSize
 
 
 class ClaimsMomentum(GoodEffect):
@@ -1092,9 +1092,12 @@ class Drives(GoodEffect):
     condition = DragForward
 
 
+class DragDeclaredLess(Drag):
+    damping_rate = 0.9
+
+
 class DampsMoreThanDeclared(GoodEffect):
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.9
+    condition = DragDeclaredLess
 
 
 class Anchor(Drag):

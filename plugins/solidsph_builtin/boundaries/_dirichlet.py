@@ -49,7 +49,7 @@ class Extension(ABC):
     """A smooth extension of the field to the ghosts, which the solve starts from."""
 
     @abstractmethod
-    def values(self, axis: int, time: float, derivative: int, column: Array) -> Array:
+    def values(self, axis: int, time: float, derivative: int, column: Array, step: float) -> Array:
         """Values at the ghosts (g,) from those of all particles (n,)."""
 
     @abstractmethod
@@ -64,7 +64,7 @@ class ReflectedExtension(Extension):
 
     matrix: csr_array  # (g, n)
 
-    def values(self, axis: int, time: float, derivative: int, column: Array) -> Array:
+    def values(self, axis: int, time: float, derivative: int, column: Array, step: float) -> Array:
         reflection: Array = self.matrix @ column
         return reflection
 
@@ -80,10 +80,9 @@ class KnownExtension(Extension):
 
     positions: Array  # (g, d)
     field: VectorField
-    step_size: float
 
-    def values(self, axis: int, time: float, derivative: int, column: Array) -> Array:
-        return self.field.derivative(axis, self.positions, time, derivative, self.step_size)
+    def values(self, axis: int, time: float, derivative: int, column: Array, step: float) -> Array:
+        return self.field.derivative(axis, self.positions, time, derivative, step)
 
     def transposed(self, forces: Array) -> Array | float:
         return 0.0
@@ -103,7 +102,6 @@ class SmoothedValue(GhostConstraint):
     boundary: Indices  # (b,)
     ghosts: Indices  # (g,)
     field: VectorField
-    step_size: float
     smoothing: csr_array  # (b + g, n) rows of W
     extension: Extension  # smooth, of boundary values to ghosts
     reflection: csr_array  # (g, n), for components that are not imposed
@@ -124,16 +122,16 @@ class SmoothedValue(GhostConstraint):
     def _free_axes(self) -> list[int]:
         return [k for k in range(self.positions.shape[1]) if k not in self.field.components]
 
-    def impose(self, time: float, derivative: int, values: Array) -> None:
+    def impose(self, time: float, derivative: int, values: Array, step: float = 0.0) -> None:
         for axis in self._free_axes():
             values[self.ghosts, axis] = self.reflection @ values[:, axis]
         for axis in self.field.components:
             target = self.field.derivative(
-                axis, self.positions[self.boundary], time, derivative, self.step_size
+                axis, self.positions[self.boundary], time, derivative, step
             )
             column = values[:, axis]
             column[self.boundary] = target
-            column[self.ghosts] = self.extension.values(axis, time, derivative, column)
+            column[self.ghosts] = self.extension.values(axis, time, derivative, column, step)
             smooth = column[self._chosen]
             column[self._chosen] = 0.0
             interior = self.smoothing @ column
@@ -203,7 +201,6 @@ def smoothed_value(
         boundary=boundary,
         ghosts=own_ghosts,
         field=field,
-        step_size=model.step_size,
         smoothing=smoothing,
         extension=_extension(model, own_ghosts, extension, field, handler),
         reflection=reflected(model.particles, own_ghosts),
@@ -227,7 +224,7 @@ def _extension(
             f"{handler}: extension lacks component {COMPONENTS[min(missing)]!r}; give every "
             "component that displacement has"
         )
-    return KnownExtension(model.particles.positions[ghosts], beyond, model.step_size)
+    return KnownExtension(model.particles.positions[ghosts], beyond)
 
 
 def solved_transposed(factors: SuperLU, right: Array) -> Array:

@@ -27,7 +27,6 @@ class ImposedMotion(ScheduledConstraint):
     indices: Indices  # (k,)
     positions: Array  # (n, d) reference positions of all particles
     field: VectorField
-    step_size: float  # of the run [s]
     stressed_face: Face | None  # of these particles, where the reaction must be read off the stress
 
     @property
@@ -39,10 +38,10 @@ class ImposedMotion(ScheduledConstraint):
         axes = np.array(list(self.field.components), dtype=np.intp)
         return np.tile(self.indices, len(axes)), np.repeat(axes, len(self.indices))
 
-    def schedule(self, times: Array, derivative: int) -> Array:
+    def schedule(self, times: Array, derivative: int, step: float = 0.0) -> Array:
         X = self.positions[self.indices]
         columns = [
-            self.field.derivative_schedule(axis, X, times, derivative, self.step_size)
+            self.field.derivative_schedule(axis, X, times, derivative, step)
             for axis in self.field.components
         ]
         rows = max(len(one) for one in columns)
@@ -72,7 +71,6 @@ def imposed_motion(
         indices=indices,
         positions=particles.positions,
         field=field,
-        step_size=model.step_size,
         stressed_face=_surface(model, indices, where) if by_stress else None,
     )
 

@@ -19,7 +19,7 @@ from solidsph.model.fields import Component, VectorField
 from solidsph.model.particles import Face
 from solidsph.model.regions import Where
 from solidsph_builtin.boundaries._reports import asked_resultant
-from solidsph_builtin.effects._gradients import body_gradient, in_the_reference
+from solidsph_builtin.effects._gradients import BodyGradient, in_the_reference
 
 
 @final
@@ -57,7 +57,7 @@ class Pressure(BoundaryHandler):
 
 def _gradients(model: DiscreteModel, chosen: Indices) -> Sequence[csr_array]:
     """From displacements of all to their derivatives at the chosen, (k, n) along each axis."""
-    blocks = [body_gradient(body).matrices.gradient for body in model.bodies]
+    blocks = [BodyGradient.of(body).matrices.gradient for body in model.bodies]
     d = model.particles.dimension
     found = []
     for axis in range(d):

@@ -14,7 +14,7 @@ from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import InternalForces, StressFields
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.law import Law, memory_name
-from solidsph.interfaces.operation_count import Tally
+from solidsph.interfaces.plan import Operations
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs
@@ -140,8 +140,8 @@ class BreakingForces(InternalForces):
         return sum(one.pairs.count for one in self.bonds)
 
     @property
-    def tally(self) -> Sequence[Tally]:
-        return self._of(tuple(one.whole() for one in self.bonds)).sums.tally
+    def operations(self) -> Sequence[Operations]:
+        return self._of(tuple(one.whole() for one in self.bonds)).sums.operations
 
     def forces(self, time: float, displacements: Array) -> Array:
         return self.advance(time, 0.0, displacements, {})[0]

@@ -20,7 +20,17 @@ class BodyGradient:
     body: Body
     matrices: Operators
 
-    def of(self, field: Array) -> Array:
+    @classmethod
+    def of(cls, body: Body) -> BodyGradient:
+        """That of a body."""
+        return cls(body, operators(body, body.pairs()))
+
+    @property
+    def pair_count(self) -> int:
+        """Ordered pairs of neighbours, self pairs included."""
+        return self.matrices.gradient.nnz // self.body.particles.dimension
+
+    def gradient(self, field: Array) -> Array:
         """Gradient (d, d, n) of a vector field (n, d) of the body's particles."""
         n, d = field.shape
         along = (self.matrices.gradient @ field).reshape(d, n, d)
@@ -31,15 +41,6 @@ class BodyGradient:
         d = len(stress)
         own = np.where(self.body.particles.ghosts, 0.0, stress)
         return np.asarray(self.matrices.force @ own.transpose(1, 2, 0).reshape(-1, d))
-
-
-def body_gradient(body: Body) -> BodyGradient:
-    """That of a body, made once."""
-    key = BodyGradient
-    if key not in body.made:
-        body.made[key] = BodyGradient(body, operators(body, body.pairs()))
-    found: BodyGradient = body.made[key]
-    return found
 
 
 def in_the_reference(model: DiscreteModel, effect: str) -> None:

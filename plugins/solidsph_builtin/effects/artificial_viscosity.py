@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import ClassVar, final
 
 import attrs
@@ -85,6 +85,7 @@ class ArtificialViscosity(Effect):
                 ).astype(np.int32),
                 values=np.concatenate([table.values for table in tables]),
             ),
+            damping_rate=max(self._rate(body) for body in model.bodies),
         )
 
     def _table(self, body: Body) -> PairTable:
@@ -108,27 +109,16 @@ class ArtificialViscosity(Effect):
             ),
         )
 
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        tables = [self._table(body) for body in model.bodies]
-        return {"pairs": sum(t.starts.nbytes + t.columns.nbytes + t.values.nbytes for t in tables)}
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        # Two neighbours in opposite motion, both ways.
+    def _rate(self, body: Body) -> float:
+        """Of two neighbours in opposite motion, both ways [1/s]."""
+        pairs, particles = body.pairs(), body.particles
+        apart = pairs.distances > 0.0
+        rates = np.zeros(pairs.count)
+        R, b = pairs.distances[apart], pairs.columns[apart]
+        slopes = np.abs(body.smoothing.slope(R))
+        rates[apart] = particles.volumes[b] * particles.spacings[b] * slopes / R
         strength = self.linear + _APPROACH * self.quadratic
-        rates = []
-        for body in bodies:
-            pairs, particles = body.pairs(), body.particles
-            apart = pairs.distances > 0.0
-            terms = np.zeros(pairs.count)
-            R, b = pairs.distances[apart], pairs.columns[apart]
-            slopes = np.abs(body.smoothing.slope(R))
-            terms[apart] = particles.volumes[b] * particles.spacings[b] * slopes / R
-            worst = float(pairs.row_sums(terms).max())
-            rates.append(2.0 * strength * body.material.wave_speed * worst)
-        return max(rates)
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.0
+        return 2.0 * strength * body.material.wave_speed * float(pairs.row_sums(rates).max())
 
     def pair_work(self, particles: float, pairs: float) -> float:
         return pairs - particles
@@ -139,6 +129,7 @@ class ArtificialViscosity(Effect):
 class _Viscosity(PairLoad):
     label: str
     pairs: PairTable
+    damping_rate: float
 
     @staticmethod
     def pull(offset: Vector, velocity: Vector, values: Vector) -> Scalar:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import ClassVar, final
 
 import attrs
 
-from solidsph.interfaces.body import Body
 from solidsph.interfaces.compilable_terms import ScheduledLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
@@ -39,17 +38,6 @@ class BodyForce(Effect):
             field=field,
         )
 
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        count = len(model.select(self.where))
-        d = model.particles.dimension
-        return {"chosen particles": 8 * count, "positions": 8 * count * d, "masses": 8 * count}
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.0
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.0
-
 
 @final
 @attrs.frozen(eq=False)
@@ -59,6 +47,14 @@ class _MassTimesField(ScheduledLoad):
     positions: Array  # (k, d) reference positions
     masses: Array  # (k,)
     field: VectorField
+
+    @property
+    def arrays(self) -> Mapping[str, int]:
+        return {
+            "chosen particles": self.particles.nbytes,
+            "positions": self.positions.nbytes,
+            "masses": self.masses.nbytes,
+        }
 
     def schedule(self, times: Array) -> Array:
         return scheduled_forces(self.field, self.positions, self.masses, times)

@@ -10,10 +10,10 @@ import numpy as np
 
 from solidsph.engines.history import ArrayLaw
 from solidsph.errors import SceneError
-from solidsph.interfaces.body import Body
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.engine import InternalForces
+from solidsph.interfaces.forces_modifier import ForcesModifier
 from solidsph.interfaces.gradient import PointwiseGradient
 from solidsph.interfaces.terms import (
     FieldTerm,
@@ -53,7 +53,7 @@ class BondFailure(Effect):
 
     conserves_momentum: ClassVar[bool] = True
     answers: ClassVar[frozenset[Need] | None] = frozenset()
-    parts_neighbours: ClassVar[bool] = True
+    breaks_bonds: ClassVar[bool] = True
 
     critical_stretch: float = number()  # [-]
     where: Where = "all"  # particles between which bonds may fail
@@ -64,27 +64,12 @@ class BondFailure(Effect):
         )
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
-        return _Cracks(label, self._bonds(model), model.particles.count)
-
-    def within(
-        self, internal: InternalForces, model: DiscreteModel, conditions: Sequence[StressTerm]
-    ) -> InternalForces:
-        if isinstance(internal, BreakingForces):
-            raise SceneError(
-                "bond-failure: it is named twice, and a bond fails once; give it one "
-                "critical_stretch, and places by `where`"
-            )
-        laws = [ArrayLaw(body) for body in model.bodies]
-        return BreakingForces(self._bonds(model), laws, conditions)
-
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        return {f"bonds of {one.body.name}": one.bytes for one in self._bonds(model)}
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.0
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        return _RUBBLE * lattice_frequency(bodies)
+        return _Cracks(
+            label=label,
+            bonds=self._bonds(model),
+            count=model.particles.count,
+            stiffness_rate=_RUBBLE * lattice_frequency(model.bodies),
+        )
 
     def pair_work(self, particles: float, pairs: float) -> float:
         return pairs
@@ -102,21 +87,38 @@ class BondFailure(Effect):
                     "not formed particle by particle, so that what failed bonds leave cannot be "
                     "corrected anew; use 'corrected'"
                 )
-            key = (BondFailure, self.critical_stretch, str(self.where))
-            if key not in body.made:
-                body.made[key] = Bonds.of(body, self.critical_stretch, chosen[body.extent])
-            found.append(body.made[key])
+            found.append(Bonds.of(body, self.critical_stretch, chosen[body.extent]))
         return found
 
 
 @final
 @attrs.frozen(eq=False)
-class _Cracks(FieldTerm, Load):
+class _Cracks(FieldTerm, Load, ForcesModifier):
     """Adds no force of its own; it shows what has failed."""
 
     label: str
     bonds: Sequence[Bonds]
     count: int
+    stiffness_rate: float  # [rad/s]
+
+    def modified(
+        self, internal: InternalForces, stress_terms: Sequence[StressTerm]
+    ) -> InternalForces:
+        if isinstance(internal, BreakingForces):
+            raise SceneError(
+                "bond-failure: it is named twice, and a bond fails once; give it one "
+                "critical_stretch, and places by `where`"
+            )
+        laws = [ArrayLaw(one.body) for one in self.bonds]
+        return BreakingForces(self.bonds, laws, stress_terms)
+
+    @property
+    def arrays(self) -> Mapping[str, int]:
+        return {f"bonds of {one.body.name}": one.bytes for one in self.bonds}
+
+    @property
+    def pair_count(self) -> int:
+        return sum(one.pairs.count for one in self.bonds)
 
     @property
     def particles(self) -> Indices:

@@ -115,37 +115,23 @@ class Contact(Effect):
             object.__setattr__(self, "between", pairs)
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
-        meetings = [self._meeting(one, other) for one, other in self._who(model.bodies)]
+        who = self._who(model.bodies)
+        meetings = [_made(one, other, self.strength, self.margin) for one, other in who]
         return _Contact(
             label=label,
             particles=np.unique(np.concatenate([one.particles for one in meetings])),
             meetings=meetings,
             friction=self.friction,
+            dimension=model.particles.dimension,
+            stiffness_rate=max(self._frequency(one, other) for one, other in who),
         )
 
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        d = model.particles.dimension
-        found: dict[str, int] = {}
-        for one, other in self._who(model.bodies):
-            meeting = self._meeting(one, other)
-            count = len(meeting.particles)
-            found[f"sites of {meeting.name}"] = 41 * count
-            if self.friction:
-                found[f"slip of {meeting.name}"] = 8 * d * count
-        return found
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        # The springs of friction give way by how far they are stretched, not how fast.
-        return 0.0
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        squares = []
-        for one, other in self._who(bodies):
-            kernel = _kernel(one, other)
-            density = min(one.material.density, other.material.density)
-            modulus = _modulus(one, other, kernel.support_radius, self.strength)
-            squares.append(modulus / density * sensitivity(kernel, _EXCESS))
-        return sqrt(max(squares))
+    def _frequency(self, one: Body, other: Body) -> float:
+        """Angular frequency that the contact of two bodies adds at most [rad/s]."""
+        kernel = _kernel(one, other)
+        density = min(one.material.density, other.material.density)
+        modulus = _modulus(one, other, kernel.support_radius, self.strength)
+        return sqrt(modulus / density * sensitivity(kernel, _EXCESS))
 
     def pair_work(self, particles: float, pairs: float) -> float:
         # Asleep it asks for boxes only; awake, surfaces meet, and they have few of all pairs.
@@ -169,14 +155,6 @@ class Contact(Effect):
             )
         return found
 
-    def _meeting(self, one: Body, other: Body) -> Meeting:
-        """Of two bodies; what is made once serves the accounts of arrays and of forces."""
-        key = (Contact, other.name, self.strength, self.margin)
-        if key not in one.made:
-            one.made[key] = _made(one, other, self.strength, self.margin)
-        meeting: Meeting = one.made[key]
-        return attrs.evolve(meeting)  # with a list of pairs of its own
-
 
 @final
 @attrs.frozen(eq=False)
@@ -185,6 +163,23 @@ class _Contact(EnergyTerm, FieldTerm, Load):
     particles: Indices  # (k,)
     meetings: Sequence[Meeting]
     friction: float
+    dimension: int
+    stiffness_rate: float  # [rad/s]; the springs of friction yield by stretch, not by speed
+
+    @property
+    def arrays(self) -> Mapping[str, int]:
+        sizes: dict[str, int] = {}
+        for meeting in self.meetings:
+            count = len(meeting.particles)
+            sizes[f"sites of {meeting.name}"] = 41 * count
+            if self.friction:
+                sizes[f"slip of {meeting.name}"] = 8 * self.dimension * count
+        return sizes
+
+    @property
+    def pair_count(self) -> int:
+        # Where boxes are apart it asks for them only; where they meet, surfaces have few pairs.
+        return len(self.particles)
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         """Without friction, which depends on what has been."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import ClassVar, final
 
 import attrs
 import numpy as np
 
 from solidsph.errors import SceneError
-from solidsph.interfaces.body import Body
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.terms import Load, Observation
@@ -52,29 +51,26 @@ class DynamicRelaxation(Effect):
     def bind(self, model: DiscreteModel, label: str) -> Load:
         return _Relaxation(
             label=label,
+            shape=(model.particles.count, model.particles.dimension),
             masses=model.masses,
             damping=self.damping,
-            highest_rate=self.damping_rate(model.bodies),
+            damping_rate=_CAP * lattice_frequency(model.bodies),
         )
-
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        n, d = model.particles.positions.shape
-        return {"masses": 8 * n, "first step": 2 * 8 * n * d, "last velocity": 8 * n * d}
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        return _CAP * lattice_frequency(bodies)
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.0
 
 
 @final
 @attrs.frozen(eq=False)
 class _Relaxation(Load):
     label: str
+    shape: tuple[int, int]  # (n, d)
     masses: Array  # (n,) [kg]
     damping: float
-    highest_rate: float  # [1/s]
+    damping_rate: float  # the highest [1/s]
+
+    @property
+    def arrays(self) -> Mapping[str, int]:
+        n, d = self.shape
+        return {"masses": 8 * n, "first step": 2 * 8 * n * d, "last velocity": 8 * n * d}
 
     @property
     def particles(self) -> Indices:
@@ -123,7 +119,7 @@ class _Relaxation(Load):
         # Before it has gone anywhere, or while a load pushes it on, the rate stays.
         if not (weight > 0.0 and power < 0.0):
             return c
-        return min(2.0 * self.damping * float(np.sqrt(-power / weight)), self.highest_rate)
+        return min(2.0 * self.damping * float(np.sqrt(-power / weight)), self.damping_rate)
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         rate = observation.state.memory.get(self._named("rate"), np.zeros(1))

@@ -24,7 +24,7 @@ from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import Where
 from solidsph.registry.parameters import check_positive, number
 from solidsph.run.stable_step import lattice_frequency
-from solidsph_builtin.effects._gradients import BodyGradient, body_gradient, in_the_reference
+from solidsph_builtin.effects._gradients import BodyGradient, in_the_reference
 
 # Of the largest stable step of the explicit rule, by which heat advances within a step.
 _PART = 0.9
@@ -63,7 +63,7 @@ class Heat(Effect):
 
     conserves_momentum: ClassVar[bool] = True
     answers: ClassVar[frozenset[Need] | None] = frozenset()
-    joins_neighbours: ClassVar[bool] = True
+    uses_initial_pairs: ClassVar[bool] = True
 
     conductivity: float = number()  # k [W/(m K)]
     heat_capacity: float = number()  # c per mass [J/(kg K)]
@@ -112,28 +112,11 @@ class Heat(Effect):
             start=start.values(0, X, 0.0),
             source=VectorField.of({"x": self.source}, "heat: source", end=model.end),
             held=held,
-            gradients=[body_gradient(b) for b in model.bodies] if self.expansion else [],
+            gradients=[BodyGradient.of(b) for b in model.bodies] if self.expansion else [],
+            # A body that has swollen is stiffer by about three times its stretch.
+            stiffness_rate=sqrt(3.0 * abs(self.expansion) * self.largest)
+            * lattice_frequency(model.bodies),
         )
-
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        in_the_reference(model, "heat")
-        K = _conduction(model.bodies, self.conductivity)
-        n = model.particles.count
-        kept = {"conduction": K.data.nbytes + K.indices.nbytes + K.indptr.nbytes}
-        kept |= {"temperature": 8 * n, "capacities": 8 * n}
-        if self.expansion:
-            kept |= {
-                f"gradient of {body.name}": body_gradient(body).matrices.bytes
-                for body in model.bodies
-            }
-        return kept
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.0
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        # A body that has swollen is stiffer by about three times its stretch.
-        return sqrt(3.0 * abs(self.expansion) * self.largest) * lattice_frequency(bodies)
 
     def pair_work(self, particles: float, pairs: float) -> float:
         return 3.0 * pairs if self.expansion else pairs
@@ -172,6 +155,21 @@ class _Conduction(FieldTerm, Load):
     source: VectorField
     held: Sequence[tuple[Indices, VectorField]]
     gradients: Sequence[BodyGradient]  # of every body, where they swell
+    stiffness_rate: float  # [rad/s]
+
+    @property
+    def arrays(self) -> Mapping[str, int]:
+        K, n = self.conduction, len(self.capacities)
+        return {
+            "conduction": K.data.nbytes + K.indices.nbytes + K.indptr.nbytes,
+            "temperature": 8 * n,
+            "capacities": 8 * n,
+            **{f"gradient of {one.body.name}": one.matrices.bytes for one in self.gradients},
+        }
+
+    @property
+    def pair_count(self) -> int:
+        return self.conduction.nnz + 2 * sum(one.pair_count for one in self.gradients)
 
     @property
     def particles(self) -> Indices:
@@ -236,7 +234,7 @@ class _Conduction(FieldTerm, Load):
         forces = np.zeros_like(positions)
         for gradient in self.gradients:
             body = gradient.body
-            H = gradient.of((positions - self.reference)[body.extent])
+            H = gradient.gradient((positions - self.reference)[body.extent])
             g = 1.0 + self.expansion * T[body.extent]
             forces[body.extent] = gradient.forces(_swelling(body.material, H, g))
         return forces

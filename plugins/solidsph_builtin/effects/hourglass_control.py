@@ -8,7 +8,7 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.engines.select import hourglass_operator
+from solidsph.engines.hourglass import hourglass_operator
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.compilable_terms import HourglassLoad
@@ -59,7 +59,7 @@ class HourglassControl(Effect):
     """
 
     conserves_momentum: ClassVar[bool] = True
-    joins_neighbours: ClassVar[bool] = True
+    uses_initial_pairs: ClassVar[bool] = True
     answers: ClassVar[frozenset[Need] | None] = frozenset({Need.UNSEEN_MOTIONS})
 
     strength: float = number(default=0.5)  # [-] times the shear modulus
@@ -77,33 +77,13 @@ class HourglassControl(Effect):
         return _Control(
             label=label,
             reference=model.particles.positions,
-            operators=[_operator(body, self.strength) for body in model.bodies],
+            operators=[hourglass_operator(penalised(body, self.strength)) for body in model.bodies],
         )
-
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        return {
-            f"penalty of {body.name}": _operator(body, self.strength).bytes for body in model.bodies
-        }
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.0
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        return max(_operator(body, self.strength).highest_frequency() for body in bodies)
 
     def pair_work(self, particles: float, pairs: float) -> float:
         # The gradient's pairs for H and for the stress in return, and the nearest in between: up
         # to 26 on a lattice.
         return 2.0 * pairs + min(pairs, 26.0 * particles)
-
-
-def _operator(body: Body, strength: float) -> HourglassOperator:
-    # The step is chosen before the term is bound: what is made for one serves the other.
-    key = (HourglassControl, strength)
-    if key not in body.made:
-        body.made[key] = hourglass_operator(penalised(body, strength))
-    operator: HourglassOperator = body.made[key]
-    return operator
 
 
 def penalised(body: Body, strength: float) -> HourglassPairs:

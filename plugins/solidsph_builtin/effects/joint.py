@@ -58,38 +58,16 @@ class Joint(Effect):
             )
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
-        springs = self._springs(model.bodies)
-        return _Springs(label, springs.table(model.particles.count), model.particles.positions)
-
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        table = self._springs(model.bodies).table(model.particles.count)
-        return {"springs": table.starts.nbytes + table.columns.nbytes + table.values.nbytes}
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.0
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        springs = self._springs(bodies)
-        masses = np.concatenate([body.masses for body in bodies])
-        # No eigenvalue exceeds the largest sum of a row's entries, scaled evenly.
-        a, b, k = springs.one, springs.other, springs.stiffness
-        own = np.bincount(a, k, len(masses)) + np.bincount(b, k, len(masses))
-        across = k / np.sqrt(masses[a] * masses[b])
-        real = masses > 0.0
-        rows = np.bincount(a, across, len(masses)) + np.bincount(b, across, len(masses))
-        rows[real] += own[real] / masses[real]
-        return float(np.sqrt(rows.max()))
+        springs = self._found(model.bodies)
+        return _Springs(
+            label=label,
+            pairs=springs.table(model.particles.count),
+            reference=model.particles.positions,
+            stiffness_rate=springs.highest_frequency(model.masses),
+        )
 
     def pair_work(self, particles: float, pairs: float) -> float:
         return 0.0  # of the few at the faces nothing is known before they are found
-
-    def _springs(self, bodies: Sequence[Body]) -> _Found:
-        key = (Joint, self.between, self.reach)
-        made = bodies[0].made
-        if key not in made:
-            made[key] = self._found(bodies)
-        found: _Found = made[key]
-        return found
 
     def _found(self, bodies: Sequence[Body]) -> _Found:
         names = [body.name for body in bodies]
@@ -122,6 +100,18 @@ class _Found:
     other: Indices
     stiffness: Array  # k (m,) [N/m]
     length: Array  # |X_ab| (m,) [m]
+
+    def highest_frequency(self, masses: Array) -> float:
+        """Above all angular frequencies of these springs alone, of masses (n,) [rad/s]."""
+        # No eigenvalue exceeds the largest sum of a row's entries, scaled evenly.
+        a, b, k = self.one, self.other, self.stiffness
+        own = np.asarray(np.bincount(a, k, len(masses)) + np.bincount(b, k, len(masses)))
+        across = k / np.sqrt(masses[a] * masses[b])
+        real = masses > 0.0
+        rows = np.zeros(len(masses))
+        rows += np.bincount(a, across, len(masses)) + np.bincount(b, across, len(masses))
+        rows[real] += own[real] / masses[real]
+        return float(np.sqrt(rows.max()))
 
     def table(self, count: int) -> PairTable:
         rows = np.concatenate([self.one, self.other])
@@ -176,6 +166,11 @@ class _Springs(PairLoad, EnergyTerm):
     label: str
     pairs: PairTable
     reference: Array  # X (n, d)
+    stiffness_rate: float  # [rad/s]
+
+    @property
+    def arrays(self) -> Mapping[str, int]:
+        return {"springs": self.pairs.bytes}
 
     @staticmethod
     def pull(offset: Vector, velocity: Vector, values: Vector) -> Scalar:

@@ -16,7 +16,7 @@ from solidsph.interfaces.terms import Load, Observation
 from solidsph.maths.arrays import Array, Indices, Tensor
 from solidsph.maths.tensors import add, identity, product, scale, trace, transpose
 from solidsph.registry.parameters import check_positive, number
-from solidsph_builtin.effects._gradients import BodyGradient, body_gradient, in_the_reference
+from solidsph_builtin.effects._gradients import BodyGradient, in_the_reference
 
 # Up to so many freedoms eigenvalues are found by a dense matrix; beyond, to this part.
 _DENSE, _FOUND = 60, 1e-3
@@ -35,7 +35,7 @@ class KelvinVoigt(Effect):
 
     conserves_momentum: ClassVar[bool] = True
     answers: ClassVar[frozenset[Need] | None] = frozenset({Need.REST})
-    joins_neighbours: ClassVar[bool] = True
+    uses_initial_pairs: ClassVar[bool] = True
 
     time: float = number()  # retardation time [s]
 
@@ -44,46 +44,28 @@ class KelvinVoigt(Effect):
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
         in_the_reference(model, "kelvin-voigt")
+        gradients = [BodyGradient.of(body) for body in model.bodies]
         return _Dashpot(
-            label,
-            model.particles.positions,
-            self.time,
-            [body_gradient(body) for body in model.bodies],
+            label=label,
+            reference=model.particles.positions,
+            time=self.time,
+            gradients=gradients,
+            damping_rate=self.time * max(_highest_square(one) for one in gradients),
         )
-
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        in_the_reference(model, "kelvin-voigt")
-        return {
-            f"gradient of {body.name}": body_gradient(body).matrices.bytes for body in model.bodies
-        }
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        return self.time * max(_highest_square(body) for body in bodies)
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.0
 
     def pair_work(self, particles: float, pairs: float) -> float:
         return 3.0 * pairs  # both gradients, and the divergence
 
 
-def _highest_square(body: Body) -> float:
-    """Largest square of an angular frequency of the body's linear stiffness [1/s^2]."""
-    key = (KelvinVoigt, "highest")
-    if key not in body.made:
-        body.made[key] = _largest_eigenvalue(body)
-    found: float = body.made[key]
-    return found
-
-
-def _largest_eigenvalue(body: Body) -> float:
-    gradient, real = body_gradient(body), ~body.particles.ghosts
+def _highest_square(gradient: BodyGradient) -> float:
+    """Largest square of an angular frequency of a body's linear stiffness [1/s^2]."""
+    body, real = gradient.body, ~gradient.body.particles.ghosts
     n, d = body.particles.positions.shape
     roots = np.zeros((n, 1))
     roots[real, 0] = 1.0 / np.sqrt(body.masses[real])
 
     def stiffness(flat: Array) -> Array:
-        rate = gradient.of(roots * flat.reshape(n, d))
+        rate = gradient.gradient(roots * flat.reshape(n, d))
         stress = _viscous_stress(body, 0.5 * (rate + rate.transpose(1, 0, 2)))
         return -(roots * gradient.forces(np.array(stress))).ravel()
 
@@ -109,6 +91,15 @@ class _Dashpot(Load):
     reference: Array  # X (n, d)
     time: float
     gradients: Sequence[BodyGradient]
+    damping_rate: float  # [1/s]
+
+    @property
+    def arrays(self) -> Mapping[str, int]:
+        return {f"gradient of {one.body.name}": one.matrices.bytes for one in self.gradients}
+
+    @property
+    def pair_count(self) -> int:
+        return 3 * sum(one.pair_count for one in self.gradients)  # both gradients, the divergence
 
     @property
     def particles(self) -> Indices:
@@ -118,7 +109,7 @@ class _Dashpot(Load):
         u, forces = positions - self.reference, np.zeros_like(positions)
         for gradient in self.gradients:
             extent = gradient.body.extent
-            H, rate = gradient.of(u[extent]), gradient.of(velocities[extent])
+            H, rate = gradient.gradient(u[extent]), gradient.gradient(velocities[extent])
             F = add(H, identity(H))
             half = product(transpose(F), rate)
             S = _viscous_stress(gradient.body, scale(0.5, add(half, transpose(half))))

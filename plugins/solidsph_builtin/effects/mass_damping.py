@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import ClassVar, final
 
 import attrs
 
-from solidsph.interfaces.body import Body
 from solidsph.interfaces.compilable_terms import PointwiseLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
@@ -33,17 +32,7 @@ class MassDamping(Effect):
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
         indices = model.select(self.where)
-        return _Drag(label, indices, self.rate * model.masses[indices, None])
-
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        count = len(model.select(self.where))
-        return {"chosen particles": 8 * count, "drag": 8 * count}
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        return self.rate
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.0
+        return _Drag(label, indices, self.rate * model.masses[indices, None], self.rate)
 
 
 @final
@@ -52,6 +41,11 @@ class _Drag(PointwiseLoad):
     label: str
     particles: Indices  # (k,)
     values: Array  # c m, (k, 1) [kg/s]
+    damping_rate: float  # c [1/s]
+
+    @property
+    def arrays(self) -> Mapping[str, int]:
+        return {"chosen particles": self.particles.nbytes, "drag": self.values.nbytes}
 
     @staticmethod
     def force(position: Vector, velocity: Vector, values: Vector) -> Vector:

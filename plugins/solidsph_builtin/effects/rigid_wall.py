@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import isfinite, sqrt
 from typing import ClassVar, final
 
@@ -11,7 +11,6 @@ import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
 from solidsph.errors import SceneError
-from solidsph.interfaces.body import Body
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.terms import (
@@ -102,7 +101,12 @@ class RigidWall(Effect):
             springs=self.strength * moduli * V / s**2,
             friction=self.friction,
             field=field,
-            step_size=model.step_size,
+            # Every particle is tied to the wall alone: k / m, and the spring along it is softer.
+            stiffness_rate=sqrt(self.strength)
+            * max(
+                body.material.wave_speed / float(body.particles.spacings.min())
+                for body in model.bodies
+            ),
         )
         wall.motion(0.0, 0)  # a formula out of its domain shows now, not in mid-run
         return wall
@@ -114,21 +118,6 @@ class RigidWall(Effect):
             return np.asarray(self.clearance * particles.spacings)
         distances = [body.shape.signed_distance(body.particles.positions) for body in model.bodies]
         return np.clip(-np.concatenate(distances), 0.0, 0.5 * particles.spacings)
-
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        count = len(model.select(self.where))
-        slip = 8 * count * model.particles.dimension
-        own = {"chosen particles": 8 * count, "clearances": 8 * count, "stiffness": 8 * count}
-        return {**own, "slip": slip} if self.friction else own
-
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        return 0.0
-
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        # Every particle is tied to the wall alone: k / m, and the spring along it is softer.
-        return sqrt(self.strength) * max(
-            body.material.wave_speed / float(body.particles.spacings.min()) for body in bodies
-        )
 
 
 @final
@@ -143,16 +132,25 @@ class _Wall(EnergyTerm, FieldTerm, Load):
     springs: Array  # (k,) k [N/m]
     friction: float
     field: VectorField | None
-    step_size: float  # [s]
+    stiffness_rate: float  # [rad/s]
 
-    def motion(self, time: float, order: int) -> Array:
+    @property
+    def arrays(self) -> Mapping[str, int]:
+        count = len(self.particles)
+        slip = {"slip": 8 * count * len(self.point)} if self.friction else {}
+        return {
+            "chosen particles": 8 * count,
+            "clearances": 8 * count,
+            "stiffness": 8 * count,
+            **slip,
+        }
+
+    def motion(self, time: float, order: int, step: float = 0.0) -> Array:
         """Displacement of the plane, (d,) [m], or its derivative of the given order."""
         moved = np.zeros(len(self.point))
         if self.field is not None:
             for axis in self.field.components:
-                moved[axis] = self.field.derivative(
-                    axis, self.point[None, :], time, order, self.step_size
-                )[0]
+                moved[axis] = self.field.derivative(axis, self.point[None, :], time, order, step)[0]
         return moved
 
     def gaps(self, time: float, positions: Array) -> Array:
@@ -181,7 +179,7 @@ class _Wall(EnergyTerm, FieldTerm, Load):
         pressed = self.pressed(time, positions)
         slip = slid(
             self._slip(memory),
-            velocities[self.particles] - self.motion(time, 1),
+            velocities[self.particles] - self.motion(time, 1, step),
             self.normal,
             step,
             _TANGENTIAL * self.springs,

@@ -18,8 +18,8 @@ def overdamped(seen: Seen) -> Iterator[Advice]:
     if not seen.moves:
         return
     omega = 2.0 * pi / seen.slowest_period
-    for label, effect in seen.answering(Need.REST).items():
-        rate = effect.damping_rate(seen.simulation.model.bodies)
+    for label in seen.answering(Need.REST):
+        rate = seen.simulation.load_of(label).damping_rate
         creeping = rate / omega**2
         if rate > _STRONG * 2.0 * omega and creeping > _LONG * seen.scene.duration:
             yield Advice(

@@ -21,7 +21,7 @@ from solidsph.registry import registry
 from solidsph.registry.origin import described
 from solidsph.interfaces.body import Body
 from solidsph.run.dynamics import Dynamics
-from solidsph.engines.history import HistoryFields, remembering
+from solidsph.engines.history import HistoryFields, modified
 from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.terms import (
     Term,
@@ -48,7 +48,7 @@ from solidsph.scene.scene_data import MOST_STEPS
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.run.built_scene import BuiltScene
 from solidsph.interfaces.smoothing_kernel import smoothing_kernel
-from solidsph.run.stable_step import largest_step
+from solidsph.run.stable_step import stable_step
 from solidsph.model.surface import Conditions
 from solidsph.build.visibility import hidden_pairs
 from solidsph.model.regions import Where, select
@@ -104,34 +104,37 @@ class Assembly:
         words.stop_if_any()
 
         made = [problems.settled(body) for body in bodies]
-        scheme = problems.settled(parts.integrator)
-        problems.attempt(self._check_constants, scheme, effects, made)
+        integrator = problems.settled(parts.integrator)
+        problems.add(returned_values.limits(integrator))
+        for body in made:
+            problems.add(returned_values.constants(body.material))
         words.stop_if_any()
-        step = problems.attempt(self._step_size, scheme, effects, made)
-        words.stop_if_any()
-        steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
         model = DiscreteModel(
             particles=particles,
             masses=np.concatenate([body.masses for body in made]),
             bodies=made,
-            step_size=scene.duration / steps,
             end=scene.duration,
             conditions=tag_conditions,
         )
         terms = self._bound(parts.handlers, effects, model)
-        problems.stop_if_any()
-        motions = _in_order([c for c in terms if isinstance(c, Constraint)], particles)
+        words.stop_if_any()
+        constraints = _in_order([c for c in terms if isinstance(c, Constraint)], particles)
         stresses = [c for c in terms if isinstance(c, StressTerm)]
-        problems.add(compatibility.motions(motions, particles))
-        forces = [c for c in terms if isinstance(c, Load)]
-        problems.add(compatibility.loads(forces, particles, formulation))
+        loads = [c for c in terms if isinstance(c, Load)]
+        step = problems.attempt(self._step_size, integrator, loads, made)
+        problems.add(compatibility.motions(constraints, particles))
+        problems.add(compatibility.loads(loads, particles, formulation))
         problems.add(compatibility.stresses(stresses, formulation))
-        initial = problems.attempt(self._initial_state, particles)
-        chosen_engine = problems.settled(parts.engine)
-        internal = problems.attempt(chosen_engine.prepare, model.bodies, stresses, steps)
-        for effect in effects.values() if internal is not None else ():
-            internal = problems.attempt(effect.within, internal, model, stresses) or internal
         problems.add(compatibility.history(made, scene, words.labels))
+        initial = problems.attempt(self._initial_state, particles)
+        words.stop_if_any()
+        steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
+        engine = problems.settled(parts.engine)
+        # An equilibrium is found with assembled matrices: there is nothing to compile for.
+        evaluations = steps if scene.statics is None else 1
+        internal = problems.attempt(engine.prepare, made, stresses, evaluations)
+        problems.stop_if_any()
+        internal = problems.attempt(modified, internal, made, terms, stresses)
         problems.stop_if_any()
         remembered = [body for body in made if isinstance(body.material, HistoryMaterial)]
         if remembered:
@@ -145,16 +148,16 @@ class Assembly:
             dynamics=Dynamics(
                 particles=particles,
                 masses=model.masses,
-                internal=remembering(problems.settled(internal), made, stresses),
-                constraints=motions,
-                loads=forces,
+                internal=problems.settled(internal),
+                constraints=constraints,
+                loads=loads,
+                step_size=scene.duration / steps,
             ),
             terms=tuple(terms),
             effects=effects,
-            integrator=scheme,
-            engine=chosen_engine,
+            integrator=integrator,
+            engine=engine,
             initial=problems.settled(initial),
-            step_size=model.step_size,
             steps=steps,
             parts=tuple(words.used),
             manager=self._manager,
@@ -170,15 +173,6 @@ class Assembly:
             problems.attempt(ask, made_ready, words.foreign)
             problems.stop_if_any()
         return made_ready
-
-    def _check_constants(
-        self, integrator: Integrator, effects: Mapping[str, Effect], bodies: Sequence[Body]
-    ) -> None:
-        self._problems.add(returned_values.limits(integrator))
-        for body in bodies:
-            self._problems.add(returned_values.constants(body.material))
-        for label, effect in effects.items():
-            self._problems.add(returned_values.rates(label, effect, bodies))
 
     def _body(
         self,
@@ -240,6 +234,10 @@ class Assembly:
         particles = model.particles
         for one in found:
             wrong += returned_values.shapes(one, particles.count, particles.dimension)
+        if not wrong:
+            for load in found:
+                if isinstance(load, Load):
+                    wrong += returned_values.rates(load)
         if wrong:
             raise BuildError([f"{described(registry.entry_of(kind, part))}, {w}" for w in wrong])
         return found
@@ -271,11 +269,11 @@ class Assembly:
         )
 
     def _step_size(
-        self, integrator: Integrator, effects: Mapping[str, Effect], bodies: Sequence[Body]
+        self, integrator: Integrator, loads: Sequence[Load], bodies: Sequence[Body]
     ) -> float:
-        """Time step [s] from the confined wave speed and whatever the effects add."""
+        """Time step [s] from the confined wave speed and whatever the loads add."""
         scene = self._scene
-        largest = largest_step(integrator, effects.values(), bodies)
+        largest = stable_step(integrator, loads, bodies)
         if scene.time_step is not None and scene.time_step > largest:
             raise SceneError(
                 f"time_step = {scene.time_step:.6g} s exceeds the CFL step, {largest:.6g} s by "

@@ -90,7 +90,7 @@ def _told(kind: str, part: Any, measured: str, required: str) -> str:
 
 def _of_effect(simulation: BuiltScene, label: str, effect: Any) -> Iterator[str]:
     """Its energy, and the rates that it declares, along one random motion of this scene."""
-    (condition,) = [load for load in simulation.dynamics.loads if load.label == label]
+    condition = simulation.load_of(label)
     particles, masses = simulation.particles, simulation.dynamics.masses
     rng = np.random.default_rng(0)
     state = simulation.initial
@@ -117,12 +117,12 @@ def _of_effect(simulation: BuiltScene, label: str, effect: Any) -> Iterator[str]
     for name, declared, change in (
         (
             "stiffness_rate",
-            effect.stiffness_rate(simulation.model.bodies) ** 2,
+            condition.stiffness_rate**2,
             (force(-h * du, still) - force(h * du, still)) / (2.0 * h),
         ),
         (
             "damping_rate",
-            effect.damping_rate(simulation.model.bodies),
+            condition.damping_rate,
             (force(still, -h * du) - force(still, h * du)) / (2.0 * h),
         ),
     ):

@@ -19,8 +19,8 @@ from solidsph.costs.foreseen import foreseen
 from solidsph.costs.model import Prediction, predicted
 from solidsph.costs.process import machine_memory
 from solidsph.costs.shares import Share, shares
-from solidsph.costs.work import Compilation
 from solidsph.errors import SceneError
+from solidsph.interfaces.plan import Compilation
 from solidsph.registry import registry
 from solidsph.registry.construct import construct
 from solidsph.scene.default_cover import cover_of
@@ -312,7 +312,7 @@ def _of_statics(simulation: Simulation) -> list[tuple[str, Any, str]]:
 
 
 def _loop(simulation: Simulation) -> tuple[str, str, str]:
-    if simulation.compiles_steps:
+    if simulation.plan.compiles_steps:
         return ("time loop", "compiled", "whole steps together: all parts are of declared kinds")
     return ("time loop", "step by step", "each step by the parts themselves, which fits all")
 
@@ -322,8 +322,8 @@ def _effects(
 ) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     named = {label: registry.entry_of("effects", one).name for label, one in effects.items()}
-    for label, effect in effects.items():
-        arrays = {} if simulation is None else effect.arrays(simulation.model)
+    for label in effects:
+        arrays = {} if simulation is None else simulation.load_of(label).arrays
         share = found.get(label)
         rows.append(
             {

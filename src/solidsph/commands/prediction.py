@@ -17,7 +17,8 @@ from solidsph.costs.coefficients import REFERENCE
 from solidsph.costs.foreseen import foreseen
 from solidsph.costs.model import Built, Prediction
 from solidsph.costs.process import company, machine_memory, memory_now, peak_memory
-from solidsph.costs.work import Compilation, Work
+from solidsph.costs.work import Work
+from solidsph.interfaces.plan import Compilation
 from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 

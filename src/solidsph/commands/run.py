@@ -27,7 +27,7 @@ from solidsph.studies.case import Case, Measurement
 
 if TYPE_CHECKING:
     from solidsph.costs.model import Prediction
-    from solidsph.costs.work import Compilation
+    from solidsph.interfaces.plan import Compilation
     from solidsph.watch import Finding
 
 

@@ -8,7 +8,7 @@ within 5 %.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from math import ceil, floor, pi
 
@@ -17,12 +17,13 @@ import numpy as np
 
 from solidsph.costs.counted import ITERATIONS, record_bytes
 from solidsph.costs.dissection import dissected
-from solidsph.costs.work import Compilation, Loop, Piece, StaticWork, Work
+from solidsph.costs.work import Loop, StaticWork, Work
 from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.engine import Engine
 from solidsph.interfaces.formulation import Configuration, Formulation
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.material import Material
-from solidsph.interfaces.operation_count import Tally, Way, vectors
+from solidsph.interfaces.plan import BodySize, Operations, Way
 from solidsph.interfaces.shape import Shape
 from solidsph.interfaces.smoothing_kernel import UNIT_SPHERE
 from solidsph.registry.construct import construct
@@ -73,31 +74,30 @@ def estimated(scene: Scene) -> Work:
     statics = None if scene.statics is None else _statics(scene, bodies, d, cover)
     steps = max(1, ceil(scene.duration / size)) if statics is None else statics.load_steps
     outputs = (min(scene.outputs, steps) if statics is None else steps) + 1
-    compiled = statics is None and _compiled(scene, n, steps)
     moving = formulation.configuration is Configuration.CURRENT
-    precision = 4 if scene.engine == "compiled-float32" and not moving else 8
-    tally = tuple(
-        part
-        for body in bodies
-        for part in _tally(body, d, compiled=compiled, moving=moving, precision=precision)
-    )
+    sizes = [BodySize(d, body.particles, body.pairs, moving, body.lattice) for body in bodies]
+    evaluations = steps + 1 if statics is None else statics.iterations + steps
+    engine: Engine = construct("engines", scene.engine)
+    plan = engine.expected(sizes, evaluations)
+    compiled = statics is None and plan.compiles_steps
+    loads: tuple[Operations, ...] = ()
     visited = sum(effect.pair_work(n, pairs) for effect in effects)
     if visited:
         way = Way.PAIR_LOOPS if compiled else Way.PAIR_ARRAYS
         kept = round(visited * (4 + 3 * 8))
-        tally = (*tally, Tally(way, round(visited), n, kept, kept, threaded=compiled))
+        loads = (Operations(way, round(visited), n, kept, kept, threaded=compiled),)
     return Work(
         dimension=d,
         particles=n,
         pairs=pairs,
-        loop=_loop(compiled=compiled, moving=moving, static=statics is not None),
+        loop=Loop.NEWTON if statics else Loop.COMPILED if compiled else Loop.STEPS,
         steps=steps,
-        evaluations=steps + 1 if statics is None else statics.iterations + steps,
-        tally=tally,
+        evaluations=evaluations,
+        operations=(*plan.engine, *loads),
         conditions=len(scene.boundaries) + len(effects),
         outputs=outputs,
         record_bytes=record_bytes(n, d, outputs),
-        compilations=frozenset(_compilations(d, compiled=compiled, moving=moving)),
+        compilations=plan.compilations,
         statics=statics,
         counted=False,
         cover=cover,
@@ -168,57 +168,6 @@ def _sampled_volume(shape: Shape) -> float:
     lower, upper = shape.bounds()
     points = np.random.default_rng(0).uniform(lower, upper, (_POINTS, shape.dimension))
     return float(np.prod(upper - lower) * np.mean(shape.signed_distance(points) < 0.0))
-
-
-def _compiled(scene: Scene, particles: int, steps: int) -> bool:
-    if scene.engine == "auto":
-        return particles * steps > _FEW
-    return scene.engine.startswith("compiled")
-
-
-def _loop(*, compiled: bool, moving: bool, static: bool) -> Loop:
-    if static:
-        return Loop.NEWTON
-    return Loop.COMPILED if compiled and not moving else Loop.STEPS
-
-
-def _tally(
-    body: BodyEstimate, d: int, *, compiled: bool, moving: bool, precision: int
-) -> Iterator[Tally]:
-    n, m = round(body.particles), round(body.pairs)
-    both = vectors(n, d)
-    if not compiled:
-        way = Way.PRODUCTS_ANEW if moving else Way.PRODUCTS
-        # Numbers and indices of two matrices, and where their rows begin.
-        matrices = 2 * m * d * (8 + 8) + 8 * n * (d + 1)
-        held = 8 * n if moving else matrices
-        yield Tally(way, m, n, 2 * matrices if moving else matrices + both, held)
-        return
-    if moving:
-        held = 36 * m + 8 * n * (d * d + 2)  # the list, its rows, kernel values and slopes
-        yield Tally(Way.FORMULAS, m, n, held + both, held)
-        return
-    # Factors, flat displacements, and buffers for the forces.
-    own = precision * n * (1 + 2 * _STRIDE[d])
-    threaded = m > 200_000
-    if body.lattice:
-        yield Tally(Way.STENCILS, m, n, own + both, own, precision, threaded)
-        return
-    rows = m * (d * precision + 4) + 16 * n
-    yield Tally(Way.STENCILS, 0, 0, own + both, own, precision, threaded)
-    yield Tally(Way.ROWS, m, n, rows, rows, precision, threaded)
-
-
-def _compilations(d: int, *, compiled: bool, moving: bool) -> Iterator[Compilation]:
-    if not compiled:
-        return
-    if moving:
-        yield Compilation(Piece.MOVING_ENGINE, d, False)
-        yield Compilation(Piece.MOVING, d, False)
-        return
-    yield Compilation(Piece.ENGINE, 0, False)
-    for piece in (Piece.FORCES, Piece.FIELDS, Piece.STEPS):
-        yield Compilation(piece, d, True)
 
 
 def _statics(scene: Scene, bodies: Sequence[BodyEstimate], d: int, cover: float) -> StaticWork:

@@ -10,7 +10,7 @@ from solidsph.costs.calibration import Calibration
 from solidsph.costs.counted import counted
 from solidsph.costs.model import Built, Prediction, predicted
 from solidsph.costs.timed import timed
-from solidsph.costs.work import Compilation
+from solidsph.interfaces.plan import Compilation
 from solidsph.simulation import Simulation
 
 

@@ -11,8 +11,8 @@ from solidsph.costs import terms
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.coefficients import COEFFICIENTS
 from solidsph.costs.terms import CostTerm, Yard
-from solidsph.costs.work import Compilation, Loop, Work
-from solidsph.interfaces.operation_count import Way
+from solidsph.costs.work import Loop, Work
+from solidsph.interfaces.plan import Compilation, Way
 
 # Not in the fit yet, which will bring them when it is next made: what a step takes more with a
 # constant force, or one by a particle's own motion, over the particles that it acts on.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import attrs
 
@@ -10,11 +10,11 @@ from solidsph.costs.calibration import Calibration
 from solidsph.costs.counted import counted
 from solidsph.costs.model import predicted
 from solidsph.costs.timed import timed
-from solidsph.engines.history import remembering
-from solidsph.interfaces.effect import Effect
+from solidsph.engines.history import modified
 from solidsph.interfaces.engine import InternalForces
-from solidsph.interfaces.terms import StressTerm
-from solidsph.run.stable_step import step_by_rates
+from solidsph.interfaces.forces_modifier import ForcesModifier
+from solidsph.interfaces.terms import Load, StressTerm
+from solidsph.run.stable_step import stable_step
 from solidsph.simulation import Simulation
 
 
@@ -31,19 +31,16 @@ def shares(simulation: Simulation, machine: Calibration) -> Mapping[str, Share]:
     work = counted(simulation)
     apart = timed(simulation, work)
     whole = predicted(apart.rest(work, simulation), machine, besides=apart.seconds).steps
-    bodies, effects = simulation.model.bodies, simulation.effects
-    rates = {n: (e.stiffness_rate(bodies), e.damping_rate(bodies)) for n, e in effects.items()}
-    step = step_by_rates(simulation.integrator, rates.values(), bodies)
     found = {}
-    for label in effects:
-        others = [rate for name, rate in rates.items() if name != label]
+    for label in simulation.effects:
         fewer = without(simulation, label)
         own = counted(fewer)
-        left = timed(fewer, own) if _acts_within(effects[label]) else apart.without(label)
+        modifies = isinstance(simulation.load_of(label), ForcesModifier)
+        left = timed(fewer, own) if modifies else apart.without(label)
         rest = predicted(left.rest(own, fewer), machine, besides=left.seconds).steps
         found[label] = Share(
             time=1.0 - rest / whole if whole > 0.0 else 0.0,
-            step=step / step_by_rates(simulation.integrator, others, bodies),
+            step=_stable_step(simulation) / _stable_step(fewer),
         )
     return found
 
@@ -54,8 +51,8 @@ def without(simulation: Simulation, label: str) -> Simulation:
     effects = {name: one for name, one in simulation.effects.items() if name != label}
     loads = [one for one in dynamics.loads if one.label != label]
     internal = dynamics.internal
-    if _acts_within(simulation.effects[label]):
-        internal = _internal(simulation, effects)
+    if isinstance(simulation.load_of(label), ForcesModifier):
+        internal = _internal(simulation, loads)
     return attrs.evolve(
         simulation,
         effects=effects,
@@ -64,16 +61,14 @@ def without(simulation: Simulation, label: str) -> Simulation:
     )
 
 
-def _acts_within(effect: Effect) -> bool:
-    """Whether it changes how bodies act on themselves."""
-    return type(effect).within is not Effect.within
+def _stable_step(simulation: Simulation) -> float:
+    dynamics = simulation.dynamics
+    return stable_step(simulation.integrator, dynamics.loads, simulation.model.bodies)
 
 
-def _internal(simulation: Simulation, effects: Mapping[str, Effect]) -> InternalForces:
-    """The internal forces as these effects let them act."""
-    model = simulation.model
-    stresses = [c for c in simulation.terms if isinstance(c, StressTerm)]
-    internal = simulation.engine.prepare(model.bodies, stresses, simulation.steps)
-    for effect in effects.values():
-        internal = effect.within(internal, model, stresses)
-    return remembering(internal, model.bodies, stresses)
+def _internal(simulation: Simulation, loads: Sequence[Load]) -> InternalForces:
+    """The internal forces as these loads modify them."""
+    bodies = simulation.model.bodies
+    stresses = [term for term in simulation.terms if isinstance(term, StressTerm)]
+    internal = simulation.engine.prepare(bodies, stresses, simulation.steps)
+    return modified(internal, bodies, loads, stresses)

@@ -8,8 +8,8 @@ from math import exp
 
 import attrs
 
-from solidsph.costs.work import Loop, Piece, Work
-from solidsph.interfaces.operation_count import Tally, Way
+from solidsph.costs.work import Loop, Work
+from solidsph.interfaces.plan import Operations, Piece, Way
 
 # Of the threads that share a sum, what they are together beside one alone.
 _TOGETHER = 0.95
@@ -53,7 +53,7 @@ def build_terms(work: Work) -> Iterator[CostTerm]:
     yield CostTerm("build", 1.0, Yard.CALLS)
     yield CostTerm(f"build particle {d}D", work.particles, Yard.SPARSE)
     yield CostTerm(f"build pair {kind} {d}D", work.pairs, Yard.SPARSE)
-    for part in work.tally:
+    for part in work.operations:
         if part.way is Way.HOURGLASS_PRODUCTS or part.way is Way.HOURGLASS_SWEEPS:
             yield CostTerm(f"build hourglass {d}D", part.pairs, Yard.SPARSE)
         if part.way is Way.PAIR_ARRAYS or part.way is Way.PAIR_LOOPS:
@@ -74,14 +74,14 @@ def step_terms(work: Work) -> Iterator[CostTerm]:
     yield CostTerm(f"{loop} particle {d}D", n, Yard.SPARSE)
     loads = work.conditions - work.motions
     if work.loop is Loop.COMPILED:  # where what acts on some particles costs nothing on others
-        own = [part for part in work.tally if part.way is Way.UNKNOWN and not part.pairs]
+        own = [part for part in work.operations if part.way is Way.UNKNOWN and not part.pairs]
         loads -= len(own)
         count = sum(part.particles for part in own)
         yield CostTerm(f"{loop} loaded particle {d}D", count, Yard.SPARSE)
     for kind, count in (("motion", work.motions), ("load", loads)):
         yield CostTerm(f"{loop} {kind} {d}D", count, Yard.CALLS)
         yield CostTerm(f"{loop} {kind} particle {d}D", count * n, Yard.SPARSE)
-    for part in work.tally:
+    for part in work.operations:
         if part.way is Way.UNKNOWN and not part.pairs:
             continue  # a load on particles, which is among the conditions
         if work.loop is Loop.STEPS:
@@ -94,7 +94,7 @@ def shared_terms(work: Work) -> Iterator[CostTerm]:
     d = work.dimension
     if work.loop is Loop.COMPILED and _PER_PARTICLE * work.particles >= _WORTH_A_THREAD:
         yield CostTerm(f"compiled step particle {d}D", work.particles, Yard.SPARSE)
-    for part in work.tally:
+    for part in work.operations:
         if part.threaded:
             yield from _sum_terms(part, d)
 
@@ -108,7 +108,7 @@ def output_terms(work: Work) -> Iterator[CostTerm]:
     yield CostTerm("output byte", work.record_bytes / work.outputs, Yard.FILING)
     if 8 * n * d * d >= _LARGE:
         yield CostTerm(f"output large particle {d}D", n, Yard.SPARSE)
-    for part in work.tally:
+    for part in work.operations:
         if part.way in (Way.HOURGLASS_PRODUCTS, Way.HOURGLASS_SWEEPS):
             yield CostTerm("output hourglass pair", part.pairs, Yard.SPARSE)
 
@@ -159,7 +159,7 @@ def run_memory(work: Work) -> Iterator[CostTerm]:
     # The file's library keeps what it knows of past outputs, up to a limit of its own.
     yield CostTerm("memory of a file", 1.0 - exp(-work.outputs / _REMEMBERED), Yard.BYTES)
     yield CostTerm(f"memory of a run, particle {_kind(work)} {d}D", work.particles, Yard.BYTES)
-    for part in work.tally:
+    for part in work.operations:
         if part.way is Way.PRODUCTS_ANEW or part.way is Way.PAIR_ARRAYS:
             yield CostTerm(f"memory of a run, pair {part.way.name} {d}D", part.pairs, Yard.BYTES)
     for one in work.compilations:
@@ -175,7 +175,7 @@ def together(threads: int) -> float:
     return 1.0 if threads == 1 else _TOGETHER * threads
 
 
-def _sum_terms(part: Tally, d: int) -> Iterator[CostTerm]:
+def _sum_terms(part: Operations, d: int) -> Iterator[CostTerm]:
     precision = f" float{8 * part.precision}" if part.precision != 8 else ""
     yield CostTerm(f"{part.way.name} {d}D{precision} pair", part.pairs, Yard.SPARSE)
     if part.way in (Way.STENCILS, Way.ROWS):  # the law, which is in double precision always
@@ -194,7 +194,7 @@ def _threads(threaded: bool) -> str:
 
 def _kind(work: Work) -> str:
     """The engine, as its coefficients name it."""
-    ways = {part.way for part in work.tally}
+    ways = {part.way for part in work.operations}
     if ways & {Way.STENCILS, Way.ROWS}:
         return "compiled"
     if ways & {Way.FORMULAS, Way.WEIGHTS}:

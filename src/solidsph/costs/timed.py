@@ -10,8 +10,7 @@ import attrs
 import numpy as np
 
 from solidsph.costs.work import Loop, Work
-from solidsph.interfaces.compilable_terms import COMPILABLE_LOADS
-from solidsph.interfaces.operation_count import Way
+from solidsph.interfaces.plan import Way
 from solidsph.simulation import Simulation
 
 _COMPILED = (Way.STENCILS, Way.ROWS)
@@ -38,13 +37,13 @@ class Timed:
 
     def rest(self, work: Work, simulation: Simulation) -> Work:
         """The work that is left to be priced by its counts."""
-        internal = tuple(simulation.dynamics.internal.tally)
+        internal = tuple(simulation.dynamics.internal.operations)
         own = len(internal)
-        kept = () if self.internal is not None else work.tally[:own]
-        others = work.tally[own:]
+        kept = () if self.internal is not None else work.operations[:own]
+        others = work.operations[own:]
         if self.loads:
             others = tuple(one for one in others if one.way is not Way.UNKNOWN or not one.pairs)
-        return attrs.evolve(work, tally=(*kept, *others))
+        return attrs.evolve(work, operations=(*kept, *others))
 
 
 def timed(simulation: Simulation, work: Work) -> Timed:
@@ -58,10 +57,10 @@ def timed(simulation: Simulation, work: Work) -> Timed:
     loads = {
         load.label: _seconds(partial(load.advance, step, step, x, v, {}))
         for load in dynamics.loads
-        if not isinstance(load, COMPILABLE_LOADS)
+        if not load.is_counted
     }
     internal = dynamics.internal
-    by_arrays = not any(part.way in _COMPILED for part in internal.tally)
+    by_arrays = not any(part.way in _COMPILED for part in internal.operations)
     own = internal.advances_histories and by_arrays
     return Timed(
         loads,

@@ -7,7 +7,7 @@ from enum import Enum
 
 import attrs
 
-from solidsph.interfaces.operation_count import Tally
+from solidsph.interfaces.plan import Compilation, Operations
 
 
 class Loop(Enum):
@@ -16,33 +16,6 @@ class Loop(Enum):
     STEPS = "steps of arrays"
     COMPILED = "whole steps, compiled"
     NEWTON = "Newton's method"
-
-
-class Piece(Enum):
-    """What may have to be compiled; each once a process and kind."""
-
-    ENGINE = "the engine, laws and the layout of rows"
-    MOVING_ENGINE = "the engine, laws and the search for neighbours"
-    FORCES = "sums over neighbours, from displacement to force at once"
-    STAGED = "sums over neighbours, stress between"
-    MOVING = "sums over moving neighbours"
-    FIELDS = "deformation for reports"
-    STEPS = "the time loop"
-    LOAD = "a load in the time loop"
-    PAIR_LOAD = "forces of pairs in the time loop"
-    HOURGLASS_LOAD = "hourglass forces in the time loop"
-    SWEEPS = "hourglass forces outside of it"
-    EXTENSION = "ghosts that follow in the time loop"
-
-
-@attrs.frozen
-class Compilation:
-    """Something to compile; two that are equal are compiled once."""
-
-    piece: Piece
-    dimension: int
-    threaded: bool
-    key: object = None  # what tells those of one piece apart
 
 
 @attrs.frozen
@@ -67,7 +40,7 @@ class Work:
     loop: Loop
     steps: int  # in time, or of the load
     evaluations: int  # of all forces
-    tally: Sequence[Tally]  # what an evaluation passes over: the engine's, and that of conditions
+    operations: Sequence[Operations]  # of an evaluation: the engine's, then those of loads
     conditions: int  # loads and motions, each with an account
     outputs: int  # observed states, the first one among them
     record_bytes: int  # about
@@ -80,7 +53,7 @@ class Work:
     @property
     def visited(self) -> int:
         """Pairs that an evaluation visits, those of conditions included."""
-        return sum(part.pairs for part in self.tally)
+        return sum(part.pairs for part in self.operations)
 
     @property
     def pair_evaluations(self) -> int:
@@ -90,7 +63,7 @@ class Work:
     @property
     def touched(self) -> int:
         """Bytes that an evaluation must move at least."""
-        return sum(part.touched for part in self.tally)
+        return sum(part.touched for part in self.operations)
 
     @property
     def traffic(self) -> int:
@@ -100,4 +73,4 @@ class Work:
     @property
     def held(self) -> int:
         """Bytes of the arrays kept between evaluations."""
-        return sum(part.held for part in self.tally)
+        return sum(part.held for part in self.operations)

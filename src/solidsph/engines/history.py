@@ -10,10 +10,11 @@ import numpy as np
 
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import InternalForces, StressFields
+from solidsph.interfaces.forces_modifier import ForcesModifier
 from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.interfaces.law import Law, memory_name
-from solidsph.interfaces.operation_count import Tally
-from solidsph.interfaces.terms import FieldTerm, Observation, StressTerm
+from solidsph.interfaces.plan import Compilation, Operations
+from solidsph.interfaces.terms import FieldTerm, Observation, StressTerm, Term
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import components_first, particles_first
 
@@ -42,10 +43,26 @@ class ArrayLaw(Law):
         return np.moveaxis(particles_first(T, n), 0, -1), history
 
 
-def remembering(
-    internal: InternalForces, bodies: Sequence[Body], conditions: Sequence[StressTerm]
+def modified(
+    internal: InternalForces,
+    bodies: Sequence[Body],
+    terms: Sequence[Term],
+    conditions: Sequence[StressTerm],
 ) -> InternalForces:
-    """Forces that also advance what the bodies' materials remember, where there are such."""
+    """Internal forces as `terms` modify them, which advance the histories of materials.
+
+    Args:
+        internal: by the scene's engine.
+        bodies: what exerts them.
+        terms: those among them that are modifiers are applied in this order.
+        conditions: what changes the stress before forces are formed.
+
+    Raises:
+        SceneError: two modifiers do not go together.
+    """
+    for term in terms:
+        if isinstance(term, ForcesModifier):
+            internal = term.modified(internal, conditions)
     asked = internal.advances_histories
     if asked or not any(isinstance(body.material, HistoryMaterial) for body in bodies):
         return internal
@@ -70,8 +87,12 @@ class HistoryForces(InternalForces):
         return self.sums.pair_count
 
     @property
-    def tally(self) -> Sequence[Tally]:
-        return self.sums.tally
+    def operations(self) -> Sequence[Operations]:
+        return self.sums.operations
+
+    @property
+    def compilations(self) -> frozenset[Compilation]:
+        return self.sums.compilations
 
     @property
     def precision(self) -> float:

@@ -15,7 +15,7 @@ from scipy.sparse import csr_array, diags_array, hstack, vstack
 from solidsph.interfaces.body import Body, part_of
 from solidsph.interfaces.engine import Engine, InternalForces, StressFields
 from solidsph.interfaces.formulation import Configuration
-from solidsph.interfaces.operation_count import Tally, Way, array_bytes, vectors
+from solidsph.interfaces.plan import BodySize, Operations, Plan, Way, array_bytes, vectors
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Indices, Mask, Tensor
 from solidsph.maths.tensors import identity, particles_first
@@ -86,12 +86,12 @@ class _FixedBody:
         return self.constant
 
     @property
-    def tally(self) -> Tally:
+    def operations(self) -> Operations:
         """What an evaluation passes over."""
         n, d = self.body.particles.positions.shape
         held = self.constant.bytes
         pairs = self.constant.gradient.nnz // d
-        return Tally(Way.PRODUCTS, pairs, n, held + vectors(n, d), held)
+        return Operations(Way.PRODUCTS, pairs, n, held + vectors(n, d), held)
 
 
 @final
@@ -112,7 +112,7 @@ class _FollowedBody:
         return operators(body, pairs, self.reference_sums / kernel_sums(body, pairs))
 
     @property
-    def tally(self) -> Tally:
+    def operations(self) -> Operations:
         """What an evaluation passes over, with the neighbours of the start."""
         n, d = self.body.particles.positions.shape
         # Pairs, and both matrices: numbers and indices of 8 bytes, written and read.
@@ -120,7 +120,7 @@ class _FollowedBody:
         pairs = self.pair_count * (8 * d + 3 * 8)
         held = self.reference_sums.nbytes
         touched = held + 2 * (matrices + pairs) + vectors(n, d)
-        return Tally(Way.PRODUCTS_ANEW, self.pair_count, n, touched, held)
+        return Operations(Way.PRODUCTS_ANEW, self.pair_count, n, touched, held)
 
 
 def kernel_sums(body: Body, pairs: Pairs) -> Array:
@@ -139,8 +139,8 @@ class MatrixForces(InternalForces):
     pair_count: int
 
     @property
-    def tally(self) -> Sequence[Tally]:
-        return tuple(part.tally for part in self.parts)
+    def operations(self) -> Sequence[Operations]:
+        return tuple(part.operations for part in self.parts)
 
     def forces(self, time: float, displacements: Array) -> Array:
         n, d = displacements.shape
@@ -250,13 +250,16 @@ def fixed_forces(
 ) -> MatrixForces:
     """Internal forces of bodies by matrices that are given."""
     parts = [_FixedBody(body, own) for body, own in zip(bodies, constant, strict=True)]
-    return MatrixForces(parts, conditions, sum(part.tally.pairs for part in parts))
+    return MatrixForces(parts, conditions, sum(part.operations.pairs for part in parts))
 
 
 @final
 @attrs.frozen
 class MatrixEngine(Engine):
     """Sums as sparse matrix products."""
+
+    def expected(self, sizes: Sequence[BodySize], evaluations: int) -> Plan:
+        return Plan(False, tuple(_expected(size) for size in sizes))
 
     def prepare(
         self,
@@ -275,3 +278,12 @@ class MatrixEngine(Engine):
             else:
                 parts.append(_FollowedBody(body, kernel_sums(body, pairs), pairs.count))
         return MatrixForces(tuple(parts), tuple(conditions), count)
+
+
+def _expected(size: BodySize) -> Operations:
+    n, m, d = round(size.particles), round(size.pairs), size.dimension
+    # Numbers and indices of two matrices, and where their rows begin.
+    matrices = 2 * m * d * (8 + 8) + 8 * n * (d + 1)
+    if size.moving:
+        return Operations(Way.PRODUCTS_ANEW, m, n, 2 * matrices, 8 * n)
+    return Operations(Way.PRODUCTS, m, n, matrices + vectors(n, d), matrices)

@@ -23,7 +23,6 @@ class DiscreteModel:
     particles: Particles
     masses: Array  # (n,) [kg], 0 for ghosts
     bodies: Sequence[Body]
-    step_size: float  # time step of the run [s]
     end: float = inf  # of the scene's duration [s]; a formula of t may have no value beyond it
     conditions: Conditions = attrs.field(factory=dict)  # of the tags that the scene adds
 

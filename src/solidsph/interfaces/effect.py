@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
 
-from solidsph.interfaces.body import Body
 from solidsph.interfaces.discrete_model import DiscreteModel
-from solidsph.interfaces.terms import Load, StressTerm
+from solidsph.interfaces.terms import Load
 
 if TYPE_CHECKING:
-    from solidsph.interfaces.engine import InternalForces
+    pass
 
 
 class Need(Enum):
@@ -33,11 +31,11 @@ class Effect(ABC):
     conserves_momentum: ClassVar[bool] = False
     """Whether its forces on a free body, and their moments, add up to zero whatever the motion."""
 
-    parts_neighbours: ClassVar[bool] = False
-    """Whether neighbours may come to act on each other no more."""
+    breaks_bonds: ClassVar[bool] = False
+    """True if it can sever neighbour pairs (fracture)."""
 
-    joins_neighbours: ClassVar[bool] = False
-    """Whether it acts between the neighbours of the start, come what may."""
+    uses_initial_pairs: ClassVar[bool] = False
+    """True if it acts between the neighbours of the start even after they are severed."""
 
     answers: ClassVar[frozenset[Need] | None] = None
     """What it is for, by which a scene is told what it lacks or has in vain (`solidsph.advice`);
@@ -50,31 +48,6 @@ class Effect(ABC):
         Raises:
             SceneError: it matches no particle, or its parameters do not fit the model.
         """
-
-    @abstractmethod
-    def arrays(self, model: DiscreteModel) -> Mapping[str, int]:
-        """Arrays that it keeps, by name, in bytes."""
-
-    @abstractmethod
-    def damping_rate(self, bodies: Sequence[Body]) -> float:
-        """Largest rate at which it damps velocities [1/s], for the stable step; 0 if none."""
-
-    @abstractmethod
-    def stiffness_rate(self, bodies: Sequence[Body]) -> float:
-        """Angular frequency that its stiffness adds at most [rad/s]; 0 if none."""
-
-    def within(
-        self, internal: InternalForces, model: DiscreteModel, conditions: Sequence[StressTerm]
-    ) -> InternalForces:
-        """The internal forces as the effect lets them act: itself, unless it changes how bodies act
-        on themselves.
-
-        Args:
-            internal: by the scene's engine, or by an effect before this one.
-            model: the bodies.
-            conditions: what changes the stress before forces are formed.
-        """
-        return internal
 
     def pair_work(self, particles: float, pairs: float) -> float:
         """Pairs that an evaluation of its forces visits, by what the cost of a run is estimated.

@@ -14,7 +14,7 @@ from solidsph.interfaces.body import Body
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.law import Law
-from solidsph.interfaces.operation_count import Tally, Way
+from solidsph.interfaces.plan import BodySize, Compilation, Operations, Piece, Plan, Way
 from solidsph.interfaces.terms import StressTerm
 from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.maths.arrays import Array, Indices
@@ -104,13 +104,18 @@ class InternalForces(ABC):
         return self.fields(displacements)
 
     @property
-    def tally(self) -> Sequence[Tally]:
-        """What one evaluation passes over, part by part, for those who count and price it.
+    def operations(self) -> Sequence[Operations]:
+        """What one evaluation passes over.
 
         An engine that does not say is taken for one that keeps nothing but its pairs' indices.
         """
         own = 8 * self.pair_count
-        return (Tally(Way.UNKNOWN, self.pair_count, 0, own, own),)
+        return (Operations(Way.UNKNOWN, self.pair_count, 0, own, own),)
+
+    @property
+    def compilations(self) -> frozenset[Compilation]:
+        """What has to be compiled for one evaluation."""
+        return frozenset()
 
     @property
     def precision(self) -> float:
@@ -120,18 +125,23 @@ class InternalForces(ABC):
     @property
     def bytes(self) -> int:
         """Memory of the arrays kept between evaluations."""
-        return sum(part.held for part in self.tally)
+        return sum(part.held for part in self.operations)
 
-    def compiles_steps(self, equation: EquationOfMotion, integrator: Integrator) -> bool:
-        """Whether the time loop compiles whole steps, as far as the kinds of the parts tell.
+    def plan(self, equation: EquationOfMotion, integrator: Integrator) -> Plan:
+        """How a run would be carried out, as far as the kinds of the parts tell.
 
         Nothing is compiled to say so; costs, `explain` and the time loop all ask here.
         """
-        return False
+        d = equation.particles.dimension
+        operations = [o for load in equation.loads for o in load.operations(d, compiled=False)]
+        sweeps = {
+            Compilation(Piece.SWEEPS, d, any(o.threaded for o in (*self.operations, *operations)))
+            for o in operations
+            if o.way is Way.HOURGLASS_SWEEPS
+        }
+        return Plan(False, self.operations, operations, self.compilations | sweeps)
 
-    def time_loop(
-        self, equation: EquationOfMotion, integrator: Integrator, step_size: float
-    ) -> TimeLoop | None:
+    def time_loop(self, equation: EquationOfMotion, integrator: Integrator) -> TimeLoop | None:
         """The engine's own loop over steps under these forces, or None."""
         return None
 
@@ -157,3 +167,13 @@ class Engine(ABC):
         Raises:
             BuildError: a formulation's operators cannot be formed on these particles.
         """
+
+    def expected(self, sizes: Sequence[BodySize], evaluations: int) -> Plan:
+        """The plan for bodies that are not built, from their sizes; loads are left out.
+
+        Args:
+            sizes: of every body.
+            evaluations: about how often the forces will be asked for.
+        """
+        pairs = round(sum(size.pairs for size in sizes))
+        return Plan(False, (Operations(Way.UNKNOWN, pairs, 0, 8 * pairs, 8 * pairs),))

@@ -32,6 +32,7 @@ class EquationOfMotion(ABC):
     masses: Array  # (n,) [kg]
     constraints: Sequence[Constraint]
     loads: Sequence[Load]
+    step_size: float  # of the run [s]
 
     @abstractmethod
     def place(self, time: float, positions: Array) -> Array:

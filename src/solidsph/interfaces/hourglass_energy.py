@@ -22,7 +22,7 @@ from scipy.sparse import csr_array, diags_array, eye_array, hstack, vstack
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from solidsph.interfaces.body import Body, part_of
-from solidsph.interfaces.operation_count import Tally, Way, vectors
+from solidsph.interfaces.plan import Operations, Way, vectors
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.neighbours import Pairs
 
@@ -109,10 +109,9 @@ class HourglassOperator(ABC):
     def bytes(self) -> int:
         """Memory of the arrays kept."""
 
-    @property
     @abstractmethod
-    def tally(self) -> Tally:
-        """What an evaluation passes over."""
+    def operations(self, *, compiled: bool) -> Operations:
+        """What an evaluation passes over, where whole steps are compiled or not."""
 
     @abstractmethod
     def forces(self, displacements: Array) -> Array:
@@ -126,6 +125,7 @@ class HourglassOperator(ABC):
         partners, and of the partners of its neighbours, need all of their own neighbours.
         """
 
+    @cached_property
     def highest_frequency(self) -> float:
         """At most by 1 % above the largest angular frequency of these forces alone [rad/s].
 
@@ -177,12 +177,14 @@ class HourglassProducts(HourglassOperator):
         own = [m.data.nbytes + m.indices.nbytes + m.indptr.nbytes for m in (self.jet, self.pull)]
         return sum(own) + self.pairs.bytes
 
-    @property
-    def tally(self) -> Tally:
+    def operations(self, *, compiled: bool) -> Operations:
         n, d = self.pairs.body.particles.positions.shape
-        # J stands twice, d times with the gradient's pairs; Z is of jets.
-        pairs = 2 * ((self.jet.nnz - n) // d) + self.pull.nnz // (1 + d)
-        return Tally(Way.HOURGLASS_PRODUCTS, pairs, n, self.bytes + vectors(n, d), self.bytes)
+        # J stands twice, d times with the gradient's pairs; Z is of jets. The compiled loop makes
+        # sweeps of it: H, near pairs, and the stress in return.
+        way = Way.HOURGLASS_SWEEPS if compiled else Way.HOURGLASS_PRODUCTS
+        near = len(self.pairs.columns) if compiled else self.pull.nnz // (1 + d)
+        pairs = 2 * ((self.jet.nnz - n) // d) + near
+        return Operations(way, pairs, n, self.bytes + vectors(n, d), self.bytes)
 
     def forces(self, displacements: Array) -> Array:
         forces: Array = -(self.jet.T @ (self.pull @ (self.jet @ displacements)))

@@ -8,12 +8,14 @@ stress, add forces, or show fields. A run calls only those that are there.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
 
+from solidsph.interfaces.plan import Operations, Way
+from solidsph.interfaces.subset import Subset
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.particles import Particles, State
 
@@ -91,12 +93,21 @@ class Constraint(Term):
         """Degrees of freedom that this condition determines, (n, d)."""
 
     @abstractmethod
-    def impose(self, time: float, derivative: int, values: Array) -> None:
+    def impose(self, time: float, derivative: int, values: Array, step: float = 0.0) -> None:
         """Overwrite the held entries of `values` (n, d) in place.
 
-        `values` is the displacement u = x - X for derivative 0, the velocity for 1, the
-        acceleration for 2.
+        Args:
+            time: [s].
+            derivative: 0 if `values` are displacements u = x - X, 1 if velocities, 2 if
+                accelerations.
+            values: (n, d).
+            step: time step of the run, over which derivatives may be differences [s].
         """
+
+    def part(self, subset: Subset, held: Mask) -> Constraint | None:
+        """The same for a subset of the particles, without those that are `held` (n,) otherwise;
+        None if it cannot act on some particles alone."""
+        return None
 
 
 class GhostConstraint(Constraint):
@@ -121,6 +132,9 @@ class StressTerm(Term):
 class Load(Term):
     """Adds forces to some particles."""
 
+    supports: ClassVar[float] = 2.0
+    """How far away, in support radii, the particles are on which its forces depend."""
+
     @property
     @abstractmethod
     def particles(self) -> Indices:
@@ -129,6 +143,45 @@ class Load(Term):
     @abstractmethod
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         """Forces on these particles, (k, d) [N], from positions and velocities (n, d) of all."""
+
+    is_counted: ClassVar[bool] = False
+    """True if `operations` say all that an evaluation costs; other loads are timed."""
+
+    @property
+    def stiffness_rate(self) -> float:
+        """Angular frequency that its stiffness adds at most [rad/s]; for the stable step."""
+        return 0.0
+
+    @property
+    def damping_rate(self) -> float:
+        """Largest rate at which it damps velocities [1/s]; for the stable step."""
+        return 0.0
+
+    @property
+    def arrays(self) -> Mapping[str, int]:
+        """Sizes of the arrays that it keeps, by name [bytes]."""
+        return {}
+
+    @property
+    def pair_count(self) -> int:
+        """Pairs of particles that an evaluation of its forces visits."""
+        return 0
+
+    def operations(self, dimension: int, *, compiled: bool) -> Sequence[Operations]:
+        """What an evaluation passes over, for those who count and price it.
+
+        Args:
+            dimension: of the scene.
+            compiled: True if whole steps are compiled.
+        """
+        count = len(self.particles)
+        kept = sum(self.arrays.values()) or 8 * count * dimension
+        touched = kept + 3 * 8 * count * dimension
+        return (Operations(Way.UNKNOWN, self.pair_count, count, touched, kept),)
+
+    def part(self, subset: Subset) -> Load | None:
+        """The same load on a subset of the particles; None if it cannot act on some alone."""
+        return None
 
     def advance(
         self,

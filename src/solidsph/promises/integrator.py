@@ -93,7 +93,7 @@ class _Shaker(Constraint):
     def held(self) -> Mask:
         return np.array([[True]])
 
-    def impose(self, time: float, derivative: int, values: Array) -> None:
+    def impose(self, time: float, derivative: int, values: Array, step: float = 0.0) -> None:
         values[0] = (sin(time), cos(time), -sin(time))[derivative]
 
 
@@ -114,6 +114,7 @@ def _dynamics(*conditions: _Damper | _Shaker) -> Dynamics:
         internal=_Spring(),
         constraints=[one for one in conditions if isinstance(one, _Shaker)],
         loads=[one for one in conditions if isinstance(one, _Damper)],
+        step_size=1.0,  # no motion here is a difference over it
     )
 
 

@@ -33,6 +33,7 @@ INTERFACES: Mapping[str, tuple[str, str]] = {
     "divergences": ("solidsph.interfaces.divergence", "Divergence"),
     "formulations": ("solidsph.interfaces.formulation", "Formulation"),
     "integrators": ("solidsph.interfaces.integrator", "Integrator"),
+    "engines": ("solidsph.interfaces.engine", "Engine"),
     "effects": ("solidsph.interfaces.effect", "Effect"),
     "cases": ("solidsph.studies.case", "Case"),
 }

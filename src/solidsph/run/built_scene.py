@@ -17,7 +17,8 @@ from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.engine import Engine
 from solidsph.interfaces.integrator import Integrator
-from solidsph.interfaces.terms import Observation, Term
+from solidsph.interfaces.plan import Plan
+from solidsph.interfaces.terms import Load, Observation, Term
 from solidsph.model.particles import Particles, State, read_only
 from solidsph.registry.registry import Entry
 from solidsph.run.dynamics import Dynamics
@@ -38,7 +39,6 @@ class BuiltScene(ABC):
     integrator: Integrator
     engine: Engine
     initial: State
-    step_size: float  # [s]
     steps: int
     parts: tuple[Entry, ...]  # every plugin used
     manager: pluggy.PluginManager
@@ -54,14 +54,21 @@ class BuiltScene(ABC):
     ) -> Result:
         """Find the equilibrium if the scene has [statics], follow the motion if not."""
 
-    @abstractmethod
     def halved(self) -> Self:
-        """The same scene, built anew with half the step."""
+        """The same with half the step."""
+        dynamics = attrs.evolve(self.dynamics, step_size=0.5 * self.step_size)
+        halvings = self.halvings + 1
+        return attrs.evolve(self, dynamics=dynamics, steps=2 * self.steps, halvings=halvings)
 
     @property
     def particles(self) -> Particles:
         """The reference configuration."""
         return self.dynamics.particles
+
+    @property
+    def step_size(self) -> float:
+        """Time step [s]."""
+        return self.dynamics.step_size
 
     def start(self) -> State:
         """The state at the first step, with imposed motions, accelerations and accounts."""
@@ -72,9 +79,14 @@ class BuiltScene(ABC):
             return self.integrator.start(state, self.dynamics, self.step_size)
 
     @property
-    def compiles_steps(self) -> bool:
-        """Whether whole steps are compiled, as far as the kinds of the parts tell."""
-        return self.dynamics.internal.compiles_steps(self.dynamics, self.integrator)
+    def plan(self) -> Plan:
+        """How the engine would carry out the motion, as far as the kinds of the parts tell."""
+        return self.dynamics.internal.plan(self.dynamics, self.integrator)
+
+    def load_of(self, effect: str) -> Load:
+        """The bound load of the effect of this label."""
+        (load,) = (one for one in self.dynamics.loads if one.label == effect)
+        return load
 
     def extended(self, steps: int) -> Self:
         """The same, of so many steps in all: the step and the outputs up to now stay as they are.

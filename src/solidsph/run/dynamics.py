@@ -52,7 +52,7 @@ class Dynamics(EquationOfMotion):
             return positions
         displacements = positions - self.particles.positions
         for motion in self.constraints:
-            motion.impose(time, 0, displacements)
+            motion.impose(time, 0, displacements, self.step_size)
         return self.particles.positions + displacements
 
     def carry(self, time: float, velocities: Array) -> Array:
@@ -61,7 +61,7 @@ class Dynamics(EquationOfMotion):
             return velocities
         carried = velocities.copy()
         for motion in self.constraints:
-            motion.impose(time, 1, carried)
+            motion.impose(time, 1, carried, self.step_size)
         return carried
 
     def respond(
@@ -96,7 +96,7 @@ class Dynamics(EquationOfMotion):
         accelerations = np.zeros_like(positions)
         accelerations[real] = total[real] / self.masses[real, None]
         for motion in self.constraints:
-            motion.impose(time, 2, accelerations)
+            motion.impose(time, 2, accelerations, self.step_size)
         if self.constraints:
             missing = self.masses[:, None] * accelerations - total
         for motion, held in zip(self.constraints, self.held, strict=True):

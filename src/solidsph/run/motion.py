@@ -22,7 +22,7 @@ def time_loop(simulation: BuiltScene) -> TimeLoop:
         from solidsph.run.sleeping.loop import sleeping_loop  # only where something sleeps
 
         return sleeping_loop(simulation)
-    return steps_of(simulation.dynamics, simulation.integrator, simulation.step_size)
+    return steps_of(simulation.dynamics, simulation.integrator)
 
 
 def run_motion(

@@ -1,31 +1,21 @@
-"""The largest step of a scene: from the wave speed, and whatever its effects add to it."""
+"""The stable time step of a scene: from the wave speed, and what its loads add to it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from math import sqrt
 
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.integrator import Integrator
+from solidsph.interfaces.terms import Load
 
 
-def largest_step(
-    integrator: Integrator, effects: Iterable[Effect], bodies: Sequence[Body]
-) -> float:
-    """The CFL step by confined wave speed and spacing, with what the effects add [s]."""
-    rates = [(e.stiffness_rate(bodies), e.damping_rate(bodies)) for e in effects]
-    return step_by_rates(integrator, rates, bodies)
-
-
-def step_by_rates(
-    integrator: Integrator, rates: Iterable[tuple[float, float]], bodies: Sequence[Body]
-) -> float:
-    """As `largest_step`, from each effect's stiffness rate [rad/s] and damping rate [1/s]."""
-    rates = list(rates)
-    squares = lattice_frequency(bodies) ** 2 + sum(stiffness**2 for stiffness, _ in rates)
+def stable_step(integrator: Integrator, loads: Iterable[Load], bodies: Iterable[Body]) -> float:
+    """The CFL step by confined wave speed and spacing, with what the loads add [s]."""
+    loads = list(loads)
+    squares = lattice_frequency(bodies) ** 2 + sum(load.stiffness_rate**2 for load in loads)
     frequency = sqrt(squares)
-    return integrator.stability_limit / (frequency + sum(damping for _, damping in rates))
+    return integrator.stability_limit / (frequency + sum(load.damping_rate for load in loads))
 
 
 def lattice_frequency(bodies: Iterable[Body]) -> float:

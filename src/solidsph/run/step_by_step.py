@@ -24,14 +24,13 @@ class StepByStep(TimeLoop):
 
     dynamics: EquationOfMotion
     integrator: Integrator
-    step_size: float  # [s]
 
     def advance(self, state: State, stop: int) -> State:
         while state.step < stop:
             try:
                 # What overflows or is undefined shows as a value that is not finite, below.
                 with np.errstate(all="ignore"):
-                    after = self.integrator.advance(state, self.dynamics, self.step_size)
+                    after = self.integrator.advance(state, self.dynamics, self.dynamics.step_size)
             except BuildError as cause:  # a moving neighbourhood may stop determining a gradient
                 raise StepError(state, cause.problems[0]) from cause
             self._check_progress(state, after)
@@ -42,17 +41,17 @@ class StepByStep(TimeLoop):
         return state
 
     def _check_progress(self, state: State, after: State) -> None:
-        gone = (after.time - state.time) / self.step_size
+        gone = (after.time - state.time) / self.dynamics.step_size
         if after.step != state.step + 1 or not 0.999 < gone < 1.001:
             who = described(entry_of("integrators", self.integrator))
             raise PluginError(
                 f"{who} made a step from step {state.step}, t = {state.time:.9g} s, to step "
                 f"{after.step}, t = {after.time:.9g} s; a step adds 1 to the count and its size, "
-                f"{self.step_size:.9g} s, to the time"
+                f"{self.dynamics.step_size:.9g} s, to the time"
             )
 
 
-def steps_of(dynamics: Dynamics, integrator: Integrator, step_size: float) -> TimeLoop:
+def steps_of(dynamics: Dynamics, integrator: Integrator) -> TimeLoop:
     """The engine's own loop for these parts, or one step after the other."""
-    own = dynamics.internal.time_loop(dynamics, integrator, step_size)
-    return StepByStep(dynamics, integrator, step_size) if own is None else own
+    own = dynamics.internal.time_loop(dynamics, integrator)
+    return StepByStep(dynamics, integrator) if own is None else own

@@ -126,8 +126,8 @@ def history(bodies: Sequence[Body], scene: SceneData, labels: Collection[str]) -
 
 def effects(named: Mapping[str, Effect]) -> Iterator[str]:
     """Nothing acts across what another effect parts."""
-    parting = [label for label, one in named.items() if one.parts_neighbours]
-    joining = [label for label, one in named.items() if one.joins_neighbours]
+    parting = [label for label, one in named.items() if one.breaks_bonds]
+    joining = [label for label, one in named.items() if one.uses_initial_pairs]
     if parting and joining:
         yield (
             f"{parting[0]!r} parts neighbours, and {joining[0]!r} acts between them whether or not "

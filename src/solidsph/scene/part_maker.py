@@ -8,7 +8,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.engines.select import engine_named
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.engine import Engine
@@ -77,7 +76,7 @@ class PartMaker:
         cover = None if kernel is None else problems.attempt(cover_of, scene)
         formulation: Formulation | None = self._make("formulations", scene.formulation)
         integrator = self._integrator()
-        engine: Engine | None = problems.attempt(engine_named, _engine_name(scene))
+        engine: Engine | None = self._engine()
         handlers = self._labelled("boundaries", scene.boundaries)
         effects: dict[str, Effect] = self._labelled("effects", scene.effects)
         problems.add(compatibility.effects(effects))
@@ -109,6 +108,13 @@ class PartMaker:
             else self.problems.attempt(construct, "integrators", DEFAULT_INTEGRATOR)
         )
         return made
+
+    def _engine(self) -> Engine | None:
+        """The scene's; the built-in ones change no result, and are not noted."""
+        engine: Engine | None = self.problems.attempt(construct, "engines", self._scene.engine)
+        if engine is not None and is_foreign(registry.entry_of("engines", engine)):
+            self._note("engines", engine)
+        return engine
 
     def _note(self, kind: str, part: Any) -> None:
         """Remember which plugins a part, and the parts inside it, came from."""
@@ -205,11 +211,6 @@ class PartMaker:
             return None
         material: Material | None = self._make("materials", wanted)
         return material
-
-
-def _engine_name(scene: SceneData) -> str:
-    """Equilibria are found with assembled matrices: there is nothing to compile."""
-    return "matrix" if scene.statics is not None and scene.engine == "auto" else scene.engine
 
 
 def _soon_made(shape: Shape, spacing: object) -> bool:

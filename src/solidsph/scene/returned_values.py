@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from solidsph.interfaces.body import Body
-from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.material import Material
 from solidsph.interfaces.terms import Constraint, Load, Term
@@ -59,13 +57,12 @@ def constants(material: Material) -> Iterator[str]:
             yield f"{who}: {name} is {value!r}; a positive number is expected"
 
 
-def rates(label: str, effect: Effect, bodies: Sequence[Body]) -> Iterator[str]:
+def rates(load: Load) -> Iterator[str]:
     """Rates for the stable step, each a number and none negative."""
     for name in ("damping_rate", "stiffness_rate"):
-        value = getattr(effect, name)(bodies)
+        value = getattr(load, name)
         if not _is_number(value) or value < 0.0:
-            who = described(entry_of("effects", effect))
-            yield f"{who}, label {label!r}: {name} is {value!r}; a number from 0 on is expected"
+            yield f"label {load.label!r}: {name} is {value!r}; a number from 0 on is expected"
 
 
 def limits(integrator: Integrator) -> Iterator[str]:

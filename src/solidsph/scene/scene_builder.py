@@ -135,9 +135,9 @@ class SceneBuilder(ABC):
         self._values["outputs"] = count
         return self
 
-    def engine(self, engine: str) -> Self:
+    def engine(self, engine: PartLike, **parameters: Any) -> Self:
         """Which engine carries out the sums; "auto" chooses."""
-        self._values["engine"] = engine
+        self._values["engine"] = _part(engine, parameters) if parameters else engine
         return self
 
     def energy_tolerance(self, tolerance: float | Literal["off"]) -> Self:

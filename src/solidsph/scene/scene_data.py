@@ -91,6 +91,6 @@ class SceneData:
     time_step_factor: float = 0.5  # of the CFL step
     time_step: float | None = None  # [s]; overrides the factor
     outputs: int = 200  # recorded states after the first
-    engine: str = "auto"
+    engine: PartLike = "auto"
     energy_tolerance: float | str = 0.01  # energy residual over energy in play, or "off" [-]
     silence: Sequence[str] = ()  # names of warnings that are not to be shown

@@ -26,7 +26,7 @@ def _table(scene: SceneData) -> dict[str, Any]:
     table: dict[str, Any] = {}
     if scene.title:
         table["title"] = scene.title
-    table |= {"duration": scene.duration, "outputs": scene.outputs, "engine": scene.engine}
+    table |= {"duration": scene.duration, "outputs": scene.outputs, "engine": _engine(scene.engine)}
     if scene.energy_tolerance != attrs.fields(SceneData).energy_tolerance.default:
         table["energy_tolerance"] = scene.energy_tolerance
     if scene.silence:
@@ -79,6 +79,10 @@ def _body_table(body: BodyScene) -> dict[str, Any]:
     if body.tags:
         table["tags"] = {tag: _writable(where, f"tags.{tag}") for tag, where in body.tags.items()}
     return table
+
+
+def _engine(engine: PartLike) -> object:
+    return engine if isinstance(engine, str) else _part(engine, "engines")
 
 
 def _part(part: PartLike, kind: str) -> dict[str, Any]:

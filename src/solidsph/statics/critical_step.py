@@ -93,9 +93,7 @@ def critical_step(simulation: BuiltScene, state: State | None = None) -> StableS
     spacing, for which this is the true margin.
     """
     frequency = highest_frequency(simulation, state)
-    rate = sum(
-        effect.damping_rate(simulation.model.bodies) for effect in simulation.effects.values()
-    )
+    rate = sum(load.damping_rate for load in simulation.dynamics.loads)
     limit = simulation.integrator.stability_limit
     total = frequency + rate
     return StableStep(

@@ -322,8 +322,7 @@ def _response(scheme: Scheme, stretches: Sequence[float]) -> tuple[LatticeRespon
     dimension = len(stretches)
     layers = [scheme.depth(min(stretches))] * dimension
     simulation = scheme.simulation(dimension, layers)
-    bodies = simulation.model.bodies
-    rate = sum(effect.damping_rate(bodies) for effect in simulation.effects.values())
+    rate = sum(load.damping_rate for load in simulation.dynamics.loads)
     state = stretched(simulation, stretches)
     response = lattice_response(simulation.dynamics, state)
     check_uniform(simulation.dynamics, state, response)

@@ -17,6 +17,7 @@ from solidsph.build.builder import Builder
 from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.engine import InternalForces
+from solidsph.interfaces.forces_modifier import ForcesModifier
 from solidsph.interfaces.terms import EnergyTerm, Load, Observation
 from solidsph.maths.arrays import Array
 from solidsph.promises.check import Check, Verdict, at_most, check, more_than, not_promised, worst
@@ -84,8 +85,7 @@ class _Sample:
     @property
     def acts_within(self) -> bool:
         """Whether the effect changes the internal forces."""
-        (effect,) = self.simulation.effects.values()
-        return type(effect).within is not Effect.within
+        return isinstance(self.condition, ForcesModifier)
 
     def internal(self, time: float, positions: Array) -> Array:
         """Internal forces as the effect lets them act, (n, d) [N]."""
@@ -197,7 +197,7 @@ def arrays(effect: Effect) -> Verdict:
     """The arrays that it keeps are listed by name, in bytes."""
     listed: set[str] = set()
     for sample in _samples(effect):
-        for name, size in effect.arrays(sample.simulation.model).items():
+        for name, size in sample.condition.arrays.items():
             if not isinstance(name, str) or not isinstance(size, (int, np.integer)) or size < 0:
                 return Verdict(False, f"{name!r}: {size!r}")
             listed.add(name)
@@ -242,8 +242,7 @@ def stored_energy(effect: Effect) -> Verdict:
     takes."""
     told: list[str] = []
     for sample in _samples(effect):
-        simulation = sample.simulation
-        if effect.damping_rate(simulation.model.bodies) > 0.0:
+        if sample.condition.damping_rate > 0.0:
             x, v = sample.positions + sample.smooth(), 50.0 * sample.smooth()
             still = sample.forces(x, np.zeros_like(v))
             power = float(np.vdot(sample.forces(x, v) - still, v))
@@ -271,16 +270,14 @@ def stored_energy(effect: Effect) -> Verdict:
 @check
 def damping_rate(effect: Effect) -> Verdict:
     """No small velocity is damped faster than by the declared rate."""
-    return _bounded(effect, _damping, effect.damping_rate)
+    return _bounded(effect, _damping, "damping_rate")
 
 
 @check
 def stiffness_rate(effect: Effect) -> Verdict:
     """No small motion about rest has, by the effect alone, a higher angular frequency than
     declared."""
-    return _bounded(
-        effect, lambda sample: np.sqrt(max(_stiffness(sample), 0.0)), effect.stiffness_rate
-    )
+    return _bounded(effect, lambda sample: np.sqrt(max(_stiffness(sample), 0.0)), "stiffness_rate")
 
 
 @check
@@ -380,12 +377,10 @@ def _observed(sample: _Sample, u: Array) -> Observation:
     return simulation.dynamics.observe(state)
 
 
-def _bounded(
-    effect: Effect, measure: Callable[[_Sample], float], declared: Callable[[Any], float]
-) -> Verdict:
+def _bounded(effect: Effect, measure: Callable[[_Sample], float], declared: str) -> Verdict:
     excess, told = [], []
     for sample in _samples(effect):
-        rate, found = declared(sample.simulation.model.bodies), float(measure(sample))
+        rate, found = getattr(sample.condition, declared), float(measure(sample))
         told.append(f"{found:.3g} of {rate:.3g}")
         # Differences, and an estimate of the largest eigenvalue from below, each leave some 1e-6 of
         # the scale, that of the fastest waves.

@@ -71,7 +71,7 @@ class Soundness:
         residual = self._accounts.residual
         swing = _swing(simulation, observation)
         self._first = swing if np.isnan(self._first) else self._first
-        if residual < 0.0 and any(one.parts_neighbours for one in simulation.effects.values()):
+        if residual < 0.0 and any(one.breaks_bonds for one in simulation.effects.values()):
             residual = 0.0  # neighbours that part take the energy between them away
         lost = min(abs(residual), max(abs(residual - swing + self._first), abs(residual) / _SWINGS))
         largest = self._rises[-1, 1] if len(self._rises) else 0.0
@@ -197,10 +197,7 @@ def _explained(simulation: BuiltScene) -> tuple[str, str]:
             "not resolve",
             "half the time step",
         )
-    controlled = any(
-        effect.stiffness_rate(simulation.model.bodies) > 0.0
-        for effect in simulation.effects.values()
-    )
+    controlled = any(load.stiffness_rate > 0.0 for load in simulation.dynamics.loads)
     if not controlled and any(one.gradient.exact_degree >= 1 for one in formulations):
         return (
             "vibrations that the step does not resolve, or motions that the gradient does not see",

@@ -14,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solidsph import BuildError, Record, Scene, SceneError, Simulation
-from solidsph.interfaces.body import Body
 from solidsph.maths.arrays import Array
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.testing import checks, conformance, example_part
@@ -407,8 +406,7 @@ def test_the_declared_frequency_holds_however_they_meet() -> None:
     """Also deep, and at a lattice's worst; the kit looks at bodies at rest."""
     for d, cells in ((1, 8), (2, 5)):
         simulation = touching(d, cells, discretisation=JITTERED).effect("contact").build()
-        bodies: list[Body] = list(simulation.model.bodies)
-        (effect,) = simulation.effects.values()
+        (load,) = simulation.dynamics.loads
         s, m = 1.0 / cells, simulation.model.masses
         for gap in (-0.1, -0.5, -0.8):
             x = apart(simulation, gap * s, 0.3 * s)
@@ -420,7 +418,7 @@ def test_the_declared_frequency_holds_however_they_meet() -> None:
                 change = forces(simulation, x - u) - forces(simulation, x + u)
                 columns.append((change / (2.0 * step * m[:, None])).ravel())
             largest = np.linalg.eigvals(np.column_stack(columns)).real.max()
-            assert np.sqrt(largest) <= effect.stiffness_rate(bodies)
+            assert np.sqrt(largest) <= load.stiffness_rate
 
 
 def test_the_scenes_of_the_page_run() -> None:

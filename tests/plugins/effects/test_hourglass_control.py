@@ -248,9 +248,8 @@ def test_the_declared_stiffness_bounds_the_true_one_closely(
             .formulation("total-lagrangian", gradient=gradient)
             .build()
         )
-        effect = HourglassControl(strength=0.3)
         bodies = simulation.model.bodies
-        declared = effect.stiffness_rate(bodies)
+        declared = HourglassControl(strength=0.3).bind(simulation.model, "").stiffness_rate
         K = HourglassProducts.of(penalised(bodies[0], 0.3)).matrix().toarray()
     scaling = 1.0 / np.sqrt(bodies[0].masses)
     true = np.sqrt(np.linalg.eigvalsh(scaling[:, None] * K * scaling)[-1])

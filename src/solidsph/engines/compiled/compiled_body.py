@@ -27,7 +27,7 @@ from solidsph.engines.compiled.shares import (
     thread_count,
 )
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.operation_count import Tally, Way, vectors
+from solidsph.interfaces.plan import Operations, Way, vectors
 from solidsph.maths.arrays import Array
 from solidsph.model.neighbours import Pairs
 
@@ -64,7 +64,7 @@ class CompiledBody:
         return own + sum(rows.values()) + sum(shares.values())
 
     @property
-    def tally(self) -> Sequence[Tally]:
+    def operations(self) -> Sequence[Operations]:
         """What an evaluation passes over: runs by stencils, the rest by rows."""
         n, d = self.body.particles.positions.shape
         # Gathering and scattering are one pass each; a pair counts once for the two together.
@@ -79,8 +79,8 @@ class CompiledBody:
         held = self.bytes - row_bytes
         precision, threaded = self.u.itemsize, self.gradient_shares.threaded
         return (
-            Tally(Way.STENCILS, run_pairs, ran, touched, held, precision, threaded),
-            Tally(Way.ROWS, row_pairs, n - ran, row_bytes, row_bytes, precision, threaded),
+            Operations(Way.STENCILS, run_pairs, ran, touched, held, precision, threaded),
+            Operations(Way.ROWS, row_pairs, n - ran, row_bytes, row_bytes, precision, threaded),
         )
 
     @property

@@ -9,9 +9,11 @@ import attrs
 import numpy as np
 
 from solidsph.engines.compiled.blocks import STRIDE, group
+from solidsph.engines.compiled.compilations import of_forces, of_steps
 from solidsph.engines.compiled.compiled_body import CompiledBody, compiled_body
+from solidsph.engines.compiled.expected import expected_plan
 from solidsph.engines.compiled.history import CompiledLaw
-from solidsph.engines.compiled.loop import are_declared, compiled_loop
+from solidsph.engines.compiled.loop import are_compilable, compiled_loop
 from solidsph.engines.compiled.moving import MovingBody, moving_body
 from solidsph.engines.compiled.part import part_of_rows
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux, no_law
@@ -29,7 +31,7 @@ from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.law import Law
-from solidsph.interfaces.operation_count import Tally
+from solidsph.interfaces.plan import BodySize, Compilation, Operations, Plan
 from solidsph.interfaces.terms import StressTerm
 from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.maths.arrays import Array, Indices
@@ -70,10 +72,27 @@ class CompiledEngine(Engine):
         parts = [self._part(b, law) for b, law in zip(bodies, laws, strict=True)]
         return CompiledForces(tuple(parts), tuple(conditions))
 
+    def expected(self, sizes: Sequence[BodySize], evaluations: int) -> Plan:
+        return expected_plan(sizes, 4 if self.precision == "float32" else 8)
+
     def _part(self, body: Body, law: Any) -> CompiledBody | MovingBody:
         if body.formulation.configuration is Configuration.REFERENCE:
             return compiled_body(body, law, self.precision)
         return moving_body(body, law)
+
+
+@final
+@attrs.frozen
+class SinglePrecisionEngine(Engine):
+    """The compiled engine with sums in single precision."""
+
+    def prepare(
+        self, bodies: Sequence[Body], conditions: Sequence[StressTerm], evaluations: int = 1
+    ) -> InternalForces:
+        return CompiledEngine("float32").prepare(bodies, conditions, evaluations)
+
+    def expected(self, sizes: Sequence[BodySize], evaluations: int) -> Plan:
+        return CompiledEngine("float32").expected(sizes, evaluations)
 
 
 @final
@@ -89,32 +108,37 @@ class CompiledForces(InternalForces):
         return sum(part.pair_count for part in self.parts)
 
     @property
-    def tally(self) -> Sequence[Tally]:
-        return tuple(own for part in self.parts for own in part.tally)
+    def operations(self) -> Sequence[Operations]:
+        return tuple(own for part in self.parts for own in part.operations)
 
     @property
     def precision(self) -> float:
         return max(part.precision for part in self.parts)
 
-    def compiles_steps(self, equation: EquationOfMotion, integrator: Integrator) -> bool:
+    @property
+    def compilations(self) -> frozenset[Compilation]:
+        return frozenset(of_forces(self.parts, self.conditions))
+
+    def plan(self, equation: EquationOfMotion, integrator: Integrator) -> Plan:
         fixed = self._fixed
-        return len(fixed) == len(self.parts) and are_declared(
+        if len(fixed) < len(self.parts) or not are_compilable(
             fixed, self.conditions, equation, integrator
-        )
+        ):
+            return super().plan(equation, integrator)
+        d = equation.particles.dimension
+        loads = [o for load in equation.loads for o in load.operations(d, compiled=True)]
+        pieces = {*self.compilations, *of_steps(fixed, equation, integrator)}
+        return Plan(True, self.operations, loads, frozenset(pieces))
 
     @property
     def _fixed(self) -> Sequence[CompiledBody]:
         return [part for part in self.parts if isinstance(part, CompiledBody)]
 
-    def time_loop(
-        self, equation: EquationOfMotion, integrator: Integrator, step_size: float
-    ) -> TimeLoop | None:
-        if not self.compiles_steps(equation, integrator):
+    def time_loop(self, equation: EquationOfMotion, integrator: Integrator) -> TimeLoop | None:
+        if not self.plan(equation, integrator).compiles_steps:
             return None
         try:
-            return compiled_loop(
-                self._fixed, self.conditions, self, equation, integrator, step_size
-            )
+            return compiled_loop(self._fixed, self.conditions, self, equation, integrator)
         except NotCompilableError:  # a formula does not compile, as its kind did not tell
             return None
 

@@ -18,7 +18,7 @@ from solidsph.engines.compiled.rows import Rows, compressed
 from solidsph.engines.compiled.shares import aligned, passes, shared, spread_pass, thread_count
 from solidsph.engines.compiled.threads import check_alive
 from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassPairs
-from solidsph.interfaces.operation_count import Tally, Way, vectors
+from solidsph.interfaces.plan import Operations, Way, vectors
 from solidsph.maths.arrays import Array, Indices
 
 _DTYPE = "float64"
@@ -96,15 +96,14 @@ class HourglassSweeps(HourglassOperator):
         own = [a.nbytes for a in self.arrays if isinstance(a, np.ndarray)]
         return sum(own) + self.arrays.rows.bytes
 
-    @property
-    def tally(self) -> Tally:
+    def operations(self, *, compiled: bool) -> Operations:
         n, d = self.arrays.positions.shape
         rows = self.arrays.rows
         # Once to gather H, once to scatter the stress, and the near pairs between.
         pairs = 2 * (rows.run_pairs + rows.row_pairs) + len(self.arrays.columns)
         threaded = len(self.arrays.table) > 1
         touched = self.bytes + vectors(n, d)
-        return Tally(Way.HOURGLASS_SWEEPS, pairs, n, touched, self.bytes, threaded=threaded)
+        return Operations(Way.HOURGLASS_SWEEPS, pairs, n, touched, self.bytes, threaded=threaded)
 
     def forces(self, displacements: Array) -> Array:
         if len(self.arrays.table) > 1:

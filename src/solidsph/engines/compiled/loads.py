@@ -26,6 +26,7 @@ from solidsph.interfaces.compilable_terms import (
     ScheduledLoad,
 )
 from solidsph.interfaces.hourglass_energy import HourglassOperator
+from solidsph.interfaces.plan import Piece
 from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array, Indices
 
@@ -75,43 +76,77 @@ class LoadPass(NamedTuple):
     own: Callable[[Array], Any]  # times (t,) at which the steps to come end -> what its kind needs
 
 
-def load_pass(load: Load, reference: Array, threaded: bool) -> LoadPass:
-    """The pass of a load on particles whose X is `reference` (n, d) [m].
+class Pass(NamedTuple):
+    """How loads of one kind become part of the loop."""
+
+    kind: Any  # a class of loads
+    prepare: Callable[[Any, Array, bool], LoadPass]  # (load, X (n, d), threaded)
+    piece: Piece
+    formula: bool = True  # whether each class of the kind compiles anew
+
+
+def pass_of(load: Load) -> Pass:
+    """The pass of a load's kind.
 
     Raises:
-        NotCompilableError: the load is not of a declared kind, or its formula does not compile.
+        NotCompilableError: the loop knows no such kind.
     """
+    for known in PASSES:
+        if isinstance(load, known.kind):
+            return known
+    raise NotCompilableError(f"load {load.label!r} is not of a kind that the loop knows")
+
+
+def load_pass(load: Load, reference: Array, threaded: bool) -> LoadPass:
+    """A load on particles whose X is `reference` (n, d) [m], made ready.
+
+    Raises:
+        NotCompilableError: the loop knows no such kind, or its formula does not compile.
+    """
+    return pass_of(load).prepare(load, reference, threaded)
+
+
+def _prepare_scheduled(load: ScheduledLoad, reference: Array, threaded: bool) -> LoadPass:
     d = reference.shape[1]
-    match load:
-        case ScheduledLoad():
-            return LoadPass(
-                _accounted(_scheduled(d), d, threaded),
-                lambda times: Scheduled(np.ascontiguousarray(load.schedule(times))),
-            )
-        case HourglassLoad():
-            sweeps = [_sweeps(operator) for operator in load.operators]
-            own = HourglassData(
-                tuple(one.arrays for one in sweeps), Scheduled(np.zeros((1, *reference.shape)))
-            )
-            each = chain(tuple(body_sweep(one.sweep) for one in sweeps))
-            account = _accounted(_scheduled(d), d, threaded)
-            return LoadPass(_hourglass(each, account), lambda times: own)
-        case PairLoad():
-            table = load.pairs
-            count = table.values.shape[1]
-            vector = numbers_type(d)
-            pull = compiled_function(load.pull, vector, vector, numbers_type(count))
-            paired = Paired(reference, table.starts, table.columns, table.values)
-            return LoadPass(_accounted(_paired(pull, d, count), d, threaded), lambda times: paired)
-        case PointwiseLoad():
-            values = np.ascontiguousarray(load.values)
-            count = values.shape[1]
-            vector = numbers_type(d)
-            force = compiled_function(load.force, vector, vector, numbers_type(count))
-            formula = _pointwise(force, d, count)
-            pointwise = Pointwise(reference, values)
-            return LoadPass(_accounted(formula, d, threaded), lambda times: pointwise)
-    raise NotCompilableError(f"load {load.label!r} is not of a declared kind")
+    return LoadPass(
+        _accounted(_scheduled(d), d, threaded),
+        lambda times: Scheduled(np.ascontiguousarray(load.schedule(times))),
+    )
+
+
+def _prepare_hourglass(load: HourglassLoad, reference: Array, threaded: bool) -> LoadPass:
+    d = reference.shape[1]
+    sweeps = [_sweeps(operator) for operator in load.operators]
+    own = HourglassData(
+        tuple(one.arrays for one in sweeps), Scheduled(np.zeros((1, *reference.shape)))
+    )
+    each = chain(tuple(body_sweep(one.sweep) for one in sweeps))
+    return LoadPass(_hourglass(each, _accounted(_scheduled(d), d, threaded)), lambda times: own)
+
+
+def _prepare_pairs(load: PairLoad, reference: Array, threaded: bool) -> LoadPass:
+    d, table = reference.shape[1], load.pairs
+    count, vector = table.values.shape[1], numbers_type(d)
+    pull = compiled_function(load.pull, vector, vector, numbers_type(count))
+    paired = Paired(reference, table.starts, table.columns, table.values)
+    return LoadPass(_accounted(_paired(pull, d, count), d, threaded), lambda times: paired)
+
+
+def _prepare_pointwise(load: PointwiseLoad, reference: Array, threaded: bool) -> LoadPass:
+    d, values = reference.shape[1], np.ascontiguousarray(load.values)
+    count, vector = values.shape[1], numbers_type(d)
+    force = compiled_function(load.force, vector, vector, numbers_type(count))
+    pointwise = Pointwise(reference, values)
+    return LoadPass(_accounted(_pointwise(force, d, count), d, threaded), lambda times: pointwise)
+
+
+PASSES = (
+    Pass(ScheduledLoad, _prepare_scheduled, Piece.LOAD, formula=False),
+    Pass(HourglassLoad, _prepare_hourglass, Piece.HOURGLASS_LOAD),
+    Pass(PairLoad, _prepare_pairs, Piece.PAIR_LOAD),
+    Pass(PointwiseLoad, _prepare_pointwise, Piece.LOAD),
+)
+"""Kinds of load that the loop knows."""
 
 
 @cache

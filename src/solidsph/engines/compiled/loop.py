@@ -12,7 +12,7 @@ from numba import njit, prange, types
 
 from solidsph.engines.compiled.chain import chain
 from solidsph.engines.compiled.internal import Internal, internal_forces
-from solidsph.engines.compiled.loads import LoadData, LoadPass, load_pass
+from solidsph.engines.compiled.loads import PASSES, LoadData, LoadPass, load_pass
 from solidsph.engines.compiled.motions import (
     Following,
     MotionWords,
@@ -23,7 +23,6 @@ from solidsph.engines.compiled.motions import (
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function
 from solidsph.engines.compiled.shares import thread_count
 from solidsph.interfaces.compilable_terms import (
-    COMPILABLE_LOADS,
     LinearExtension,
     ScheduledConstraint,
     ScheduledLoad,
@@ -60,7 +59,7 @@ class _Moving(NamedTuple):
     total: Array  # force [N]
 
 
-def are_declared(
+def are_compilable(
     bodies: Sequence[CompiledBody],
     conditions: Sequence[StressTerm],
     equation: EquationOfMotion,
@@ -68,13 +67,14 @@ def are_declared(
 ) -> bool:
     """Whether everything in a step is of a kind that this loop knows; then only a formula that
     does not compile can be in its way."""
+    kinds = tuple(one.kind for one in PASSES)
     labels = [c.label for c in (*equation.loads, *equation.constraints)]
     fused = not conditions and all(body.fused for body in bodies)
     alone = len(bodies) == 1 and all(isinstance(one, LinearExtension) for one in conditions)
     return (
         isinstance(integrator, PointwiseIntegrator)
         and (fused or alone)
-        and all(isinstance(load, COMPILABLE_LOADS) for load in equation.loads)
+        and all(isinstance(load, kinds) for load in equation.loads)
         and all(labels.count(load.label) == 1 for load in equation.loads)
         and all(
             isinstance(one, (ScheduledConstraint, LinearExtension)) for one in equation.constraints
@@ -88,7 +88,6 @@ def compiled_loop(
     sums: InternalForces,
     equation: EquationOfMotion,
     integrator: Integrator,
-    step_size: float,
 ) -> TimeLoop:
     """The loop for these prepared bodies, conditions on their stress, and the scene's equation.
 
@@ -117,7 +116,7 @@ def compiled_loop(
         chain(tuple(one.apply for one in loads)),
         MotionWords(*(chain(functions) for functions in by_word)),
     )
-    return CompiledLoop(sums, equation, step_size, internal, loads, steps, threads)
+    return CompiledLoop(sums, equation, internal, loads, steps, threads)
 
 
 @final
@@ -127,7 +126,6 @@ class CompiledLoop(TimeLoop):
 
     sums: InternalForces
     equation: EquationOfMotion
-    step_size: float  # [s]
     internal: Internal
     loads: Sequence[LoadPass]
     steps: Any  # compiled
@@ -136,9 +134,13 @@ class CompiledLoop(TimeLoop):
 
     @most_steps.default
     def _within_memory(self) -> int:
-        two = np.array([0.0, self.step_size])
+        two = np.array([0.0, self.equation.step_size])
         parts = [load.schedule(two) for load in self._scheduled_loads]
-        parts += [motion.schedule(two, k) for motion in self._scheduled_motions for k in range(3)]
+        parts += [
+            motion.schedule(two, k, self.equation.step_size)
+            for motion in self._scheduled_motions
+            for k in range(3)
+        ]
         width = sum(int(part[0].size) for part in parts if len(part) > 1)
         work = _PER_PARTICLE * self.equation.particles.count + 2 * self.sums.pair_count
         return max(1, min(_TABLE // max(1, width), int(_AT_ONCE / work)))
@@ -169,12 +171,12 @@ class CompiledLoop(TimeLoop):
         while state.step + done < stop:
             count = min(stop - state.step - done, self.most_steps)
             numbers = np.arange(done + 1, done + count + 1, dtype=np.float64)
-            times = state.time + self.step_size * numbers
+            times = state.time + self.equation.step_size * numbers
             loads = accounts.loads([one.own(times) for one in self.loads], self.threads)
             motions = accounts.motions(times)
             carried_out = self.steps(
                 count,
-                self.step_size,
+                self.equation.step_size,
                 self.threads,
                 moving,
                 equation.masses,
@@ -187,7 +189,7 @@ class CompiledLoop(TimeLoop):
             accounts.settle(loads, motions)
             if not np.isfinite(moving.a.sum()):
                 break
-        time = state.time + self.step_size * done
+        time = state.time + self.equation.step_size * done
         end = State(
             time=time,
             step=state.step + done,
@@ -238,7 +240,9 @@ class _Accounts:
     def motions(self, times: Array) -> tuple[Scheduled | Following, ...]:
         """What the loop holds of the motions."""
         pairs = zip(self.equation.constraints, self.reactions, strict=True)
-        return tuple(motion_data(motion, times, before) for motion, before in pairs)
+        return tuple(
+            motion_data(motion, times, before, self.equation.step_size) for motion, before in pairs
+        )
 
     def settle(self, loads: Sequence[LoadData], motions: Sequence[Scheduled | Following]) -> None:
         """Take back what the loop has done with them."""

@@ -61,15 +61,17 @@ def motion_words(motion: Constraint, dimension: int) -> MotionWords:
     raise NotCompilableError(f"motion {motion.label!r} is not of a declared kind")
 
 
-def motion_data(motion: Constraint, times: Array, before: Array) -> Scheduled | Following:
+def motion_data(
+    motion: Constraint, times: Array, before: Array, step: float
+) -> Scheduled | Following:
     """What the loop holds of a motion over steps that end at `times` (t,) [s].
 
-    `before` (m,) is its reaction at the start [N].
+    `before` (m,) is its reaction at the start [N], `step` the time step [s].
     """
     match motion:
         case ScheduledConstraint():
             particles, axes = motion.entries
-            u, v, a = (np.ascontiguousarray(motion.schedule(times, k)) for k in range(3))
+            u, v, a = (np.ascontiguousarray(motion.schedule(times, k, step)) for k in range(3))
             return Scheduled(particles, axes, u, v, a, before, np.zeros(1))
         case LinearExtension():
             A = motion.displacement

@@ -19,7 +19,7 @@ from solidsph.engines.compiled.pointwise_sums import PointwiseSums
 from solidsph.engines.compiled.vectors import MATRIX
 from solidsph.engines.compiled.weighted_sums import WeightedSums
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.operation_count import Tally, Way, vectors
+from solidsph.interfaces.plan import Operations, Way, vectors
 from solidsph.maths.arrays import Array
 
 
@@ -77,11 +77,11 @@ class MovingBody:
         return self.search.bytes + sum(array.nbytes for array in own)
 
     @property
-    def tally(self) -> Sequence[Tally]:
+    def operations(self) -> Sequence[Operations]:
         """What an evaluation passes over, with the neighbours of the start."""
         n, d = self.body.particles.positions.shape
         way = Way.FORMULAS if isinstance(self.sums, PointwiseSums) else Way.WEIGHTS
-        return (Tally(way, self.pair_count, n, self.bytes + vectors(n, d), self.bytes),)
+        return (Operations(way, self.pair_count, n, self.bytes + vectors(n, d), self.bytes),)
 
     def forces(self, displacements: Array, out: Array) -> None:
         """Forces (n, d) from displacements (n, d) where no condition changes the stress."""

@@ -10,13 +10,15 @@ import numpy as np
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body, part_of
-from solidsph.interfaces.compilable_terms import HourglassLoad, ScheduledConstraint, ScheduledLoad
+from solidsph.interfaces.compilable_terms import ScheduledConstraint, ScheduledLoad
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
+from solidsph.interfaces.subset import Subset
+from solidsph.interfaces.terms import Load
 from solidsph.interfaces.time_loop import StepError, TimeLoop
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.particles import State
 from solidsph.run.dynamics import Dynamics
-from solidsph.run.sleeping.restricted import ASLEEP, Chosen, Frozen, check_restrictable
+from solidsph.run.sleeping.frozen import ASLEEP, Frozen
 from solidsph.run.sleeping.slabs import Slabs
 from solidsph.run.stable_step import lattice_frequency
 from solidsph.run.step_by_step import steps_of
@@ -42,8 +44,18 @@ def check_sleep(simulation: BuiltScene) -> None:
     """Raise SceneError if a part of the scene cannot sleep."""
     dynamics = simulation.dynamics
     dynamics.internal.check_parts()
-    for condition in [*dynamics.constraints, *dynamics.loads]:
-        check_restrictable(condition)
+    none = np.empty(0, dtype=np.intp)
+    nobody, free = (
+        Subset.of(none, dynamics.particles.count),
+        np.zeros(dynamics.particles.count, bool),
+    )
+    parts = [(one, one.part(nobody, free)) for one in dynamics.constraints]
+    for term, part in (*parts, *((one, one.part(nobody)) for one in dynamics.loads)):
+        if part is None:
+            raise SceneError(
+                f"sleep: {term.label!r} does not say what it depends on particle by particle, so "
+                "that it cannot act on those alone that are awake; leave out it, or [sleep]"
+            )
     if not isinstance(simulation.integrator, PointwiseIntegrator):
         raise SceneError(
             f"sleep: integrator {type(simulation.integrator).__name__} may need more of a particle "
@@ -58,7 +70,7 @@ def sleeping_loop(simulation: BuiltScene) -> SleepingLoop:
     check_sleep(simulation)
     (body,) = simulation.model.bodies
     slabs = Slabs.across(simulation.particles, wanted.slabs)
-    controlled = any(isinstance(one, HourglassLoad) for one in simulation.dynamics.loads)
+    supports = max((one.supports for one in simulation.dynamics.loads), default=Load.supports)
     fastest = body.material.wave_speed * simulation.step_size
     steps = max(1, int(_CROSSED * slabs.width / fastest))
     spacing = float(body.particles.spacings.max())
@@ -66,15 +78,12 @@ def sleeping_loop(simulation: BuiltScene) -> SleepingLoop:
         body=body,
         dynamics=simulation.dynamics,
         integrator=simulation.integrator,
-        step_size=simulation.step_size,
         slabs=slabs,
         tolerance=wanted.tolerance,
         steps_at_once=steps,
         reach=steps * fastest + _PRECURSOR * spacing,
         highest=lattice_frequency([body]),
-        # Forces are right where the neighbours of the neighbours are there too; hourglass forces
-        # need them of the partners of the neighbours.
-        halo=(4.0 if controlled else 2.0) * body.smoothing.support_radius,
+        halo=supports * body.smoothing.support_radius,
     )
 
 
@@ -83,7 +92,7 @@ class _Window:
     """What is awake, made ready to be stepped."""
 
     awake: Mask  # slabs
-    chosen: Chosen  # particles that are awake, or near those
+    chosen: Subset  # particles that are awake, or near those
     moving: Indices  # those of the chosen that are awake
     dynamics: Dynamics
     loop: TimeLoop
@@ -102,7 +111,6 @@ class SleepingLoop(TimeLoop):
     body: Body
     dynamics: Dynamics
     integrator: Integrator
-    step_size: float  # [s]
     slabs: Slabs
     tolerance: float
     steps_at_once: int
@@ -143,14 +151,14 @@ class SleepingLoop(TimeLoop):
         # A displacement is the difference of two positions: what its rounding makes of the forces
         # is no motion to come.
         rounding = _ROUNDING * self.highest**2 * float(np.abs(full.x).max())
-        moving = (speeds > limit) | (gains > limit / (count * self.step_size) + rounding)
+        moving = (speeds > limit) | (gains > limit / (count * self.dynamics.step_size) + rounding)
         moving |= self._driven(full.time, count)
         return self.slabs.widened(moving, self.reach)
 
     def _driven(self, time: float, count: int) -> Mask:
         """Slabs on which something that is imposed changes in the next steps."""
         found = np.zeros(self.slabs.count, dtype=np.bool_)
-        times = time + self.step_size * np.arange(count + 1, dtype=np.float64)
+        times = time + self.dynamics.step_size * np.arange(count + 1, dtype=np.float64)
         for motion in self.dynamics.constraints:
             assert isinstance(motion, ScheduledConstraint)
             values = motion.schedule(times, 0)
@@ -169,25 +177,23 @@ class SleepingLoop(TimeLoop):
     def _made(self, awake: Mask, full: _Arrays) -> _Window:
         whole, slabs = self.dynamics, self.slabs
         near = slabs.widened(awake, self.halo)
-        chosen = Chosen.of(np.flatnonzero(near[slabs.of]), whole.particles.count)
+        chosen = Subset.of(np.flatnonzero(near[slabs.of]), whole.particles.count)
         asleep = ~awake[slabs.of]
         moving = np.flatnonzero(~asleep[chosen.particles])
         internal = whole.internal.part(chosen.particles)
         still = np.flatnonzero(asleep[chosen.particles])
         u = full.x[chosen.particles] - whole.particles.positions[chosen.particles]
-        motions = [
-            chosen.motion(motion, asleep)
-            for motion in whole.constraints
-            if isinstance(motion, ScheduledConstraint)
-        ]
+        constraints = [one.part(chosen, asleep) for one in whole.constraints]
+        loads = [one.part(chosen) for one in whole.loads]
         dynamics = Dynamics(
             particles=part_of(self.body, chosen.particles).particles,
             masses=whole.masses[chosen.particles],
             internal=internal,
-            constraints=[Frozen.of(still, u), *motions],
-            loads=[chosen.load(load) for load in whole.loads],
+            constraints=[Frozen.of(still, u), *(one for one in constraints if one is not None)],
+            loads=[one for one in loads if one is not None],
+            step_size=whole.step_size,
         )
-        loop = steps_of(dynamics, self.integrator, self.step_size)
+        loop = steps_of(dynamics, self.integrator)
         return _Window(awake, chosen, moving, dynamics, loop)
 
 
@@ -221,14 +227,14 @@ class _Arrays:
             work=state.work,
         )
 
-    def settle(self, moving: Indices, chosen: Chosen) -> None:
+    def settle(self, moving: Indices, chosen: Subset) -> None:
         """Let all that sleeps be at rest."""
         asleep = np.ones(len(self.x), dtype=np.bool_)
         asleep[chosen.particles[moving]] = False
         for one in (self.v, self.a, self.h):
             one[asleep] = 0.0
 
-    def part(self, chosen: Chosen) -> State:
+    def part(self, chosen: Subset) -> State:
         """The state of the chosen."""
         own = chosen.particles
         applied = {name: force[own] for name, force in self.applied.items()}
@@ -243,7 +249,7 @@ class _Arrays:
             work={**self.work, ASLEEP: 0.0},
         )
 
-    def take(self, chosen: Chosen, moving: Indices, after: State) -> None:
+    def take(self, chosen: Subset, moving: Indices, after: State) -> None:
         """Take back what those that are awake have done."""
         own = chosen.particles[moving]
         self.time, self.step = after.time, after.step

@@ -1,0 +1,22 @@
+"""The size of a body, by which engines choose."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solidsph.interfaces.body import Body
+from solidsph.interfaces.formulation import Configuration
+from solidsph.interfaces.plan import BodySize
+from solidsph.interfaces.smoothing_kernel import UNIT_SPHERE
+
+
+def size_of(body: Body) -> BodySize:
+    """The size of a body; its pairs are those that there would be in complete supports."""
+    d = body.smoothing.dimension
+    ball = UNIT_SPHERE[d] / d * body.smoothing.support_radius**d
+    return BodySize(
+        dimension=d,
+        particles=body.particles.count,
+        pairs=float(body.particles.count * ball / np.mean(body.particles.volumes)),
+        moving=body.formulation.configuration is Configuration.CURRENT,
+    )

@@ -1,0 +1,100 @@
+"""Plan: how an engine would carry out a run, for those who count and price it.
+
+Nothing in it depends on the speed of the machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from enum import Enum
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Way(Enum):
+    """How sums over neighbours are carried out; what a pair costs depends on it."""
+
+    PRODUCTS = "products of sparse matrices"
+    PRODUCTS_ANEW = "products of sparse matrices, formed anew at every evaluation"
+    STENCILS = "compiled, weights that neighbouring particles share"
+    ROWS = "compiled, weights of each particle's own"
+    FORMULAS = "compiled, moving neighbours, weights by formula"
+    WEIGHTS = "compiled, moving neighbours, weights by arrays"
+    PAIR_ARRAYS = "forces of pairs, by arrays"
+    PAIR_LOOPS = "forces of pairs, compiled"
+    HOURGLASS_PRODUCTS = "hourglass forces, as products of sparse matrices"
+    HOURGLASS_SWEEPS = "hourglass forces, compiled"
+    UNKNOWN = "of a way that is not known here"
+
+
+@attrs.frozen
+class Operations:
+    """One part of what an evaluation passes over. Nothing in it depends on the machine's speed."""
+
+    way: Way
+    pairs: int  # ordered, that are visited
+    particles: int
+    touched: int  # bytes that must be moved once at least
+    held: int  # bytes of the arrays kept between evaluations
+    precision: int = 8  # bytes of a number in the sums
+    threaded: bool = False  # whether threads share them
+
+
+class Piece(Enum):
+    """What may have to be compiled; each once a process and kind."""
+
+    ENGINE = "the engine, laws and the layout of rows"
+    MOVING_ENGINE = "the engine, laws and the search for neighbours"
+    FORCES = "sums over neighbours, from displacement to force at once"
+    STAGED = "sums over neighbours, stress between"
+    MOVING = "sums over moving neighbours"
+    FIELDS = "deformation for reports"
+    STEPS = "the time loop"
+    LOAD = "a load in the time loop"
+    PAIR_LOAD = "forces of pairs in the time loop"
+    HOURGLASS_LOAD = "hourglass forces in the time loop"
+    SWEEPS = "hourglass forces outside of it"
+    EXTENSION = "ghosts that follow in the time loop"
+
+
+@attrs.frozen
+class Compilation:
+    """Something to compile; two that are equal are compiled once."""
+
+    piece: Piece
+    dimension: int
+    threaded: bool
+    key: object = None  # what tells those of one piece apart
+
+
+@attrs.frozen
+class Plan:
+    """How a run is carried out."""
+
+    compiles_steps: bool  # True if whole steps are one compiled function
+    engine: Sequence[Operations]  # of the internal forces, in an evaluation
+    loads: Sequence[Operations] = ()  # of all else
+    compilations: frozenset[Compilation] = frozenset()
+
+
+@attrs.frozen
+class BodySize:
+    """What an engine plans by before a body is built."""
+
+    dimension: int
+    particles: float
+    pairs: float  # ordered pairs within the support, self pairs included
+    moving: bool  # True if neighbours are those of the current configuration
+    lattice: bool = False  # True if it is on the default arrangement
+
+
+def array_bytes(arrays: Iterable[NDArray[np.generic]]) -> int:
+    """Memory of these arrays."""
+    return sum(array.nbytes for array in arrays)
+
+
+def vectors(particles: int, dimension: int) -> int:
+    """Bytes of the displacements that an evaluation reads and the forces that it writes."""
+    return 2 * 8 * particles * dimension
