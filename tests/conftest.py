@@ -6,7 +6,8 @@ import functools
 import os
 import signal
 import sys
-from collections.abc import Iterator
+import textwrap
+from collections.abc import Callable, Iterator
 from importlib.metadata import EntryPoints, entry_points
 from pathlib import Path
 
@@ -62,3 +63,26 @@ def _plain_environment(monkeypatch: pytest.MonkeyPatch, cache_folder: Path) -> N
     for name in [name for name in os.environ if name.startswith("SOLIDSPH_")]:
         monkeypatch.delenv(name)
     monkeypatch.setenv("SOLIDSPH_CACHE", str(cache_folder))
+
+
+@pytest.fixture
+def foreign(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[[str, str, str, str], None]]:
+    """Installs distributions of one module each, into folders of their own on the path."""
+
+    def install(distribution: str, module: str, source: str, points: str) -> None:
+        folder = tmp_path / distribution
+        info = folder / f"{distribution.replace('-', '_')}-1.2.dist-info"
+        info.mkdir(parents=True)
+        (folder / f"{module}.py").write_text(textwrap.dedent(source))
+        (info / "METADATA").write_text(
+            f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 1.2\n"
+        )
+        (info / "entry_points.txt").write_text(textwrap.dedent(points))
+        monkeypatch.syspath_prepend(str(folder))
+
+    yield install
+    for name in list(sys.modules):
+        if name.startswith("foreign_"):
+            del sys.modules[name]

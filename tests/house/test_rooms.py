@@ -20,7 +20,7 @@ MAY_IMPORT = {
     "interfaces": "errors maths model",
     "registry": "errors",
     "engines": "errors maths model interfaces",
-    "scene": "errors system maths model interfaces registry engines",
+    "scene": "errors system maths model interfaces registry",
     "run": "errors maths model interfaces registry scene",
     "statics": "errors maths model interfaces engines scene run",
     "results": "errors system maths model interfaces registry scene run",

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import textwrap
-from pathlib import Path
 
 import pytest
 
@@ -23,27 +21,6 @@ GOOD_KERNEL = """
         def profile(q, params):
             return np.maximum(1.0 - q, 0.0)
 """
-
-
-@pytest.fixture
-def foreign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Installs distributions of one module each, into folders of their own on the path."""
-
-    def install(distribution: str, module: str, source: str, points: str) -> None:
-        folder = tmp_path / distribution
-        info = folder / f"{distribution.replace('-', '_')}-1.2.dist-info"
-        info.mkdir(parents=True)
-        (folder / f"{module}.py").write_text(textwrap.dedent(source))
-        (info / "METADATA").write_text(
-            f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 1.2\n"
-        )
-        (info / "entry_points.txt").write_text(textwrap.dedent(points))
-        monkeypatch.syspath_prepend(str(folder))
-
-    yield install
-    for name in list(sys.modules):
-        if name.startswith("foreign_"):
-            del sys.modules[name]
 
 
 def test_a_foreign_kernel_is_found_and_loaded(foreign) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from functools import cached_property
 
 import attrs
 import numpy as np
+from scipy.spatial import cKDTree
 
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.material import Material
@@ -14,6 +15,9 @@ from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.neighbours import Hidden, Pairs, neighbour_pairs
 from solidsph.model.particles import Particles
+
+# Of nearest neighbours, in spacings.
+_NEAREST = 1.2
 
 
 @attrs.frozen(eq=False)
@@ -28,8 +32,6 @@ class Body:
     material: Material
     formulation: Formulation
     hidden: Hidden | None = None  # near particles that do not see each other
-    # What parts have made of these arrays, by keys of theirs; it lives as long as the body does.
-    made: dict[object, Any] = attrs.field(factory=dict, init=False, repr=False)
 
     def pairs(self, radius: float | None = None) -> Pairs:
         """Neighbours in the reference configuration, numbered within the body: within the support,
@@ -39,6 +41,18 @@ class Body:
         """
         within = self.smoothing.support_radius if radius is None else radius
         return neighbour_pairs(self.particles.positions, within, self.hidden)
+
+    @cached_property
+    def nearest_pairs(self) -> tuple[Indices, Indices]:
+        """Particles (m,) and (m,) up to 1.2 spacings apart in the reference, each pair once."""
+        particles = self.particles
+        reach = _NEAREST * float(particles.spacings.max())
+        pairs = cKDTree(particles.positions).query_pairs(reach, output_type="ndarray")
+        pairs = pairs[~particles.ghosts[pairs].any(axis=1)]
+        if self.hidden is not None:
+            pairs = pairs[~self.hidden.between(pairs[:, 0], pairs[:, 1])]
+        a, b = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].T
+        return np.ascontiguousarray(a), np.ascontiguousarray(b)
 
     @property
     def masses(self) -> Array:

@@ -6,9 +6,7 @@ from typing import TYPE_CHECKING, final
 
 import attrs
 import numpy as np
-from scipy.spatial import cKDTree
 
-from solidsph.interfaces.body import Body
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array, Indices
@@ -17,9 +15,6 @@ from solidsph.watch.symptom import Finding, Symptom, graded
 
 if TYPE_CHECKING:
     from solidsph.run.built_scene import BuiltScene
-
-# Nearest neighbours alone, in spacings: they are the first to meet.
-_NEAR = 1.2
 
 
 @final
@@ -35,12 +30,12 @@ class CollapsingNeighbours(Symptom):
     ) -> Finding | None:
         found, part = 0, np.inf
         for body in simulation.model.bodies:
-            a, b, first = _nearest(body)
+            a, b = body.nearest_pairs
             if not len(a):
                 continue
             with np.errstate(all="ignore"):
                 squares = _squares(observation.state.positions[body.extent], a, b)
-                squares *= first
+                squares /= _squares(body.particles.positions, a, b)
             closest = int(np.argmin(squares))  # the first that is no number, if there is one
             ratio = float(np.sqrt(squares[closest]))
             if not ratio >= part:
@@ -78,24 +73,3 @@ def _squares(positions: Array, a: Indices, b: Indices) -> Array:
         apart *= apart
         total += apart
     return total
-
-
-def _nearest(body: Body) -> tuple[Indices, Indices, Array]:
-    """Pairs of nearest neighbours, each once, and one over the square of their distance [m^-2].
-
-    Found when they are asked for first.
-    """
-    if CollapsingNeighbours not in body.made:
-        particles = body.particles
-        pairs = cKDTree(particles.positions).query_pairs(
-            _NEAR * float(particles.spacings.max()), output_type="ndarray"
-        )
-        pairs = pairs[~particles.ghosts[pairs].any(axis=1)]
-        if body.hidden is not None:
-            pairs = pairs[~body.hidden.between(pairs[:, 0], pairs[:, 1])]
-        a, b = (
-            np.ascontiguousarray(one) for one in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].T
-        )
-        body.made[CollapsingNeighbours] = (a, b, 1.0 / _squares(particles.positions, a, b))
-    found: tuple[Indices, Indices, Array] = body.made[CollapsingNeighbours]
-    return found
