@@ -1,0 +1,187 @@
+"""Everything that the author of a part imports, in one place.
+
+An interface to keep, what a part is given and what it hands back, the words of pointwise formulas,
+and numbers as scenes state them. `docs/authors.md` has an example of every kind of part.
+"""
+
+from solidsph.errors import BuildError, PluginError, SceneError
+from solidsph.interfaces.body import Body
+from solidsph.interfaces.boundary import BoundaryHandler
+from solidsph.interfaces.compilable_terms import (
+    LinearExtension,
+    PairLoad,
+    PairTable,
+    PointwiseLoad,
+    ScheduledConstraint,
+    ScheduledLoad,
+)
+from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.divergence import Divergence, PointwiseDivergence
+from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.engine import Engine, InternalForces, StressFields
+from solidsph.interfaces.equation_of_motion import EquationOfMotion, Response
+from solidsph.interfaces.forces_modifier import ForcesModifier
+from solidsph.interfaces.formulation import Configuration, Formulation
+from solidsph.interfaces.gradient import Gradient, PointwiseGradient
+from solidsph.interfaces.history import History, HistoryMaterial
+from solidsph.interfaces.integrator import Integrator, PointwiseIntegrator
+from solidsph.interfaces.kernel import Kernel
+from solidsph.interfaces.law import Law, memory_name
+from solidsph.interfaces.material import Material
+from solidsph.interfaces.plan import BodySize, Compilation, Operations, Plan
+from solidsph.interfaces.shape import Shape, Surface
+from solidsph.interfaces.smoothing_kernel import SmoothingKernel, smoothing_kernel
+from solidsph.interfaces.terms import (
+    Constraint,
+    EnergyTerm,
+    FieldTerm,
+    GhostConstraint,
+    Load,
+    Observation,
+    StressTerm,
+    SurfaceLoad,
+    Term,
+)
+from solidsph.interfaces.time_loop import StepError, TimeLoop
+from solidsph.maths.arrays import Array, Indices, Mask, Scalar, Tensor, Vector
+from solidsph.maths.tensors import (
+    add,
+    cauchy_stress,
+    cofactor,
+    components_first,
+    contraction,
+    determinant,
+    dot,
+    green_lagrange,
+    identity,
+    inverse,
+    inverse_transpose,
+    particles_first,
+    product,
+    right_cauchy_green,
+    scale,
+    scaled,
+    small_strain,
+    trace,
+    transpose,
+)
+from solidsph.model.fields import Component, VectorField, scheduled_forces
+from solidsph.model.neighbours import Pairs, neighbour_pairs
+from solidsph.model.particles import Face, Particles, State
+from solidsph.model.regions import AXES, EVERYWHERE, Where
+from solidsph.registry.construct import construct
+from solidsph.registry.parameters import check_positive, number, optional_number
+from solidsph.results.record import Record
+from solidsph.run.stable_step import lattice_frequency
+from solidsph.scene.scene import Scene
+from solidsph.studies.case import Case, Curves, Measurement, Trial
+from solidsph.system.encoding import decoded
+from solidsph.system.files import content, located
+
+__all__ = [
+    "AXES",
+    "EVERYWHERE",
+    "Array",
+    "Body",
+    "BodySize",
+    "BoundaryHandler",
+    "BuildError",
+    "Case",
+    "Compilation",
+    "Component",
+    "Configuration",
+    "Constraint",
+    "Curves",
+    "DiscreteModel",
+    "Discretisation",
+    "Divergence",
+    "Effect",
+    "EnergyTerm",
+    "Engine",
+    "EquationOfMotion",
+    "Face",
+    "FieldTerm",
+    "ForcesModifier",
+    "Formulation",
+    "GhostConstraint",
+    "Gradient",
+    "History",
+    "HistoryMaterial",
+    "Indices",
+    "Integrator",
+    "InternalForces",
+    "Kernel",
+    "Law",
+    "LinearExtension",
+    "Load",
+    "Mask",
+    "Material",
+    "Measurement",
+    "Need",
+    "Observation",
+    "Operations",
+    "PairLoad",
+    "PairTable",
+    "Pairs",
+    "Particles",
+    "Plan",
+    "PluginError",
+    "PointwiseDivergence",
+    "PointwiseGradient",
+    "PointwiseIntegrator",
+    "PointwiseLoad",
+    "Record",
+    "Response",
+    "Scalar",
+    "Scene",
+    "SceneError",
+    "ScheduledConstraint",
+    "ScheduledLoad",
+    "Shape",
+    "SmoothingKernel",
+    "State",
+    "StepError",
+    "StressFields",
+    "StressTerm",
+    "Surface",
+    "SurfaceLoad",
+    "Tensor",
+    "Term",
+    "TimeLoop",
+    "Trial",
+    "Vector",
+    "VectorField",
+    "Where",
+    "add",
+    "cauchy_stress",
+    "check_positive",
+    "cofactor",
+    "components_first",
+    "construct",
+    "content",
+    "contraction",
+    "decoded",
+    "determinant",
+    "dot",
+    "green_lagrange",
+    "identity",
+    "inverse",
+    "inverse_transpose",
+    "lattice_frequency",
+    "located",
+    "memory_name",
+    "neighbour_pairs",
+    "number",
+    "optional_number",
+    "particles_first",
+    "product",
+    "right_cauchy_green",
+    "scale",
+    "scaled",
+    "scheduled_forces",
+    "small_strain",
+    "smoothing_kernel",
+    "trace",
+    "transpose",
+]
