@@ -38,7 +38,7 @@ MAY_IMPORT = {
     "cli": "errors commands",
 }
 """What a room may import; a file at the top is a room of its own. The faces of the package,
-`solidsph` for users and `solidsph.parts` for authors, may import everything; nothing imports them."""
+`solidsph` for users and `solidsph.parts` for authors, may import all; nothing imports them."""
 
 
 def imports(path: Path) -> Iterator[str]:
