@@ -9,7 +9,7 @@ from typing import final
 
 import attrs
 
-from solidsph.build.builder import Builder
+from solidsph.assembly.builder import Builder
 from solidsph.errors import UnsoundError
 from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.run.built_scene import BuiltScene

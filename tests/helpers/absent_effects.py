@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from solidsph import Scene, Simulation
-from solidsph.build.assembly import Assembly
+from solidsph.assembly.assembler import Assembler
 from solidsph.registry import registry
 from solidsph.run.dynamics import Dynamics
 
@@ -130,14 +130,14 @@ def instructions(simulation: Simulation) -> int:
 
 
 def _import() -> None:
-    plain = Assembly.built
+    plain = Assembler.built
 
-    def importing(self: Assembly, kind: type[Simulation]) -> Simulation:
+    def importing(self: Assembler, kind: type[Simulation]) -> Simulation:
         for entry in registry.available("effects"):
             import_module(entry.target.partition(":")[0])
         return plain(self, kind)
 
-    Assembly.built = importing  # type: ignore[method-assign]
+    Assembler.built = importing  # type: ignore[method-assign]
 
 
 def _branch() -> None:
@@ -152,14 +152,14 @@ def _branch() -> None:
 
 
 def _array() -> None:
-    plain = Assembly.built
+    plain = Assembler.built
     kept = []
 
-    def keeping(self: Assembly, kind: type[Simulation]) -> Simulation:
+    def keeping(self: Assembler, kind: type[Simulation]) -> Simulation:
         kept.extend(np.zeros(8) for _ in registry.names("effects"))
         return plain(self, kind)
 
-    Assembly.built = keeping  # type: ignore[method-assign]
+    Assembler.built = keeping  # type: ignore[method-assign]
 
 
 def _result() -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.build.builder import Builder
+from solidsph.assembly.builder import Builder
 from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.engine import InternalForces

@@ -4,22 +4,21 @@ is honest is used without a word."""
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import attrs
 import numpy as np
 import pytest
+from tests.helpers.scenes import SOFT, box
 
 from solidsph import Effect
 from solidsph.errors import BuildError, PartWarning, PluginError
-from solidsph.interfaces.body import Body
-from solidsph.interfaces.terms import Load, Observation, EnergyTerm
 from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.terms import EnergyTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph_builtin.materials.neo_hookean import NeoHookean
-from tests.helpers.scenes import SOFT, box
 
 K = 1e3  # [N/m]
 

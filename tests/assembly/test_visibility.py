@@ -12,9 +12,10 @@ from typing import Any
 import attrs
 import numpy as np
 import pytest
+from tests.helpers.scenes import SOFT
 
 from solidsph import Simulation
-from solidsph.build.visibility import hidden_pairs
+from solidsph.assembly.visibility import hidden_pairs
 from solidsph.engines.compiled.cells import NeighbourSearch
 from solidsph.engines.compiled.chunks import weighted_chunks
 from solidsph.interfaces.body import Body, part_of
@@ -24,7 +25,6 @@ from solidsph.model.particles import Particles
 from solidsph.registry.construct import construct
 from solidsph.run.energy import KINETIC
 from solidsph.scene.scene_builder import SceneBuilder
-from tests.helpers.scenes import SOFT
 
 H = 0.1  # spacing
 ON_BOUNDARY = {"type": "lattice", "on_boundary": True}

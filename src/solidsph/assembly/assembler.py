@@ -1,4 +1,4 @@
-"""Assembly: names -> parts -> a checked Simulation.
+"""Assembler: names -> parts -> a checked Simulation.
 
 This is the edge where names end. Every part is made and every pair of parts is checked here, all
 problems are reported together, and what comes out holds objects only.
@@ -6,7 +6,6 @@ problems are reported together, and what comes out holds objects only.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from math import ceil
 from typing import Any, TypeVar
@@ -15,21 +14,11 @@ import attrs
 import numpy as np
 import pluggy
 
-from solidsph.scene import compatibility
-from solidsph.scene import returned_values
-from solidsph.registry import registry
-from solidsph.registry.origin import described
-from solidsph.interfaces.body import Body
-from solidsph.run.dynamics import Dynamics
+from solidsph.assembly.visibility import hidden_pairs
 from solidsph.engines.history import HistoryFields, modified
 from solidsph.errors import BuildError, SceneError
-from solidsph.interfaces.terms import (
-    Term,
-    Load,
-    Constraint,
-    Observation,
-    StressTerm,
-)
+from solidsph.interfaces.body import Body
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.formulation import Configuration, Formulation
 from solidsph.interfaces.gradient import Gradient
@@ -38,26 +27,32 @@ from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.material import Material
 from solidsph.interfaces.shape import Shape
-from solidsph.scene.part_maker import PartMaker, Parts
+from solidsph.interfaces.smoothing_kernel import smoothing_kernel
+from solidsph.interfaces.terms import (
+    Constraint,
+    Load,
+    Observation,
+    StressTerm,
+    Term,
+)
 from solidsph.model.fields import VectorField
 from solidsph.model.particles import Particles, State
+from solidsph.model.regions import select
+from solidsph.registry import registry
+from solidsph.registry.origin import described
 from solidsph.results.shown import clashes
+from solidsph.run.built_scene import BuiltScene
+from solidsph.run.dynamics import Dynamics
+from solidsph.run.stable_step import stable_step
+from solidsph.scene import compatibility, returned_values
 from solidsph.scene.placed_parts import PlacedParts
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import MOST_STEPS
-from solidsph.interfaces.discrete_model import DiscreteModel
-from solidsph.run.built_scene import BuiltScene
-from solidsph.interfaces.smoothing_kernel import smoothing_kernel
-from solidsph.run.stable_step import stable_step
-from solidsph.model.surface import Conditions
-from solidsph.build.visibility import hidden_pairs
-from solidsph.model.regions import Where, select
-
 
 S = TypeVar("S", bound=BuiltScene)
 
 
-class Assembly:
+class Assembler:
     """One build of one scene."""
 
     def __init__(self, scene: Scene, manager: pluggy.PluginManager) -> None:
@@ -168,7 +163,7 @@ class Assembly:
             problems.attempt(check_sleep, made_ready)
             problems.stop_if_any()
         if words.foreign:
-            from solidsph.build.first_use import ask  # only where there is somebody to be asked
+            from solidsph.assembly.first_use import ask  # only where there is somebody to be asked
 
             problems.attempt(ask, made_ready, words.foreign)
             problems.stop_if_any()
@@ -316,9 +311,7 @@ def _at_rest(initial: State, model: DiscreteModel, terms: Sequence[Term]) -> Obs
     )
 
 
-def _in_order(
-    motions: Sequence[Constraint], particles: Particles
-) -> tuple[Constraint, ...]:
+def _in_order(motions: Sequence[Constraint], particles: Particles) -> tuple[Constraint, ...]:
     """Motions of particles first, then those of ghosts, which follow particles."""
     return tuple(sorted(motions, key=lambda m: bool(m.held[particles.ghosts].any())))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Generic, TypeVar, final
 
-from solidsph.build.assembly import Assembly
+from solidsph.assembly.assembler import Assembler
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.hooks import listeners
 from solidsph.scene.scene import Scene
@@ -30,4 +30,4 @@ class Builder(SceneBuilder, Generic[S]):
         """
         manager = listeners()
         manager.hook.solidsph_configure(builder=self)
-        return Assembly(self.scene(), manager).built(self._kind)
+        return Assembler(self.scene(), manager).built(self._kind)

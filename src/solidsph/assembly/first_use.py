@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from solidsph.scene import returned_values
-from solidsph.registry.origin import described
 from solidsph.errors import BuildError, PartWarning
-from solidsph.interfaces.terms import Load, EnergyTerm
+from solidsph.interfaces.terms import EnergyTerm, Load
 from solidsph.model.particles import read_only
 from solidsph.promises.kits import KITS
+from solidsph.registry.origin import described
 from solidsph.registry.registry import entry_of, singular
 from solidsph.run.built_scene import BuiltScene
+from solidsph.scene import returned_values
 
 # Of a kit, by the names of its checks: those that need no scene of their own.
 _QUICK: Mapping[str, Sequence[str]] = {

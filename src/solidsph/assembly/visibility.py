@@ -16,8 +16,8 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.interfaces.shape import Shape
+from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.neighbours import Hidden, neighbour_pairs
 from solidsph.model.particles import Particles
 
