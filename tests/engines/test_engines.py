@@ -302,9 +302,7 @@ class Lookup(Material):
         return [[params[0] * component for component in row] for row in dF]
 
 
-@pytest.mark.filterwarnings(
-    "ignore::solidsph.assembly.first_use.PartWarning"
-)  # its stress is a table
+@pytest.mark.filterwarnings("ignore::solidsph.errors.PartWarning")  # its stress is a table
 def test_a_part_that_cannot_be_compiled_runs_on_the_matrix_engine() -> None:
     simulation = block(2, lengths=[0.8, 0.7], material=Lookup()).build()
     forces = prepared(CompiledEngine(), simulation)

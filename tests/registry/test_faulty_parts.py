@@ -48,7 +48,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-@pytest.mark.filterwarnings("ignore::solidsph.assembly.first_use.PartWarning")
+@pytest.mark.filterwarnings("ignore::solidsph.errors.PartWarning")
 def test_what_cannot_be_used_is_refused_at_the_build(name: str) -> None:
     builder, told = REFUSED[name]
     with pytest.raises(BuildError, match=told) as caught:
@@ -71,7 +71,7 @@ FAILING = {
 
 
 @pytest.mark.parametrize("name", FAILING)
-@pytest.mark.filterwarnings("ignore::solidsph.assembly.first_use.PartWarning")
+@pytest.mark.filterwarnings("ignore::solidsph.errors.PartWarning")
 def test_what_fails_in_the_run_is_named(name: str, tmp_path: Path) -> None:
     builder, told = FAILING[name]
     with pytest.raises(PluginError, match=told):

@@ -103,7 +103,7 @@ def lying() -> SceneBuilder:
     )
 
 
-@pytest.mark.filterwarnings("ignore::solidsph.assembly.first_use.PartWarning")
+@pytest.mark.filterwarnings("ignore::solidsph.errors.PartWarning")
 @pytest.mark.parametrize(
     ("scene", "cause"),
     [(plain, "Plain"), (updated, "updated Lagrangian"), (lying, "of its energy")],
@@ -170,7 +170,7 @@ def test_a_block_of_steel_under_its_weight_is_sound() -> None:
     )
 
 
-@pytest.mark.filterwarnings("ignore::solidsph.assembly.first_use.PartWarning")
+@pytest.mark.filterwarnings("ignore::solidsph.errors.PartWarning")
 def test_a_small_load_that_goes_wrong_is_not_sound() -> None:
     """Strains of 1e-5 are no rounding."""
     with pytest.raises(UnsoundError):
