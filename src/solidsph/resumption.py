@@ -10,10 +10,10 @@ import attrs
 
 from solidsph.errors import RecordError
 from solidsph.results.checkpoint import Checkpoint, checkpoint_path, read_checkpoint
-from solidsph.results.circumstances import circumstances, differences, is_part, named_parts
+from solidsph.results.environment import circumstances, differences, is_part, named_parts
 from solidsph.results.record import Record
 from solidsph.results.recorder import COMPOSED, scene_text
-from solidsph.results.same import check_same_output, check_same_particles
+from solidsph.results.resume_checks import check_same_output, check_same_particles
 from solidsph.results.sole_writer import check_no_writer
 from solidsph.run.outcome import Result, is_over
 from solidsph.run.restart_point import RestartPoint

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solidsph import SceneError, Simulation
-from solidsph.advice import Advice, advised
+from solidsph.advice import Advice, advise
 from solidsph.errors import BuildError
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.simulation import Simulation as Built
@@ -60,7 +60,7 @@ def peak(built: Built) -> float:
 
 
 def warnings(built: Built) -> list[Advice]:
-    return [one for one in advised(built) if one.name == "half-supports"]
+    return [one for one in advise(built) if one.name == "half-supports"]
 
 
 def test_a_quarter_without_ghosts_is_wrong_and_warned_of_and_the_remedies_are_right() -> None:

@@ -23,11 +23,11 @@ from hypothesis import strategies as st
 
 from solidsph.errors import DivergedError, RecordError
 from solidsph.model.particles import Face, Particles
+from solidsph.results.hdf5_source import _lookup3
 from solidsph.results.layout import FORMAT, Field, PluginUsed
 from solidsph.results.record import Record, TimeSeries
 from solidsph.results.record_writer import RecordWriter
 from solidsph.results.repair import repaired
-from solidsph.results.unclosed import _lookup3
 from tests.helpers.waiting import wait_for
 
 PLUGINS = (

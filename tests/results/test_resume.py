@@ -296,11 +296,11 @@ def test_other_versions_and_plugins_are_refused_unless_forced(
     simulation = stopped(path)
     if not kept:
         checkpoint_path(path).unlink()
-    from solidsph.results import circumstances
+    from solidsph.results import environment
 
-    real = circumstances.metadata.version
+    real = environment.metadata.version
     monkeypatch.setattr(
-        circumstances.metadata, "version", lambda name: "0.0.1" if name == "scipy" else real(name)
+        environment.metadata, "version", lambda name: "0.0.1" if name == "scipy" else real(name)
     )
     monkeypatch.setattr(
         registry,

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from math import sqrt
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 
 _NOTABLE = 0.01  # difference of speeds [-]
 
 
-def bar_speed(seen: Seen) -> Iterator[Advice]:
+def bar_speed(seen: SceneFacts) -> Iterator[Advice]:
     """Whoever expects a slender bar finds it stiffer."""
     if seen.dimension != 1:
         return

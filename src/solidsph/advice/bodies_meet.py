@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen, SeenBody
+from solidsph.advice.scene_facts import BodyFacts, SceneFacts
 from solidsph.interfaces.effect import Need
 from solidsph.maths.arrays import Array
 
@@ -16,7 +16,7 @@ _NEAR = 1.5  # spacings between particles of bodies that touch
 _LOOKS = 50  # times at which the boxes are compared
 
 
-def bodies_meet(seen: Seen) -> Iterator[Advice]:
+def bodies_meet(seen: SceneFacts) -> Iterator[Advice]:
     """By the boxes of bodies, and where their momentum and the forces at the start carry them."""
     if len(seen.bodies) < 2 or not seen.lacks(Need.MEETING):
         return
@@ -39,7 +39,7 @@ def bodies_meet(seen: Seen) -> Iterator[Advice]:
         )
 
 
-def _way(seen: Seen, one: SeenBody, times: Array) -> Array:
+def _way(seen: SceneFacts, one: BodyFacts, times: Array) -> Array:
     """Displacement of a body's middle, (t, d) [m]; none along axes that hold it."""
     d = seen.dimension
     extent = one.body.extent
@@ -54,7 +54,7 @@ def _way(seen: Seen, one: SeenBody, times: Array) -> Array:
     return np.where(one.held_axes, 0.0, way)
 
 
-def _gap(a: SeenBody, b: SeenBody, ways: Array) -> Array:
+def _gap(a: BodyFacts, b: BodyFacts, ways: Array) -> Array:
     """Distance between the surfaces' boxes, (t,) [m]; negative where they overlap.
 
     Two boxes may overlap where the bodies do not: at the start the particles say so.

@@ -23,7 +23,7 @@ from solidsph.advice.nothing_happens import nothing_happens
 from solidsph.advice.overdamped import overdamped
 from solidsph.advice.overloaded import overloaded
 from solidsph.advice.pressed_at_start import pressed_at_start
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.advice.several_faces import several_faces
 from solidsph.advice.slow_load import slow_load
 from solidsph.advice.small_cover import small_cover
@@ -35,7 +35,7 @@ from solidsph.advice.unseen_motions import unseen_motions
 from solidsph.advice.viscosity_unneeded import viscosity_unneeded
 from solidsph.run.built_scene import BuiltScene
 
-Look = Callable[[Seen], Iterator[Advice]]
+Look = Callable[[SceneFacts], Iterator[Advice]]
 
 _LOOKS: tuple[Look, ...] = (
     nothing_happens,
@@ -67,12 +67,12 @@ ADVICE: Mapping[str, Look] = {look.__name__.replace("_", "-"): look for look in 
 """Every warning by its name."""
 
 
-def advised(simulation: BuiltScene) -> tuple[Advice, ...]:
+def advise(simulation: BuiltScene) -> tuple[Advice, ...]:
     """What there is to say about a built scene, less what it silences.
 
     To warn must never be why a run fails: a warning that cannot be formed is left out.
     """
-    seen, heard = Seen(simulation), []
+    seen, heard = SceneFacts(simulation), []
     for name, look in ADVICE.items():
         if name in simulation.scene.silence:
             continue

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 
 _A_PERIOD = 8.0  # outputs
 
 
-def coarse_outputs(seen: Seen) -> Iterator[Advice]:
+def coarse_outputs(seen: SceneFacts) -> Iterator[Advice]:
     """Of the slowest free vibration: quicker ones are seen less still."""
     if not seen.moves or seen.answering(Need.REST):
         return
@@ -27,7 +27,7 @@ def coarse_outputs(seen: Seen) -> Iterator[Advice]:
     )
 
 
-def _vibrates(seen: Seen, period: float) -> bool:
+def _vibrates(seen: SceneFacts, period: float) -> bool:
     """Whether something comes quickly enough to set the slowest vibration off."""
     imposed = [one for one in (*seen.loads, *seen.motions) if one.peak > 0.0]
     quick = any(one.rise < period for one in imposed)

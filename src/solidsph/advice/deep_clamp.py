@@ -8,14 +8,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.maths.arrays import Mask
 
 # Part of a body's particles that may be held for nothing.
 _SHARE = 0.1
 
 
-def deep_clamp(seen: Seen) -> Iterator[Advice]:
+def deep_clamp(seen: SceneFacts) -> Iterator[Advice]:
     """Held particles beyond the support of every free one do nothing but cost."""
     for one in seen.bodies:
         extent = one.body.extent

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 
 # Particles across, for gradients exact for linear fields and for quadratic ones. A cantilever ten
 # times as long as thick, at rest under its weight, sags too far by 117, 50, 29, 13 and 7 % with 3,
@@ -20,7 +20,7 @@ _SLENDER = 5.0
 _ALONG = 10
 
 
-def few_across(seen: Seen) -> Iterator[Advice]:
+def few_across(seen: SceneFacts) -> Iterator[Advice]:
     """By rays through the shape, normal to its surface."""
     for one in seen.bodies:
         least, usual = one.thicknesses

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 
 _FEW = 10
 
 
-def few_steps(seen: Seen) -> Iterator[Advice]:
+def few_steps(seen: SceneFacts) -> Iterator[Advice]:
     """A wave crosses about half a spacing a step."""
     if not seen.moves or seen.simulation.steps >= _FEW:
         return

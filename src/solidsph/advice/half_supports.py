@@ -8,14 +8,14 @@ from math import ceil
 import numpy as np
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen, SeenBody
+from solidsph.advice.scene_facts import BodyFacts, SceneFacts
 from solidsph.maths.arrays import Mask
 
 # In spacings: on the boundary, or in one plane, up to rounding.
 _ON = 1e-6
 
 
-def half_supports(seen: Seen) -> Iterator[Advice]:
+def half_supports(seen: SceneFacts) -> Iterator[Advice]:
     """By what a motion holds: particles on a face, along its normal and no other axis.
 
     A quarter of a sheet with a hole has a peak stress a third too high there, with ever more
@@ -41,7 +41,7 @@ def half_supports(seen: Seen) -> Iterator[Advice]:
             )
 
 
-def _plane(one: SeenBody, held: Mask) -> tuple[str, float, int] | None:
+def _plane(one: BodyFacts, held: Mask) -> tuple[str, float, int] | None:
     """Axis, place [m] and particles of the plane in which they are held, if there is one."""
     particles = one.body.particles
     X, near = particles.positions, _ON * one.spacing

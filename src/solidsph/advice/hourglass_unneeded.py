@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 
 
-def hourglass_unneeded(seen: Seen) -> Iterator[Advice]:
+def hourglass_unneeded(seen: SceneFacts) -> Iterator[Advice]:
     """Along a line there is no bending, and the control only stiffens the shortest waves."""
     if seen.dimension > 1:
         return

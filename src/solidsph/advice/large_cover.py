@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 from solidsph.interfaces.formulation import Configuration
 from solidsph.scene.default_cover import BLIND, held, own_cover
@@ -22,7 +22,7 @@ _PAIRING = {1: 6.0, 2: 4.0, 3: 3.3}
 _USUAL = 3.0
 
 
-def large_cover(seen: Seen) -> Iterator[Advice]:
+def large_cover(seen: SceneFacts) -> Iterator[Advice]:
     """By what the gradient holds on a lattice in rows, and by the neighbours that it brings."""
     d, cover = seen.dimension, seen.cover
     body = seen.simulation.model.bodies[0]

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from math import sqrt
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 
 _NEARLY = 0.49  # Poisson's ratio [-]
 _TOO_NEARLY = 0.4999
 
 
-def near_incompressible(seen: Seen) -> Iterator[Advice]:
+def near_incompressible(seen: SceneFacts) -> Iterator[Advice]:
     """Pressures oscillate, or the body locks; and steps are as small as the wave is fast."""
     if seen.dimension == 1:
         return

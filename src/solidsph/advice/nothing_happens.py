@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 
 
-def nothing_happens(seen: Seen) -> Iterator[Advice]:
+def nothing_happens(seen: SceneFacts) -> Iterator[Advice]:
     """No force, no imposed motion, no initial state."""
     if any(one.peak > 0.0 for one in seen.loads) or any(one.peak > 0.0 for one in seen.motions):
         return

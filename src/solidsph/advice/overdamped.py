@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from math import pi
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 
 _STRONG = 5.0  # times critical
 _LONG = 0.3  # of the duration
 
 
-def overdamped(seen: Seen) -> Iterator[Advice]:
+def overdamped(seen: SceneFacts) -> Iterator[Advice]:
     """Against the slowest free vibration, which damping at 2 omega brings to rest the soonest."""
     if not seen.moves:
         return

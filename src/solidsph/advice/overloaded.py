@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 
 _STRAIN = 3.0  # a stress, over Young's modulus
 _SPEED = 1.0  # a velocity, over the wave speed
@@ -17,7 +17,7 @@ _SAG = 30.0  # deflection of a cantilever under its weight by small strains, ove
 _UNITS = "check the units: Pa, m, s, m/s^2"
 
 
-def overloaded(seen: Seen) -> Iterator[Advice]:
+def overloaded(seen: SceneFacts) -> Iterator[Advice]:
     """Stress over stiffness, velocity over wave speed, displacement over size."""
     soft = min(seen.bodies, key=lambda one: one.youngs_modulus)
     for load in seen.loads:
@@ -58,7 +58,7 @@ def overloaded(seen: Seen) -> Iterator[Advice]:
             )
 
 
-def _sag(seen: Seen, acceleration: float) -> float:
+def _sag(seen: SceneFacts, acceleration: float) -> float:
     """q L^4 / (8 E I) of the slenderest supported body, over its length [-]."""
     if not acceleration > 0.0:
         return 0.0

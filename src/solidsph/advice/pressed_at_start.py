@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.compilable_terms import HourglassLoad
 from solidsph.interfaces.terms import EnergyTerm
 from solidsph.maths.arrays import Array
@@ -18,7 +18,7 @@ _PRESSED = 1e-3
 _LISTED = 3
 
 
-def pressed_at_start(seen: Seen) -> Iterator[Advice]:
+def pressed_at_start(seen: SceneFacts) -> Iterator[Advice]:
     """By the forces between bodies at the start, over the faces of the particles' cells."""
     particles = seen.simulation.particles
     faces = np.where(particles.ghosts, np.inf, particles.volumes) ** (1.0 - 1.0 / seen.dimension)
@@ -45,7 +45,7 @@ def pressed_at_start(seen: Seen) -> Iterator[Advice]:
             )
 
 
-def _pushed(seen: Seen, forces: Array) -> str:
+def _pushed(seen: SceneFacts, forces: Array) -> str:
     pushed = [
         f"{one.name!r} with {np.linalg.norm(forces[one.body.extent].sum(axis=0)):.3g} N"
         for one in seen.bodies

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.maths.arrays import Mask
 from solidsph.model.regions import AXES, Where, names_used
@@ -22,7 +22,7 @@ _SHOWN = 6  # faces of one load
 _AHEAD, _TOUCHING = 0.75, 1.5
 
 
-def several_faces(seen: Seen) -> Iterator[Advice]:
+def several_faces(seen: SceneFacts) -> Iterator[Advice]:
     """By the area that a load takes of each face.
 
     A corner that is picked by coordinates owns some of every face that meets there. Where the

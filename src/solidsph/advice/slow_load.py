@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import isfinite
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 from solidsph.interfaces.history import HistoryMaterial
 
@@ -14,7 +14,7 @@ from solidsph.interfaces.history import HistoryMaterial
 _RISING, _RESTING = 20.0, 40.0
 
 
-def slow_load(seen: Seen) -> Iterator[Advice]:
+def slow_load(seen: SceneFacts) -> Iterator[Advice]:
     """By the slowest period of the bodies; not where materials remember, or waves are imposed."""
     if (
         not seen.moves

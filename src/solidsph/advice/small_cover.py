@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel, smoothing_kernel
 from solidsph.maths.arrays import Array
 
@@ -19,7 +19,7 @@ _WRONG = 0.03
 _PLACES = (0.0, 0.25, 0.5)
 
 
-def small_cover(seen: Seen) -> Iterator[Advice]:
+def small_cover(seen: SceneFacts) -> Iterator[Advice]:
     """How far the kernel's sum over a lattice is from 1, at worst."""
     own = seen.simulation.model.bodies[0].smoothing
     wrong = _unevenness(own, seen.cover)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 
 # Waves across a spacing in which a load should rise.
 _CELLS = 4.0
 
 
-def sudden_load(seen: Seen) -> Iterator[Advice]:
+def sudden_load(seen: SceneFacts) -> Iterator[Advice]:
     """By the time of rise against that of a wave across a spacing."""
     if not seen.moves or not seen.lacks(Need.SHOCKS):
         return

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from itertools import combinations
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 
 
-def twice(seen: Seen) -> Iterator[Advice]:
+def twice(seen: SceneFacts) -> Iterator[Advice]:
     """Two of one kind with the same parameters act twice as much."""
     for (a, first), (b, other) in combinations(seen.simulation.effects.items(), 2):
         if first == other:

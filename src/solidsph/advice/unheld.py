@@ -7,14 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen, SeenBody
+from solidsph.advice.scene_facts import BodyFacts, SceneFacts
 from solidsph.interfaces.effect import Need
 from solidsph.maths.arrays import Array
 
 _FAR = 5.0  # lengths of the body
 
 
-def unheld(seen: Seen) -> Iterator[Advice]:
+def unheld(seen: SceneFacts) -> Iterator[Advice]:
     """How far the forces carry it in the duration; an equilibrium does not even exist."""
     if not seen.lacks(Need.MEETING):
         return
@@ -35,7 +35,7 @@ def unheld(seen: Seen) -> Iterator[Advice]:
         )
 
 
-def _pull(seen: Seen, one: SeenBody, moved: Array | float) -> Array:
+def _pull(seen: SceneFacts, one: BodyFacts, moved: Array | float) -> Array:
     """Mean acceleration at the end of the duration, were it `moved` [m], (d,) [m/s^2]."""
     simulation, extent = seen.simulation, one.body.extent
     masses = simulation.model.masses[extent]

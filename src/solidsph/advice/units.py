@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 
 # From foams and gels to heavy metals and diamond; most that is in g/cm^3 falls below.
 _DENSITIES = (10.0, 3e4)  # [kg/m^3]
 _SPEEDS = (0.3, 2e4)  # [m/s]
 
 
-def units(seen: Seen) -> Iterator[Advice]:
+def units(seen: SceneFacts) -> Iterator[Advice]:
     """Density and wave speed of every body, where its mass is of any effect."""
     if not seen.moves and not any(
         load.accelerations.any() and not load.on_surface for load in seen.loads

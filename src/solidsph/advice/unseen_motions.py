@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 
 # Velocity over wave speed, or strain, beyond which a motion is a violent one: a beam that swings by
@@ -13,7 +13,7 @@ from solidsph.interfaces.effect import Need
 _VIOLENT = 0.05
 
 
-def unseen_motions(seen: Seen) -> Iterator[Advice]:
+def unseen_motions(seen: SceneFacts) -> Iterator[Advice]:
     """The measured ones of docs/hourglass.md: some spacings high in a column thrown to the side."""
     if seen.dimension == 1 or not seen.moves or not seen.lacks(Need.UNSEEN_MOTIONS):
         return

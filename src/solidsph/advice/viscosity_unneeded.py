@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 
 # Waves across a spacing in which a load rises smoothly; a slow motion over the wave speed.
 _CELLS, _SLOW = 20.0, 0.02
 
 
-def viscosity_unneeded(seen: Seen) -> Iterator[Advice]:
+def viscosity_unneeded(seen: SceneFacts) -> Iterator[Advice]:
     """Smooth and slow: no force, imposed motion or initial velocity has a front."""
     viscous = seen.answering(Need.SHOCKS)
     if not viscous or len(seen.bodies) > 1:
@@ -33,7 +33,7 @@ def viscosity_unneeded(seen: Seen) -> Iterator[Advice]:
         )
 
 
-def _sudden(seen: Seen) -> bool:
+def _sudden(seen: SceneFacts) -> bool:
     slow = _CELLS * seen.cell_time
     return any(one.on_surface and one.peak > 0.0 and one.rise < slow for one in seen.loads) or any(
         one.jump > 1e-4 * seen.first.speed for one in seen.motions

@@ -41,7 +41,7 @@ from solidsph.interfaces.shape import Shape
 from solidsph.scene.part_maker import PartMaker, Parts
 from solidsph.model.fields import VectorField
 from solidsph.model.particles import Particles, State
-from solidsph.results.shown import clashes
+from solidsph.results.output_fields import clashes
 from solidsph.scene.placed_parts import PlacedParts
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import MOST_STEPS

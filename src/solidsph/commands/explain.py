@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import click
 
-from solidsph.advice import advised
+from solidsph.advice import advise
 from solidsph.commands import prediction as told
 from solidsph.commands.console import say, show_json, show_table
 from solidsph.commands.target import parameters, resolve
@@ -141,7 +141,7 @@ def _explained(
         "effects": _effects(simulation.effects, simulation, shares(simulation, machine)),
         "warnings": [
             {"name": a.name, "found": a.found, "expected": a.expected, "remedy": a.remedy}
-            for a in advised(simulation)
+            for a in advise(simulation)
         ],
         "silenced": list(scene.silence),
     }

@@ -139,7 +139,7 @@ def run(
 
 def _make_way(path: Path, *, overwrite: bool) -> None:
     """Say what a new record takes the place of, if it may."""
-    from solidsph.results.left import check_replaceable
+    from solidsph.results.earlier_run import check_replaceable
     from solidsph.results.sole_writer import check_no_writer
 
     check_no_writer(path)
@@ -183,7 +183,7 @@ def _run_scene(
     shown: bool,
     as_json: bool,
 ) -> None:
-    from solidsph.advice import advised
+    from solidsph.advice import advise
     from solidsph.commands import prediction as told
     from solidsph.commands.receipted import of_scene, show_receipts
     from solidsph.commands.warned import warn
@@ -192,7 +192,7 @@ def _run_scene(
     known = facts()
     known |= {"scene": target, "record": str(path), "warnings": []}
     simulation, build = told.built(scene)
-    advice = advised(simulation)
+    advice = advise(simulation)
     known["warnings"] += [one.line for one in advice]
     if not as_json:
         warn({"": advice})
@@ -285,7 +285,7 @@ def _run_case(
     shown: bool,
     as_json: bool,
 ) -> None:
-    from solidsph.advice import Advice, advised
+    from solidsph.advice import Advice, advise
     from solidsph.commands import prediction as told
     from solidsph.commands.receipted import of_case, show_case_receipts
     from solidsph.commands.warned import warn
@@ -302,7 +302,7 @@ def _run_case(
             case_predictions[name] = told.of_run(simulation, None, frozenset(compiled))
             compiled.update(told.compilations(case_predictions[name]))
             before = {one.name for several in advice.values() for one in several}
-            advice[name] = advised(simulation)
+            advice[name] = advise(simulation)
             if advice[name]:
                 known["warnings"][name] = [one.line for one in advice[name]]
             if not as_json:  # each warning once a case, at the first scene that it is about

@@ -13,7 +13,7 @@ from solidsph.errors import RecordError
 from solidsph.interfaces.terms import Observation
 from solidsph.model.particles import State
 from solidsph.results.checkpoint import Checkpoint, checkpoint_path, write_checkpoint
-from solidsph.results.circumstances import circumstances
+from solidsph.results.environment import circumstances
 from solidsph.results.recorder import scene_text
 from solidsph.run.hooks import implementation
 from solidsph.run.outcome import is_over

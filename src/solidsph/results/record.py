@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from solidsph.errors import RecordError
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import Face, Particles
-from solidsph.results.conformity import Tree, check_first, check_rest, check_values
 from solidsph.results.digest import Reference, step_digest
+from solidsph.results.hdf5_source import SIGNATURE, Source, is_unclosed
 from solidsph.results.layout import (
     FORMAT,
     HDF5_ERRORS,
@@ -30,7 +30,7 @@ from solidsph.results.layout import (
     tag_name,
     unpadded,
 )
-from solidsph.results.unclosed import SIGNATURE, Source, is_unclosed
+from solidsph.results.layout_checks import Tree, check_first, check_rest, check_values
 
 T = TypeVar("T")
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from solidsph.errors import RecordError, SceneError
 from solidsph.interfaces.terms import Observation
-from solidsph.results.left import check_no_other_file
+from solidsph.results.earlier_run import check_no_other_file
+from solidsph.results.output_fields import OWN, history, parted
+from solidsph.results.output_fields import fields as shown_fields
 from solidsph.results.record import Record
 from solidsph.results.record_writer import EarlierStep, Field, PluginUsed, RecordWriter
-from solidsph.results.shown import OWN, history, parted
-from solidsph.results.shown import fields as shown_fields
 from solidsph.run.energy import KINETIC, STRAIN, kinetic_energy, strain_energy
 from solidsph.run.hooks import implementation
 from solidsph.run.restart_point import RestartPoint

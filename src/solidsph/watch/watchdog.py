@@ -13,12 +13,12 @@ from solidsph.interfaces.terms import Observation
 from solidsph.model.particles import State
 from solidsph.run.accounts import Accounts
 from solidsph.run.hooks import implementation
-from solidsph.watch.crowding import CollapsingNeighbours
-from solidsph.watch.hourglass import StoredBesides
+from solidsph.watch.collapsing_neighbours import CollapsingNeighbours
+from solidsph.watch.faster_than_sound import FasterThanSound
+from solidsph.watch.hourglass_energy import HourglassEnergy
 from solidsph.watch.soundness import allowed, part_of_play
-from solidsph.watch.speed import FasterThanSound
 from solidsph.watch.symptom import Finding, Grade, Symptom
-from solidsph.watch.volume import VanishingVolume
+from solidsph.watch.vanishing_volume import VanishingVolume
 
 if TYPE_CHECKING:
     from solidsph.maths.arrays import Array
@@ -28,7 +28,7 @@ SYMPTOMS: Sequence[Symptom] = (
     VanishingVolume(),
     FasterThanSound(),
     CollapsingNeighbours(),
-    StoredBesides(),
+    HourglassEnergy(),
 )
 """What is looked for unless something else is asked for."""
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @final
 @attrs.frozen
-class StoredBesides(Symptom):
+class HourglassEnergy(Symptom):
     """What a control of unseen motions stores is much beside the strain energy."""
 
     # What conditions store is another pass over all pairs, by arrays: some ten steps or so.

@@ -1,4 +1,4 @@
-"""Seen: a built scene as warnings look at it, each fact found once and only if asked for."""
+"""SceneFacts: a built scene as warnings look at it, each fact found once and only if asked for."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _ROUGH = 0.01
 
 
 @attrs.frozen(eq=False, slots=False)
-class SeenBody:
+class BodyFacts:
     """One body."""
 
     body: Body
@@ -135,7 +135,7 @@ class SeenBody:
 
 
 @attrs.frozen(eq=False, slots=False)
-class Seen:
+class SceneFacts:
     """A built scene."""
 
     simulation: BuiltScene
@@ -182,11 +182,11 @@ class Seen:
         return type(formulation.gradient).of_body is not Gradient.of_body
 
     @cached_property
-    def bodies(self) -> Sequence[SeenBody]:
+    def bodies(self) -> Sequence[BodyFacts]:
         particles = self.simulation.particles
         held = self._stays_behind | (self.freedoms & ~particles.ghosts[:, None])
         return [
-            SeenBody(
+            BodyFacts(
                 body,
                 construct("shapes", self.simulation.scene.bodies[body.name].shape),
                 np.asarray(held[body.extent].any(axis=0)),
@@ -272,7 +272,7 @@ class Seen:
         return max(velocity / one.speed, strained, moved / one.speed)
 
     @property
-    def first(self) -> SeenBody:
+    def first(self) -> BodyFacts:
         """The body with the fastest waves across a spacing."""
         return min(self.bodies, key=lambda one: one.spacing / one.speed)
 

@@ -17,7 +17,7 @@ _ENDED = (FINISHED, "diverged", "unsound", "ConvergenceError")
 
 
 @attrs.frozen
-class Left:
+class EarlierRun:
     """An earlier run, as far as its record tells."""
 
     path: Path
@@ -61,7 +61,7 @@ def check_no_other_file(path: Path) -> None:
         ) from None
 
 
-def left_at(path: Path) -> Left | None:
+def earlier_run_at(path: Path) -> EarlierRun | None:
     """What is there; None if nothing is.
 
     Raises:
@@ -73,18 +73,18 @@ def left_at(path: Path) -> Left | None:
     try:
         with Record(path) as record:
             until = float(record.times[-1]) if record.count else 0.0
-            return Left(path, record.outcome, record.count, until, record.scene)
+            return EarlierRun(path, record.outcome, record.count, until, record.scene)
     except RecordError:
-        return Left(path)
+        return EarlierRun(path)
 
 
-def check_replaceable(path: Path, *, overwrite: bool) -> Left | None:
+def check_replaceable(path: Path, *, overwrite: bool) -> EarlierRun | None:
     """What a new run may take the place of; None if nothing is there.
 
     Raises:
         RecordError: it is no record, or, without `overwrite`, a run that can be gone on with.
     """
-    left = left_at(path)
+    left = earlier_run_at(path)
     if left is not None and left.can_go_on and not overwrite:
         raise RecordError(
             f"{path} holds {left.told()}; go on with it (solidsph resume {path}), or replace it "
