@@ -40,7 +40,7 @@ def test_a_flaw_is_named_and_nothing_else(flawed: Flawed) -> None:
     found = heard(flawed.toml)
     assert {one.name for one in found} == {flawed.name}
     assert flawed.remedy in found[0].remedy
-    assert found[0].found
+    assert found[0].finding
     assert found[0].expected
 
 
@@ -57,13 +57,13 @@ def test_every_warning_has_a_flawed_scene() -> None:
 @pytest.mark.parametrize("toml", [*(one.toml for one in FLAWED), *SOUND], ids=title)
 def test_no_warning_fails_where_it_could_be_formed(toml: str) -> None:
     """`advise` leaves out what fails; here it would show."""
-    seen = SceneFacts(built(toml))
-    for look in ADVICE.values():
-        list(look(seen))
+    facts = SceneFacts(built(toml))
+    for check in ADVICE.values():
+        list(check(facts))
 
 
 def test_a_warning_that_fails_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(seen: SceneFacts) -> Iterator[Advice]:
+    def broken(facts: SceneFacts) -> Iterator[Advice]:
         raise RuntimeError("a fault")
         yield
 

@@ -94,7 +94,7 @@ def test_the_plane_is_named(axis: str) -> None:
     behind = {"x": "bottom", "y": "left"}[axis]
     built = quarter({**ON, "ghosts": 4, "ghost_faces": [behind]}).build()
     (heard,) = warnings(built)
-    assert f"on the plane of symmetry {axis} = 0 m (" in heard.found
+    assert f"on the plane of symmetry {axis} = 0 m (" in heard.finding
     assert "ghosts = 4" in heard.remedy
 
 
@@ -110,7 +110,7 @@ def test_rollers_on_a_face_are_a_plane_of_symmetry_too() -> None:
 def test_a_plane_is_told_without_its_rounding() -> None:
     """The rows of a lattice that conforms come to rest at 1e-20 m, and that is no place."""
     for one in warnings(quarter("conforming-lattice").build()):
-        assert " = 0 m (" in one.found
+        assert " = 0 m (" in one.finding
 
 
 def test_no_false_alarm() -> None:

@@ -230,7 +230,7 @@ def test_faces_that_are_met_and_not_named_are_told_with_their_shares(
     where: Any, tags: Mapping[str, Any], shares: str | None
 ) -> None:
     made = scene(tags=tags).boundary("traction", where=where, traction={"y": 1.0}).build()
-    told = [one.found for one in advise(made) if one.name == "several-faces"]
+    told = [one.finding for one in advise(made) if one.name == "several-faces"]
     assert len(told) == (shares is not None)
     assert all(str(shares) in one for one in told)
 
@@ -393,7 +393,7 @@ def test_what_ghosts_hold_is_held() -> None:
             .statics()
             .build()
         )
-        return [one.found for one in advise(made) if one.name == "unheld"]
+        return [one.finding for one in advise(made) if one.name == "unheld"]
 
     assert quarter(x=1.0) == []
     (told,) = quarter(y=1.0)  # along the plane nothing holds it

@@ -227,7 +227,7 @@ def test_a_full_disk_at_the_first_output_keeps_the_older_record(
                 raise OSError("the disk is full")
 
         calls.clear()
-        monkeypatch.setattr("solidsph.results.record_writer._try_room", full)
+        monkeypatch.setattr("solidsph.results.record_writer.check_space", full)
         assert "the disk is full" in refusal(lambda: moving().run(record=path))
         assert path.read_bytes() == before
         assert not list(tmp_path.glob("*.partial"))
@@ -292,9 +292,9 @@ def test_records_of_two_suffixes_have_a_checkpoint_each(tmp_path: Path) -> None:
 
 
 def test_an_unsound_run_did_not_end_early(tmp_path: Path) -> None:
-    left = EarlierRun(tmp_path / "run.h5", "unsound: the energies do not add up", 5, 0.25)
-    assert left.told() == "an unsound run up to t = 0.25 s"
-    assert not left.can_go_on
+    earlier = EarlierRun(tmp_path / "run.h5", "unsound: the energies do not add up", 5, 0.25)
+    assert earlier.description == "an unsound run up to t = 0.25 s"
+    assert not earlier.can_resume
 
 
 def test_a_link_stays_and_a_file_without_a_byte_is_nothing(tmp_path: Path) -> None:

@@ -677,7 +677,7 @@ def test_an_end_that_never_comes_is_refused(tmp_path: Path) -> None:
         ({"steps": lambda n: 10**18}, "damaged"),
         ({"halvings": lambda n: 10**9}, "damaged"),
         ({"step_size": lambda h: 0.0}, "damaged"),
-        ({"circumstances": lambda c: {"numpy": 3}}, "damaged"),
+        ({"environment": lambda e: {"numpy": 3}}, "damaged"),
         *(
             ({"kept": lambda k, name=name, wrong=wrong: {**k, name: wrong}}, "delete it and resume")
             for name in ("soundness", "soundness rises")

@@ -1,9 +1,10 @@
-"""All warnings, and what a scene does to hear them or not."""
+"""All warnings, and those that a scene gets."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 
 import attrs
 import numpy as np
@@ -35,9 +36,9 @@ from solidsph.advice.unseen_motions import unseen_motions
 from solidsph.advice.viscosity_unneeded import viscosity_unneeded
 from solidsph.run.built_scene import BuiltScene
 
-Look = Callable[[SceneFacts], Iterator[Advice]]
+Check = Callable[[SceneFacts], Iterator[Advice]]
 
-_LOOKS: tuple[Look, ...] = (
+_CHECKS: tuple[Check, ...] = (
     nothing_happens,
     units,
     overloaded,
@@ -63,29 +64,26 @@ _LOOKS: tuple[Look, ...] = (
     few_steps,
 )
 
-ADVICE: Mapping[str, Look] = {look.__name__.replace("_", "-"): look for look in _LOOKS}
+ADVICE: Mapping[str, Check] = {check.__name__.replace("_", "-"): check for check in _CHECKS}
 """Every warning by its name."""
 
 
 def advise(simulation: BuiltScene) -> tuple[Advice, ...]:
-    """What there is to say about a built scene, less what it silences.
+    """All warnings about a built scene, except for those that it silences.
 
-    To warn must never be why a run fails: a warning that cannot be formed is left out.
+    A warning must never make a run fail: one whose check raises is left out.
     """
-    seen, heard = SceneFacts(simulation), []
-    for name, look in ADVICE.items():
+    facts, warnings = SceneFacts(simulation), []
+    for name, check in ADVICE.items():
         if name in simulation.scene.silence:
             continue
-        try:
-            with np.errstate(all="ignore"):
-                heard += [attrs.evolve(one, name=name) for one in look(seen)]
-        except Exception:
-            continue
-    return tuple(heard)
+        with suppress(Exception), np.errstate(all="ignore"):
+            warnings += [attrs.evolve(advice, name=name) for advice in check(facts)]
+    return tuple(warnings)
 
 
-def unknown(silenced: Sequence[str]) -> Iterable[str]:
-    """A problem for each name that no warning has, with its remedy."""
+def unknown_names(silenced: Sequence[str]) -> Iterable[str]:
+    """Problem and remedy for each silenced name that no warning has."""
     for name in silenced:
         if name not in ADVICE:
             near = difflib.get_close_matches(name, ADVICE, 1)

@@ -10,14 +10,14 @@ from solidsph.advice.scene_facts import SceneFacts
 _FEW = 10
 
 
-def few_steps(seen: SceneFacts) -> Iterator[Advice]:
-    """A wave crosses about half a spacing a step."""
-    if not seen.moves or seen.simulation.steps >= _FEW:
+def few_steps(facts: SceneFacts) -> Iterator[Advice]:
+    """By the number of steps; a wave crosses about half a spacing in each."""
+    if not facts.is_motion or facts.simulation.steps >= _FEW:
         return
-    longest = max(one.transit for one in seen.bodies)
+    longest = max(body.transit for body in facts.bodies)
     yield Advice(
-        found=f"the duration of {seen.scene.duration:.3g} s is {seen.simulation.steps} steps of "
-        f"{seen.simulation.step_size:.2g} s",
-        expected=f"as long as a wave needs through the body, {longest:.2g} s, or longer",
+        finding=f"the duration of {facts.scene.duration:.3g} s is {facts.simulation.steps} steps "
+        f"of {facts.simulation.step_size:.2g} s",
+        expected=f"at least the time of a wave through the body, {longest:.2g} s",
         remedy="a longer duration, or check the units of modulus and density",
     )

@@ -1,4 +1,4 @@
-"""A control of motions that the gradient sees anyway."""
+"""Hourglass control in one dimension, where the gradient sees all motions."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 
 
-def hourglass_unneeded(seen: SceneFacts) -> Iterator[Advice]:
-    """Along a line there is no bending, and the control only stiffens the shortest waves."""
-    if seen.dimension > 1:
+def hourglass_unneeded(facts: SceneFacts) -> Iterator[Advice]:
+    """By the dimension: a bar has no bending, and control only stiffens its shortest waves."""
+    if facts.dimension > 1:
         return
-    for label in seen.answering(Need.UNSEEN_MOTIONS):
+    for label in facts.effects_for(Need.UNSEEN_MOTIONS):
         yield Advice(
-            found=f"{label!r} is for motions of two and three dimensions, and this is a bar",
+            finding=f"{label!r} is for motions of two and three dimensions, and this is a bar",
             expected="no control in one dimension: it changes only the shortest waves",
             remedy="leave the effect out",
         )

@@ -1,33 +1,38 @@
-"""SceneFacts: a built scene as warnings look at it, each fact found once and only if asked for."""
+"""Facts about a built scene that warnings look at, each found once and only if asked for."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
 from math import sqrt
-from typing import Any
 
 import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.advice import load_histories
+from solidsph.advice.load_histories import (
+    LoadHistory,
+    MotionHistory,
+    TimeHistory,
+    load_histories,
+    motion_histories,
+)
 from solidsph.advice.thickness import through
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.gradient import Gradient
-from solidsph.interfaces.shape import Shape
 from solidsph.interfaces.terms import GhostConstraint
 from solidsph.maths.arrays import Array, Mask
 from solidsph.registry.construct import construct
 from solidsph.run.built_scene import BuiltScene
 from solidsph.scene.default_cover import cover_of
+from solidsph.scene.scene import Scene
 
-# Particles of a body that are asked whether they are in its shape.
+# Particles of a body that are checked to be in its shape.
 _SAMPLES = 400
 
-# Particles looked at where neighbours are compared.
+# Particles whose neighbours are compared.
 _LOOKED_AT = 4000
 
 # Velocity over the wave speed by which a field may miss a linear one: what a twist bends within a
@@ -37,15 +42,19 @@ _ROUGH = 0.01
 
 @attrs.frozen(eq=False, slots=False)
 class BodyFacts:
-    """One body."""
+    """One body; units are SI."""
 
     body: Body
-    shape: Shape
-    held_axes: Mask  # (d,) along which some motion keeps it from moving away
+    held_axes: Mask  # (d,) axes along which some constraint keeps it from moving away
 
     @property
     def name(self) -> str:
         return self.body.name
+
+    @property
+    def extent(self) -> slice:
+        """Its place among all particles."""
+        return self.body.extent
 
     @property
     def dimension(self) -> int:
@@ -53,12 +62,17 @@ class BodyFacts:
 
     @property
     def spacing(self) -> float:
-        """Smallest of its particles [m]."""
+        """Smallest spacing of its particles [m]."""
         return float(self.body.particles.spacings.min())
 
     @property
+    def exact_degree(self) -> int:
+        """Degree of the polynomials for which its gradient is exact."""
+        return self.body.formulation.gradient.exact_degree
+
+    @property
     def speed(self) -> float:
-        """Of confined waves [m/s]."""
+        """Speed of confined waves [m/s]."""
         return self.body.material.wave_speed
 
     @property
@@ -82,48 +96,49 @@ class BodyFacts:
         return 2.0 * mu * (1.0 + self.poissons_ratio)
 
     @property
-    def supported(self) -> bool:
+    def is_held(self) -> bool:
         return bool(self.held_axes.any())
 
     @cached_property
     def real(self) -> Array:
-        """Positions of its particles, without ghosts, (k, d) [m]."""
+        """Reference positions of its particles, without ghosts, (k, d) [m]."""
         return self.body.particles.positions[~self.body.particles.ghosts]
 
     @cached_property
     def length(self) -> float:
-        """Its largest extent along an axis [m]."""
+        """Largest extent along an axis [m]."""
         return float((np.ptp(self.real, axis=0) + self.spacing).max())
 
     @cached_property
     def thicknesses(self) -> tuple[float, float]:
-        """Smallest and usual way through it, normal to its surface [m]."""
+        """Smallest and usual thickness, normal to its surface [m].
+
+        Raises:
+            ValueError: its particles were moved away from its shape.
+        """
         if self.dimension == 1:
             return self.length, self.length
-        if self._moved:
+        shape = self.body.shape
+        samples = self.real[:: max(1, len(self.real) // _SAMPLES)]
+        if (shape.signed_distance(samples) > self.spacing).mean() > 0.02:
             raise ValueError("particles do not stand where the shape is")
-        rays = through(self.shape, self.spacing)
+        rays = through(shape, self.spacing)
         some = self.real[:: max(1, len(self.real) // _LOOKED_AT)]
-        widest = 2.0 * float(-self.shape.signed_distance(some).min())
+        widest = 2.0 * float(-shape.signed_distance(some).min())
         return rays.least(widest), rays.usual(widest)
 
     @property
-    def _moved(self) -> bool:
-        X = self.real[:: max(1, len(self.real) // _SAMPLES)]
-        return bool((self.shape.signed_distance(X) > self.spacing).mean() > 0.02)
-
-    @cached_property
     def transit(self) -> float:
         """Time of a wave along it [s]."""
         return self.length / self.speed
 
     @cached_property
     def slowest_period(self) -> float:
-        """Of its free vibration, held or not, about: that of a bar or a cantilever [s]."""
-        along = 4.0 * self.length / sqrt(self.youngs_modulus / self.density)
+        """Approximate period of its slowest free vibration, as of a bar or a cantilever [s]."""
         if self.dimension == 1:
             return 4.0 * self.transit
-        if not self.supported:
+        along = 4.0 * self.length / sqrt(self.youngs_modulus / self.density)
+        if not self.is_held:
             return 0.5 * along
         # The first bending of a cantilever: omega = 3.516 / L^2 sqrt(E I / (rho A)).
         thickness = self.thicknesses[1]
@@ -141,20 +156,20 @@ class SceneFacts:
     simulation: BuiltScene
 
     @property
-    def scene(self) -> Any:
+    def scene(self) -> Scene:
         return self.simulation.scene
 
     @property
-    def moves(self) -> bool:
-        """Whether it is a motion and no equilibrium."""
-        return self.simulation.scene.statics is None
+    def is_motion(self) -> bool:
+        """Whether it is a motion, not an equilibrium."""
+        return self.scene.statics is None
 
     @property
     def dimension(self) -> int:
         return self.simulation.particles.dimension
 
-    def answering(self, need: Need) -> dict[str, Effect]:
-        """Effects that are for this, by label."""
+    def effects_for(self, need: Need) -> dict[str, Effect]:
+        """Effects that answer a need, by label."""
         return {
             label: effect
             for label, effect in self.simulation.effects.items()
@@ -162,126 +177,137 @@ class SceneFacts:
         }
 
     def lacks(self, need: Need) -> bool:
-        """Whether nothing answers it; an effect that does not say what it is for may."""
-        return not self.answering(need) and not self._undeclared
-
-    @property
-    def _undeclared(self) -> bool:
-        return any(effect.answers is None for effect in self.simulation.effects.values())
+        """Whether nothing answers a need; an effect that does not declare its needs may."""
+        undeclared = any(effect.answers is None for effect in self.simulation.effects.values())
+        return not self.effects_for(need) and not undeclared
 
     @cached_property
     def cover(self) -> float:
         """Support radius in particle spacings, the scene's or the kernel's own."""
-        return cover_of(self.simulation.scene)
+        return cover_of(self.scene)
 
     @cached_property
     def fits_surface(self) -> bool:
-        """Whether the gradient is changed for each body as a whole, so that sums end right where
-        the body does."""
-        formulation: Formulation = construct("formulations", self.simulation.scene.formulation)
+        """Whether the gradient is corrected for each body, so that sums are right at surfaces."""
+        formulation: Formulation = construct("formulations", self.scene.formulation)
         return type(formulation.gradient).of_body is not Gradient.of_body
 
     @cached_property
     def bodies(self) -> Sequence[BodyFacts]:
-        particles = self.simulation.particles
-        held = self._stays_behind | (self.freedoms & ~particles.ghosts[:, None])
+        held = self._fixed_ghosts | (self.held & ~self.simulation.particles.ghosts[:, None])
         return [
-            BodyFacts(
-                body,
-                construct("shapes", self.simulation.scene.bodies[body.name].shape),
-                np.asarray(held[body.extent].any(axis=0)),
-            )
+            BodyFacts(body, np.asarray(held[body.extent].any(axis=0)))
             for body in self.simulation.model.bodies
         ]
 
     @cached_property
-    def freedoms(self) -> Mask:
-        """(n, d) that some motion determines."""
+    def held(self) -> Mask:
+        """(n, d) components of motion that some constraint prescribes."""
         held = np.zeros(self.simulation.particles.positions.shape, dtype=np.bool_)
         for motion in self.simulation.dynamics.constraints:
             held |= motion.held
         return held
 
-    @cached_property
-    def _stays_behind(self) -> Mask:
-        """(n, d) ghosts that do not go along where all else is moved: those of a symmetry plane."""
-        behind = np.zeros(self.freedoms.shape, dtype=np.bool_)
-        followers = [
-            motion
-            for motion in self.simulation.dynamics.constraints
-            if isinstance(motion, GhostConstraint)
-        ]
+    @property
+    def _fixed_ghosts(self) -> Mask:
+        """(n, d) ghosts that stay where all else is moved: those of a symmetry plane."""
+        fixed = np.zeros(self.held.shape, dtype=np.bool_)
+        constraints = self.simulation.dynamics.constraints
+        followers = [motion for motion in constraints if isinstance(motion, GhostConstraint)]
         for axis in range(self.dimension if followers else 0):
-            moved = np.zeros(self.freedoms.shape)
+            moved = np.zeros(self.held.shape)
             moved[:, axis] = 1.0
             for motion in followers:
                 motion.impose(0.0, 0, moved)
-            behind[:, axis] = np.abs(moved[:, axis] - 1.0) > 0.5
-        return behind
+            fixed[:, axis] = np.abs(moved[:, axis] - 1.0) > 0.5
+        return fixed
 
     @cached_property
-    def loads(self) -> Sequence[load_histories.LoadHistory]:
-        return list(load_histories.loads(self.simulation))
+    def loads(self) -> Sequence[LoadHistory]:
+        return list(load_histories(self.simulation))
 
     @cached_property
-    def motions(self) -> Sequence[load_histories.Motion]:
-        return list(load_histories.motions(self.simulation))
+    def motions(self) -> Sequence[MotionHistory]:
+        return list(motion_histories(self.simulation))
+
+    @property
+    def imposed(self) -> Sequence[TimeHistory]:
+        """Loads and motions that are not zero."""
+        return [history for history in (*self.loads, *self.motions) if history.peak > 0.0]
+
+    def acceleration(
+        self, body: BodyFacts, time: float, positions: Array, velocities: Array
+    ) -> Array:
+        """Mean acceleration of a body by all loads, (d,) [m/s^2]."""
+        extent = body.extent
+        mass = self.simulation.model.masses[extent].sum()
+        mean = np.zeros(self.dimension)
+        for load in self.simulation.dynamics.loads:
+            forces = load.forces(time, positions, velocities)
+            own = (load.particles >= extent.start) & (load.particles < extent.stop)
+            mean += forces[own].sum(axis=0) / mass
+        return mean
 
     @cached_property
     def velocities(self) -> Array:
-        """(n, d) at the start, with what is imposed then [m/s]."""
+        """(n, d) velocities at the start, prescribed ones included [m/s]."""
         return self.simulation.dynamics.carry(0.0, self.simulation.initial.velocities)
 
     @cached_property
     def displacements(self) -> Array:
-        """(n, d) at the start [m]."""
+        """(n, d) displacements at the start [m]."""
         initial, particles = self.simulation.initial, self.simulation.particles
         return self.simulation.dynamics.place(0.0, initial.positions) - particles.positions
+
+    @property
+    def starts_at_rest(self) -> bool:
+        """Whether nothing moves or is displaced at the start."""
+        return not (self.velocities.any() or self.displacements.any())
 
     @cached_property
     def velocity_jump(self) -> float:
         """Largest jump of the velocity at the start, over the wave speed [-].
 
-        Where it is not smooth, the largest difference between neighbours. Smooth is what the linear
-        field fits that is nearest to it around a particle: a body that turns or stretches.
+        Where the velocity is not smooth, the largest difference between neighbours. It is smooth
+        where the nearest linear field around a particle fits: in a body that turns or stretches.
         """
         worst = 0.0
-        for one in self.bodies:
-            V = self.velocities[one.body.extent][~one.body.particles.ghosts]
+        for body in self.bodies:
+            V = self.velocities[body.extent][~body.body.particles.ghosts]
             near = 4 * self.dimension + 1
             if not V.any() or len(V) < near:
                 continue
             chosen = np.linspace(0, len(V) - 1, min(len(V), _LOOKED_AT)).astype(np.intp)
-            _, others = cKDTree(one.real).query(one.real[chosen], near)
-            offsets = (one.real[others] - one.real[chosen][:, None, :]) / one.spacing
+            _, others = cKDTree(body.real).query(body.real[chosen], near)
+            offsets = (body.real[others] - body.real[chosen][:, None, :]) / body.spacing
             linear = np.concatenate([np.ones((*others.shape, 1)), offsets], axis=2)
             fitted = linear @ (np.linalg.pinv(linear) @ V[others])
-            rough = np.linalg.norm(V[others] - fitted, axis=2).max(axis=1) > _ROUGH * one.speed
+            rough = np.linalg.norm(V[others] - fitted, axis=2).max(axis=1) > _ROUGH * body.speed
             if rough.any():
                 apart = np.linalg.norm(V[others][rough] - V[chosen][rough, None, :], axis=2)
-                worst = max(worst, float(apart.max()) / one.speed)
+                worst = max(worst, float(apart.max()) / body.speed)
         return worst
 
     @cached_property
     def vigour(self) -> float:
         """Largest velocity over the wave speed, or strain by a load, that is asked for [-]."""
-        one = self.first
+        body = self.fastest
         velocity = float(abs(self.velocities).max(initial=0.0))
-        strained = max((float(load.stresses.max()) / one.modulus for load in self.loads), default=0)
+        strain = max((float(load.stresses.max()) / body.modulus for load in self.loads), default=0)
         moved = max((float(motion.speeds.max()) for motion in self.motions), default=0.0)
-        return max(velocity / one.speed, strained, moved / one.speed)
+        return max(velocity / body.speed, strain, moved / body.speed)
 
     @property
-    def first(self) -> BodyFacts:
-        """The body with the fastest waves across a spacing."""
-        return min(self.bodies, key=lambda one: one.spacing / one.speed)
+    def fastest(self) -> BodyFacts:
+        """The body in which a wave crosses a spacing in the shortest time."""
+        return min(self.bodies, key=lambda body: body.spacing / body.speed)
 
     @property
     def cell_time(self) -> float:
-        """Of a wave across a spacing [s]."""
-        return self.first.spacing / self.first.speed
+        """Shortest time of a wave across a spacing [s]."""
+        return self.fastest.spacing / self.fastest.speed
 
-    @cached_property
+    @property
     def slowest_period(self) -> float:
-        """Of the slowest body [s]."""
-        return max(one.slowest_period for one in self.bodies)
+        """Slowest period of all bodies [s]."""
+        return max(body.slowest_period for body in self.bodies)

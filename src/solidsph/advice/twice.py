@@ -1,4 +1,4 @@
-"""The same effect twice."""
+"""The same effect twice: it acts twice as much."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from solidsph.advice.advice import Advice
 from solidsph.advice.scene_facts import SceneFacts
 
 
-def twice(seen: SceneFacts) -> Iterator[Advice]:
-    """Two of one kind with the same parameters act twice as much."""
-    for (a, first), (b, other) in combinations(seen.simulation.effects.items(), 2):
-        if first == other:
+def twice(facts: SceneFacts) -> Iterator[Advice]:
+    """By kind and parameters."""
+    for (a, first), (b, second) in combinations(facts.simulation.effects.items(), 2):
+        if first == second:
             yield Advice(
-                found=f"{a!r} and {b!r} are the same effect with the same parameters",
+                finding=f"{a!r} and {b!r} are the same effect with the same parameters",
                 expected="each once",
                 remedy="leave one out, or state where each acts",
             )

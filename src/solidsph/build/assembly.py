@@ -41,7 +41,7 @@ from solidsph.interfaces.shape import Shape
 from solidsph.scene.part_maker import PartMaker, Parts
 from solidsph.model.fields import VectorField
 from solidsph.model.particles import Particles, State
-from solidsph.results.output_fields import clashes
+from solidsph.results.output_fields import name_clashes
 from solidsph.scene.placed_parts import PlacedParts
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import MOST_STEPS
@@ -76,7 +76,7 @@ class Assembly:
         if scene.silence:
             from solidsph import advice  # only where its names are asked for
 
-            problems.add(advice.unknown(scene.silence))
+            problems.add(advice.unknown_names(scene.silence))
         words = self._words
         words.stop_if_any()
         parts = words.parts
@@ -136,7 +136,7 @@ class Assembly:
         remembered = [body for body in made if isinstance(body.material, HistoryMaterial)]
         if remembered:
             terms.append(HistoryFields(remembered, particles.count))
-        problems.add(clashes(_at_rest(problems.settled(initial), model, terms), terms))
+        problems.add(name_clashes(_at_rest(problems.settled(initial), model, terms), terms))
         problems.stop_if_any()
 
         made_ready = kind(

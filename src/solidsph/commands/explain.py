@@ -140,7 +140,7 @@ def _explained(
         "cost": told.prediction_rows(found),
         "effects": _effects(simulation.effects, simulation, shares(simulation, machine)),
         "warnings": [
-            {"name": a.name, "found": a.found, "expected": a.expected, "remedy": a.remedy}
+            {"name": a.name, "found": a.finding, "expected": a.expected, "remedy": a.remedy}
             for a in advise(simulation)
         ],
         "silenced": list(scene.silence),

@@ -143,9 +143,9 @@ def _make_way(path: Path, *, overwrite: bool) -> None:
     from solidsph.results.sole_writer import check_no_writer
 
     check_no_writer(path)
-    left = check_replaceable(path, overwrite=overwrite)
-    if left is not None and left.count:
-        err.print(escape(f"{path} holds {left.told()}; it is replaced"), soft_wrap=True)
+    earlier = check_replaceable(path, overwrite=overwrite)
+    if earlier is not None and earlier.count:
+        err.print(escape(f"{path} holds {earlier.description}; it is replaced"), soft_wrap=True)
 
 
 def _checked(scene: Scene) -> None:
@@ -210,7 +210,11 @@ def _run_scene(
 
                 heard = _Once(known["warnings"])
                 result = run_watched(
-                    simulation, record=path, roll_backs=watched, observers=observers, told=heard
+                    simulation,
+                    record=path,
+                    roll_backs=watched,
+                    observers=observers,
+                    on_finding=heard,
                 )
         except UnsoundError as cause:
             # What it came to is shown, and then that it is not to be used.

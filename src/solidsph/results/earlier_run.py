@@ -9,7 +9,7 @@ import attrs
 from solidsph.errors import RecordError
 from solidsph.results.layout import RUNNING
 from solidsph.results.record import NotARecordError, Record, check_is_record
-from solidsph.results.record_writer import check_free
+from solidsph.results.record_file import check_writable
 from solidsph.run.outcome import FINISHED, INTERRUPTED, is_over
 
 # Outcomes of runs that would come to the same end again.
@@ -21,37 +21,37 @@ class EarlierRun:
     """An earlier run, as far as its record tells."""
 
     path: Path
-    outcome: str = ""  # nothing if the record cannot be read
-    count: int = 0  # outputs
-    until: float = 0.0  # time of the last [s]
+    outcome: str = ""  # empty if the record cannot be read
+    count: int = 0  # number of outputs
+    last_time: float = 0.0  # of the last output [s]
     scene: str = ""
 
     @property
-    def can_go_on(self) -> bool:
-        """Whether there is something that `resume` goes on with, and that would be lost."""
+    def can_resume(self) -> bool:
+        """Whether `resume` can go on with it, so that replacing it would lose work."""
         return self.count > 1 and not self.outcome.startswith(_ENDED)
 
-    def told(self) -> str:
+    @property
+    def description(self) -> str:
         """What it is, in words."""
         if not self.outcome:
             return "a record that cannot be read"
+        end = f"up to t = {self.last_time:.6g} s"
         if self.outcome in (RUNNING, INTERRUPTED):
-            return f"an interrupted run up to t = {self.until:.6g} s"
-        if self.outcome == FINISHED:
-            return f"a finished run up to t = {self.until:.6g} s"
+            return f"an interrupted run {end}"
         if is_over(self.outcome):
-            return f"an unsound run up to t = {self.until:.6g} s"
-        return f"a run up to t = {self.until:.6g} s that ended early ({self.outcome.split(':')[0]})"
+            return f"{'a finished' if self.outcome == FINISHED else 'an unsound'} run {end}"
+        return f"a run {end} that ended early ({self.outcome.split(':')[0]})"
 
 
 def check_no_other_file(path: Path) -> None:
-    """That a record may be written there, maybe in place of another record, but of nothing else.
+    """Check that a record may be written there: in place of another record, but of nothing else.
 
     Raises:
         RecordError: there is something else.
     """
-    check_free(path, overwrite=True)
-    if not path.exists() or not path.stat().st_size:
+    check_writable(path, overwrite=True)
+    if not _has_content(path):
         return
     try:
         check_is_record(path)
@@ -61,33 +61,37 @@ def check_no_other_file(path: Path) -> None:
         ) from None
 
 
+def _has_content(path: Path) -> bool:
+    return path.exists() and path.stat().st_size > 0
+
+
 def earlier_run_at(path: Path) -> EarlierRun | None:
-    """What is there; None if nothing is.
+    """The run whose record is there; None if there is no file, or an empty one.
 
     Raises:
-        RecordError: there is something that is no record, which a record must not replace.
+        RecordError: there is something other than a record, which a record must not replace.
     """
     check_no_other_file(path)
-    if not path.exists() or not path.stat().st_size:
+    if not _has_content(path):
         return None
     try:
         with Record(path) as record:
-            until = float(record.times[-1]) if record.count else 0.0
-            return EarlierRun(path, record.outcome, record.count, until, record.scene)
+            last_time = float(record.times[-1]) if record.count else 0.0
+            return EarlierRun(path, record.outcome, record.count, last_time, record.scene)
     except RecordError:
         return EarlierRun(path)
 
 
 def check_replaceable(path: Path, *, overwrite: bool) -> EarlierRun | None:
-    """What a new run may take the place of; None if nothing is there.
+    """The run that a new one may replace; None if nothing is there.
 
     Raises:
-        RecordError: it is no record, or, without `overwrite`, a run that can be gone on with.
+        RecordError: it is no record, or, without `overwrite`, a run that can be resumed.
     """
-    left = earlier_run_at(path)
-    if left is not None and left.can_go_on and not overwrite:
+    earlier = earlier_run_at(path)
+    if earlier is not None and earlier.can_resume and not overwrite:
         raise RecordError(
-            f"{path} holds {left.told()}; go on with it (solidsph resume {path}), or replace it "
-            "(--overwrite), or record into another place (--output)"
+            f"{path} holds {earlier.description}; go on with it (solidsph resume {path}), or "
+            "replace it (--overwrite), or record into another place (--output)"
         )
-    return left
+    return earlier

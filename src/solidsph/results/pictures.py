@@ -16,13 +16,13 @@ _STRESS = "cauchy_stress"
 
 
 def draw(record: Record, folder: Path, stem: str, field: str = _STRESS) -> Sequence[Path]:
-    """Write the pictures of a record into `folder`; returns their paths.
+    """Draw a record into files in `folder`; returns their paths.
 
     Args:
         record: what to draw.
-        folder: where to; made if it is missing.
+        folder: made if it is missing.
         stem: beginning of the file names.
-        field: what the particles are coloured by.
+        field: the field that colours the particles.
 
     Raises:
         RecordError: the record has no such field.
@@ -45,8 +45,8 @@ def largest_principal(stress: Array) -> Array:
     return np.asarray(np.linalg.eigvalsh(stress)[:, -1], dtype=np.float64)
 
 
-def _shown(values: Array) -> Array:
-    """One number a particle, (n,): a scalar, a vector's length, a tensor's largest principal."""
+def _magnitudes(values: Array) -> Array:
+    """Scalars, lengths of vectors, or largest principal values of tensors, (n,)."""
     if values.ndim == 1:
         return values
     if values.ndim == 2:
@@ -55,7 +55,7 @@ def _shown(values: Array) -> Array:
 
 
 def _label(record: Record, field: str) -> str:
-    """What the colours mean."""
+    """Label of the colours."""
     words = field.replace("_", " ").replace("cauchy", "Cauchy")
     return f"{words} [{record.units[field]}]"
 
@@ -71,7 +71,7 @@ def _draw_histories(record: Record, field: str, path: Path) -> None:
     left.set_xlabel("time [s]")
     left.set_ylabel("displacement [m]")
     left.set_title(f"{len(order)} particles", fontsize=10)
-    # On a line vectors and tensors have one component, sign and all.
+    # In one dimension vectors and tensors have one component, drawn with its sign.
     values = record.field(field)[:].reshape(record.count, -1)[:, order]
     mesh = right.pcolormesh(X, record.times, values, cmap="cividis", shading="nearest")
     right.set_xlabel("X [m]")
@@ -89,9 +89,9 @@ def _draw_bodies(record: Record, field: str, path: Path) -> None:
     figure = Figure(figsize=(11.0, height), layout="constrained")
     solid = {"projection": "3d"} if record.dimension == 3 else {}
     axes = figure.subplots(1, 2, subplot_kw=solid)
-    values = [_shown(record.field(field)[k][real]) for k in (0, -1)]
+    values = [_magnitudes(record.field(field)[k][real]) for k in (0, -1)]
     low, high = min(v.min() for v in values), max(v.max() for v in values)
-    # Marker size that about fills a spacing, in points, on an axis some 300 points wide.
+    # Size of a marker that about fills a spacing, on an axis some 300 points wide.
     size = max(1.0, (280.0 * float(particles.spacings[0]) / extent) ** 2)
     for axis, k, colours in zip(axes, (0, -1), values, strict=True):
         x = record.positions[k][real]

@@ -1,4 +1,4 @@
-"""Whether what is built now is what a record was made with, which holds no files."""
+"""Whether a run can go on: what is built now must be what the record was made with."""
 
 from __future__ import annotations
 
@@ -11,33 +11,33 @@ import numpy as np
 from solidsph.errors import RecordError
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import Particles
-from solidsph.results.checkpoint import Checkpoint
+from solidsph.results.checkpoint import START_OVER, Checkpoint
 from solidsph.results.record import Record
 from solidsph.results.recorder import stress
 from solidsph.run.built_scene import BuiltScene
 
-# Other versions of libraries may round otherwise; what differs by more, in spacings, is not that.
+# Other versions of libraries may round differently; a larger difference, in spacings, is a change.
 _ROUNDING = 1e-9
 
 _ARRAYS = ("positions", "images", "area_vectors", "volumes", "cells", "spacings", "ghosts")
 
 
 def check_same_particles(record: Record, built: Particles, *, exactly: bool) -> None:
-    """That the particles are those of the record.
+    """Check that the particles are those of the record, which does not hold the files it read.
 
     Args:
         record: of the run.
         built: the particles that its scene gives now.
-        exactly: to the last bit; or else but for rounding.
+        exactly: whether to the last bit, or up to rounding.
 
     Raises:
-        RecordError: they are not; it names the files that the scene reads, and the difference.
+        RecordError: they differ; it names the files that the scene reads, and the difference.
     """
     difference = next(_differences(record.particles, built, exactly), None)
     if difference is None:
         return
-    named = ", ".join(f"{name!r}" for name in dict.fromkeys(_files(record.scene)))
-    where = f" (the scene reads {named}, relative to {record.folder})" if named else ""
+    files = ", ".join(f"{name!r}" for name in dict.fromkeys(_files(record.scene)))
+    where = f" (the scene reads {files}, relative to {record.folder})" if files else ""
     raise RecordError(
         f"the run in {record.path} cannot go on: the scene no longer gives the particles that it "
         f"was begun with{where}: {difference}. Restore what the scene reads, or run it again, into "
@@ -48,43 +48,41 @@ def check_same_particles(record: Record, built: Particles, *, exactly: bool) -> 
 def check_same_output(
     record: Record, checkpoint: Checkpoint, simulation: BuiltScene, *, exactly: bool
 ) -> None:
-    """That a checkpoint is an output of the record, and answered as it was then.
+    """Check that a checkpoint is an output of the record, and still gives the same stresses.
 
-    So that neither a checkpoint of another run, nor a part or a material whose code or data have
-    changed, goes on behind outputs that it would not have made.
+    This refuses a checkpoint of another run, and parts or materials whose code or data have
+    changed: their outputs must not follow those in the record.
+
+    Args:
+        record: of the run.
+        checkpoint: of one of its outputs.
+        simulation: what its scene gives now.
+        exactly: whether stresses are compared as well.
 
     Raises:
-        RecordError: it does not fit the simulation, or it is not, or not answered so.
+        RecordError: it does not fit the simulation, is no output of the record, or gives others.
     """
-    state, begun = checkpoint.state, simulation.start()
-    fits = state.positions.shape == begun.positions.shape
-    fits &= state.applied.keys() == begun.applied.keys() == state.work.keys()
-    for name, array in begun.memory.items():
+    state, start = checkpoint.state, simulation.start()
+    beside = f"the checkpoint beside {record.path}"
+    fits = state.positions.shape == start.positions.shape
+    fits &= state.applied.keys() == start.applied.keys() == state.work.keys()
+    for name, array in start.memory.items():
         fits &= name in state.memory and state.memory[name].shape == array.shape
     if not fits:
-        raise RecordError(
-            f"the checkpoint beside {record.path} is of another scene than the record; delete it "
-            "and resume again: the run is then carried out from its first state"
-        )
+        raise RecordError(f"{beside} is of another scene than the record; {START_OVER}")
     place = int(np.flatnonzero(record.times == state.time)[0])
-    record.check_step(place)
-    same = np.array_equal(record.positions[place], state.positions)
-    same &= np.array_equal(record.field("velocity")[place], state.velocities)
-    if not same:
-        raise RecordError(
-            f"the checkpoint beside {record.path} is not its output at t = {state.time:.9g} s; "
-            "delete it and resume again: the run is then carried out from its first state"
-        )
+    output = record.checked_output(place)
+    is_same = np.array_equal(output.positions, state.positions)
+    is_same &= np.array_equal(output.fields["velocity"], state.velocities)
+    if not is_same:
+        raise RecordError(f"{beside} is not its output at t = {state.time:.9g} s; {START_OVER}")
     if not exactly:
         return
     try:
-        answered = stress(simulation.dynamics.observe(state))
+        stresses = stress(simulation.dynamics.observe(state))
     except (LookupError, ValueError, TypeError) as cause:
-        raise RecordError(
-            f"the checkpoint beside {record.path} does not fit its scene ({cause}); delete it and "
-            "resume again: the run is then carried out from its first state"
-        ) from None
-    if not np.array_equal(record.field("cauchy_stress")[place], answered, equal_nan=True):
+        raise RecordError(f"{beside} does not fit its scene ({cause}); {START_OVER}") from None
+    if not np.array_equal(output.fields["cauchy_stress"], stresses, equal_nan=True):
         raise RecordError(
             f"the run in {record.path} cannot go on bit for bit: at t = {state.time:.9g} s the "
             "scene now gives other stresses than were recorded, so a part, or something that it "
@@ -93,42 +91,45 @@ def check_same_output(
 
 
 def _differences(then: Particles, now: Particles, exactly: bool) -> Iterator[str]:
-    for what, one, other in (
+    for what, recorded, built in (
         ("particles", then.count, now.count),
         ("bodies", list(then.bodies), list(now.bodies)),
         ("tags", list(then.tags), list(now.tags)),
         ("faces", list(then.faces), list(now.faces)),
     ):
-        if one != other:
-            yield f"{one} {what} were recorded, now there are {other}"
+        if recorded != built:
+            yield f"{recorded} {what} were recorded, now there are {built}"
             return
     if then.bodies != now.bodies:
         yield "bodies have other numbers of particles"
+    arrays = [(name, getattr(then, name), getattr(now, name)) for name in _ARRAYS]
+    arrays += [(f"tag {tag!r}", mask, now.tags[tag]) for tag, mask in then.tags.items()]
+    arrays += [
+        (f"{part} of face {name!r}", getattr(face, part), getattr(now.faces[name], part))
+        for name, face in then.faces.items()
+        for part in ("particles", "area_vectors", "areas")
+    ]
     scale = float(now.spacings.min(initial=np.inf))
-    for name in _ARRAYS:
-        yield from _of_arrays(name, getattr(then, name), getattr(now, name), scale, exactly)
-    for tag in then.tags:
-        yield from _of_arrays(f"tag {tag!r}", then.tags[tag], now.tags[tag], scale, exactly)
-    for face in then.faces:
-        for part in ("particles", "area_vectors", "areas"):
-            one, other = getattr(then.faces[face], part), getattr(now.faces[face], part)
-            yield from _of_arrays(f"{part} of face {face!r}", one, other, scale, exactly)
+    for name, recorded_array, built_array in arrays:
+        yield from _array_differences(name, recorded_array, built_array, scale, exactly)
 
 
-def _of_arrays(name: str, then: Any, now: Any, scale: float, exactly: bool) -> Iterator[str]:
-    one, other = np.asarray(then, dtype=np.float64), np.asarray(now, dtype=np.float64)
-    if one.shape != other.shape:
-        yield f"{name} are {len(one)} in the record, and {len(other)} now"
+def _array_differences(
+    name: str, then: Any, now: Any, scale: float, exactly: bool
+) -> Iterator[str]:
+    recorded, built = np.asarray(then, dtype=np.float64), np.asarray(now, dtype=np.float64)
+    if recorded.shape != built.shape:
+        yield f"{name} are {len(recorded)} in the record, and {len(built)} now"
         return
-    apart: Array = np.abs(one - other)
-    largest = np.maximum(np.abs(one).max(initial=0.0), np.abs(other).max(initial=0.0))
+    apart: Array = np.abs(recorded - built)
+    largest = np.maximum(np.abs(recorded).max(initial=0.0), np.abs(built).max(initial=0.0))
     allowed = 0.0 if exactly else _ROUNDING * max(scale, float(largest))
     wrong = apart.reshape(len(apart), -1).max(axis=1, initial=0.0) > allowed
     if wrong.any():
         row, largest_apart = int(np.argmax(wrong)), float(apart.max())
         yield (
             f"{name} differ for {int(wrong.sum())} of {len(wrong)}, first for {row}: "
-            f"{_short(one[row])} in the record, {_short(other[row])} now; at most "
+            f"{_short(recorded[row])} in the record, {_short(built[row])} now; at most "
             f"{largest_apart:.3g} apart"
         )
 
@@ -140,15 +141,15 @@ def _short(value: Any) -> str:
 def _files(scene: str) -> Iterator[str]:
     """Files that parts of the scene read."""
     try:
-        yield from _named(tomllib.loads(scene))
-    except tomllib.TOMLDecodeError:  # composed in Python: it has no such form
+        yield from _file_entries(tomllib.loads(scene))
+    except tomllib.TOMLDecodeError:  # a scene composed in Python has no such form
         return
 
 
-def _named(value: Any) -> Iterator[str]:
+def _file_entries(value: Any) -> Iterator[str]:
     items = value.items() if isinstance(value, dict) else enumerate(value)
-    for key, one in items:
-        if isinstance(one, (dict, list)):
-            yield from _named(one)
-        elif key == "file" and isinstance(one, str):
-            yield one
+    for key, entry in items:
+        if isinstance(entry, (dict, list)):
+            yield from _file_entries(entry)
+        elif key == "file" and isinstance(entry, str):
+            yield entry

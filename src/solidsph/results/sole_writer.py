@@ -1,7 +1,7 @@
-"""One writer at a time: a record, or the records of a case, belong to one run while it lasts.
+"""One writer at a time: a record, or the folder of a case, is locked by the run that writes it.
 
-The lock is the operating system's, on a small file beside the record that says who holds it. It is
-gone with the process, however that ends; a file that is left behind then locks nothing.
+The lock is the operating system's, on a small file beside the record that names its holder. It ends
+with the process, however that ends; a file that is left behind then locks nothing.
 """
 
 from __future__ import annotations
@@ -18,19 +18,20 @@ from solidsph.errors import RecordError
 
 try:
     import fcntl
-except ImportError:  # not a system with these locks: there, nobody is kept out
+except ImportError:  # a system without these locks
     fcntl = None  # type: ignore[assignment]
 
-_LONGEST = 300  # bytes of what a holder says of itself
+_LONGEST = 300  # bytes that are read of a lock file
 _held: dict[int, int] = {}  # open lock file -> the process that locked it
 
 
 @contextmanager
 def sole_writer(path: Path) -> Iterator[None]:
-    """Within it, no other run, of this process or another, writes `path`.
+    """Keep all other runs, of this process and of others, from writing `path`.
 
     Raises:
-        RecordError: another one does; it names that one. Or the folder cannot be written.
+        RecordError: another run writes it; the message names its process. Or the folder cannot be
+            written.
     """
     lock = _lock_of(path)
     _check_lock(lock)
@@ -51,10 +52,10 @@ def sole_writer(path: Path) -> Iterator[None]:
 
 
 def check_no_writer(path: Path) -> None:
-    """That no run is writing `path` now.
+    """Check that no run is writing `path` now.
 
     Raises:
-        RecordError: one is; it names that one.
+        RecordError: a run is; the message names its process.
     """
     lock = _lock_of(path)
     _check_lock(lock)
@@ -75,20 +76,20 @@ def _lock_of(path: Path) -> Path:
 
 
 def _check_lock(lock: Path) -> None:
-    """That nothing else has its name: a link would lead to a file that is somebody's own, and a
-    pipe would keep `open` waiting."""
+    """Check that nothing else has its name: a link could lead to a file of the user's, and a pipe
+    would keep `open` waiting."""
     if lock.is_symlink() or (lock.exists() and not lock.is_file()):
         raise RecordError(
-            f"{lock} is not a regular file, and has the name of the one by which a run keeps "
-            "others from its record; move it away, or choose another place for the record"
+            f"{lock} is not a regular file, but has the name of a record's lock; move it away, "
+            "or choose another place for the record"
         )
 
 
 def _locked(lock: Path) -> int:
-    """The lock file, open and locked.
+    """Open and lock the lock file; returns its handle.
 
     Raises:
-        BlockingIOError: somebody else has locked it.
+        BlockingIOError: another run has locked it.
     """
     while True:
         handle = os.open(lock, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
@@ -101,9 +102,8 @@ def _locked(lock: Path) -> int:
                 except OSError:  # a file system without locks
                     pass
             # Its last holder may have removed it after it was opened here.
-            there = os.fstat(handle)
             with suppress(FileNotFoundError):
-                if os.path.samestat(there, lock.stat()):
+                if os.path.samestat(os.fstat(handle), lock.stat()):
                     break
         except BaseException:
             os.close(handle)
@@ -119,7 +119,7 @@ def _locked(lock: Path) -> int:
 
 def _release(handle: int, lock: Path) -> None:
     if _held.pop(handle, None) != os.getpid():
-        return  # the fork of the process that holds it
+        return  # a fork of the process that holds it
     with suppress(OSError):
         lock.unlink()
     os.close(handle)
@@ -127,7 +127,7 @@ def _release(handle: int, lock: Path) -> None:
 
 @cache
 def _forget_in_forks() -> None:
-    """A fork must not keep a lock when the process that took it has ended."""
+    """Close the locks in forks: one must not keep a lock whose own process has ended."""
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(after_in_child=_forget)
 

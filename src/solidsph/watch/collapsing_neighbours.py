@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import attrs
 import numpy as np
@@ -13,19 +13,17 @@ from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.run.accounts import Accounts
-from solidsph.watch.symptom import Finding, Symptom, graded
+from solidsph.run.built_scene import BuiltScene
+from solidsph.watch.symptom import Finding, Symptom
 
-if TYPE_CHECKING:
-    from solidsph.run.built_scene import BuiltScene
-
-# Nearest neighbours alone, in spacings: they are the first to meet.
+# Distance of nearest neighbours in spacings; they are the first to meet.
 _NEAR = 1.2
 
 
 @final
 @attrs.frozen
 class CollapsingNeighbours(Symptom):
-    """Two nearest neighbours are at a small part of their first distance."""
+    """Two nearest neighbours are at a small part of their reference distance."""
 
     warning: float = 0.15  # [-]; metal that flows comes to 0.2
     failure: float = 0.03  # [-]
@@ -33,39 +31,30 @@ class CollapsingNeighbours(Symptom):
     def look(
         self, simulation: BuiltScene, observation: Observation, accounts: Accounts
     ) -> Finding | None:
-        found, part = 0, np.inf
+        particle, least, closest = 0, np.inf, simulation.model.bodies[0]
         for body in simulation.model.bodies:
-            a, b, first = _nearest(body)
+            a, b, inverse_squares = _nearest(body)
             if not len(a):
                 continue
             with np.errstate(all="ignore"):
                 squares = _squares(observation.state.positions[body.extent], a, b)
-                squares *= first
-            closest = int(np.argmin(squares))  # the first that is no number, if there is one
-            ratio = float(np.sqrt(squares[closest]))
-            if not ratio >= part:
-                found, part = body.extent.start + int(a[closest]), ratio
-        grade = graded(1.0 / part if part > 0.0 else np.inf, 1.0 / self.warning, 1.0 / self.failure)
-        if grade is None:
-            return None
-        return Finding(
-            grade,
-            found,
-            f"a neighbour has come to {part:.3g} of its first distance",
-            f"{_help(simulation, found)}; a smaller step; artificial-viscosity where something "
-            "strikes",
+                squares *= inverse_squares
+            pair = int(np.argmin(squares))  # the first NaN, if there is one
+            ratio = float(np.sqrt(squares[pair]))
+            if not ratio >= least:
+                particle, least, closest = body.extent.start + int(a[pair]), ratio, body
+        if closest.formulation.configuration is Configuration.CURRENT:
+            remedy = "the total Lagrangian form, in which tension does not pull particles together"
+        else:
+            remedy = "hourglass-control, against motions that the gradient does not see"
+        return Finding.graded(
+            1.0 / least if least > 0.0 else np.inf,
+            1.0 / self.warning,
+            1.0 / self.failure,
+            particle=particle,
+            cause=f"a neighbour has come to {least:.3g} of its reference distance",
+            remedy=f"{remedy}; a smaller step; artificial-viscosity where something strikes",
         )
-
-
-def _help(simulation: BuiltScene, particle: int) -> str:
-    """Against what brings particles of this body together."""
-    bodies = simulation.model.bodies
-    body = next(one for one in bodies if one.extent.start <= particle < one.extent.stop)
-    if body.formulation.configuration is Configuration.CURRENT:
-        return (
-            "the total Lagrangian form, in which particles under tension do not attract each other"
-        )
-    return "hourglass-control, against motions that the gradient does not see"
 
 
 def _squares(positions: Array, a: Indices, b: Indices) -> Array:
@@ -81,10 +70,7 @@ def _squares(positions: Array, a: Indices, b: Indices) -> Array:
 
 
 def _nearest(body: Body) -> tuple[Indices, Indices, Array]:
-    """Pairs of nearest neighbours, each once, and one over the square of their distance [m^-2].
-
-    Found when they are asked for first.
-    """
+    """Pairs of nearest neighbours, each once, and 1 / distance^2 of each [m^-2]; kept in `body`."""
     if CollapsingNeighbours not in body.made:
         particles = body.particles
         pairs = cKDTree(particles.positions).query_pairs(
@@ -93,9 +79,7 @@ def _nearest(body: Body) -> tuple[Indices, Indices, Array]:
         pairs = pairs[~particles.ghosts[pairs].any(axis=1)]
         if body.hidden is not None:
             pairs = pairs[~body.hidden.between(pairs[:, 0], pairs[:, 1])]
-        a, b = (
-            np.ascontiguousarray(one) for one in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].T
-        )
+        a, b = np.ascontiguousarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].T)
         body.made[CollapsingNeighbours] = (a, b, 1.0 / _squares(particles.positions, a, b))
-    found: tuple[Indices, Indices, Array] = body.made[CollapsingNeighbours]
-    return found
+    nearest: tuple[Indices, Indices, Array] = body.made[CollapsingNeighbours]
+    return nearest
