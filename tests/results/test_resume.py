@@ -401,9 +401,9 @@ def test_every_damage_of_a_checkpoint_is_noticed(tmp_path: Path) -> None:
             read_checkpoint(file)
     assert_refused(path, "checkpoint .* is damaged; delete it")
     file.write_bytes(data.replace(b"checkpoint 1 ", b"checkpoint 2 ", 1))
-    assert_refused(path, "format 2, this solidsph reads up to 1; update")
+    assert_refused(path, "has format 2, this solidsph reads 1; update")
     file.write_bytes(data.replace(b"checkpoint 1 ", b"checkpoint 0 ", 1))
-    assert_refused(path, "the older format 0, this solidsph reads 1; delete it")
+    assert_refused(path, "has format 0, this solidsph reads 1; delete it")
     file.unlink()
     resume(path)
     with Record(path) as record:

@@ -306,8 +306,8 @@ def test_what_it_knows_survives_an_interruption(
         simulation.run(record=path, observers=[first, Stop(4)])
     resume(path, simulation=simulation, observers=[second])
     kept: list[dict[str, np.ndarray]] = [{}, {}]
-    whole.solidsph_keep(simulation, kept[0])
-    second.solidsph_keep(simulation, kept[1])
+    whole.solidsph_keep(kept[0])
+    second.solidsph_keep(kept[1])
     assert np.array_equal(kept[0]["watchdog accounts"], kept[1]["watchdog accounts"])
     assert np.all(kept[0]["watchdog accounts"] != 0.0)
 

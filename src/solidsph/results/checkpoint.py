@@ -114,16 +114,11 @@ def read_checkpoint(path: Path) -> Checkpoint:
     words = head.decode("ascii", errors="replace").removeprefix(_MAGIC).split()
     if not (end and head.startswith(_MAGIC.encode()) and len(words) == 2 and words[0].isdecimal()):
         raise RecordError(f"{path} is not a checkpoint of solidsph, or its beginning is lost")
-    # Its length is bounded: a forged number of any length would take long to convert.
-    if len(words[0]) > 9 or int(words[0]) > FORMAT:
+    if words[0] != str(FORMAT):
+        number = words[0][:9]  # one of any length would take long to convert
         raise RecordError(
-            f"the checkpoint {path} has format {words[0][:9]}, this solidsph reads up to {FORMAT}; "
-            "update solidsph"
-        )
-    if int(words[0]) < FORMAT:
-        raise RecordError(
-            f"the checkpoint {path} has the older format {words[0]}, this solidsph reads {FORMAT}; "
-            f"{START_OVER}"
+            f"the checkpoint {path} has format {number}, this solidsph reads {FORMAT}; "
+            f"{'update solidsph' if int(number) > FORMAT else START_OVER}"
         )
     body = data[len(head) + 1 :]
     damaged = f"the checkpoint {path} is damaged; {START_OVER}"

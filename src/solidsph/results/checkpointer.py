@@ -47,9 +47,7 @@ class Checkpointer:
         self._cost: float | None = None  # of the last checkpoint [s]
 
     @implementation(trylast=True)
-    def solidsph_resume(
-        self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
-    ) -> None:
+    def solidsph_resume(self, simulation: BuiltScene, observation: Observation) -> None:
         # At once: the end of the run, or its step, may differ from those in the older checkpoint.
         self._take(simulation, observation)
         self._write(simulation)

@@ -96,15 +96,11 @@ class Record:
     def _read_all(self) -> None:
         run = _run(self._file, self.path)
         written = int(run.attrs["format"])
-        if written > FORMAT:
+        if written != FORMAT:  # older formats were never published, so none is translated
+            remedy = "update solidsph" if written > FORMAT else "run its scene again"
             raise RecordError(
-                f"the record {self.path} has format {written}, this solidsph reads up to {FORMAT}; "
-                "update solidsph"
-            )
-        if written < FORMAT:  # older formats were never published, so none is translated
-            raise RecordError(
-                f"the record {self.path} has the older format {written}, this solidsph reads "
-                f"{FORMAT}; run its scene again"
+                f"the record {self.path} has format {written}, this solidsph reads {FORMAT}; "
+                f"{remedy}"
             )
         tree = Tree(self._file)
         check_first(tree)
@@ -241,7 +237,9 @@ class Record:
                     _lines(run, "bodies"), run["body_ranges"][()], strict=True
                 )
             },
-            faces=dict(_face(group) for group in _numbered(run.get("faces"))),
+            faces=dict(
+                _face(run[f"faces/{number}"]) for number in range(len(run.get("faces", ())))
+            ),
         )
 
     def _readable(self, count: int, datasets: list[Any]) -> int:
@@ -347,10 +345,6 @@ def _lines(group: Any, name: str) -> tuple[str, ...]:
 
 def _word(item: Any, name: str) -> str:
     return bytes(item.attrs[name]).decode()
-
-
-def _numbered(group: Any) -> list[Any]:
-    return [] if group is None else [group[str(number)] for number in range(len(group))]
 
 
 def _face(group: Any) -> tuple[str, Face]:

@@ -44,6 +44,11 @@ class RecordWriter:
 
     Use it as a context manager: an error that leaves the `with` becomes the outcome.
 
+    Attributes:
+        path: the file, through a link to it.
+        count: number of steps written.
+        last_time: t of the last step written [s]; minus infinity if there is none.
+
     Args:
         path: the file; missing folders are created.
         reference: what all steps share, stored completely (n particles in d dimensions).
@@ -62,12 +67,12 @@ class RecordWriter:
         overwrite: bool = True,
         earlier: Iterable[Output] = (),
     ) -> None:
-        self.path = Path(os.path.realpath(path))  # through a link to the file itself
+        self.path = Path(os.path.realpath(path))
         self._particles = reference.particles
         self._fields = {field.name: field for field in reference.fields}
         self._history = np.dtype([(name, np.float64) for name in reference.columns])
-        self._count = 0
-        self._last_time = -np.inf
+        self.count = 0
+        self.last_time = -np.inf
         self._checked_space = 0  # bytes by which the file can grow, as far as is known
         check_fields(reference.fields, reference.particles)
         self._draft = self.path.with_name(f"{self.path.name}.{os.getpid()}.partial")
@@ -83,7 +88,7 @@ class RecordWriter:
                 self._open()
             for output in earlier:
                 self._add(output)
-            if self._count or not self.path.exists():
+            if self.count or not self.path.exists():
                 self._publish()
         except BaseException:
             self._discard_draft()
@@ -125,16 +130,6 @@ class RecordWriter:
     def _place(self) -> Path:
         return self._draft if self._is_draft else self.path
 
-    @property
-    def count(self) -> int:
-        """Number of steps written."""
-        return self._count
-
-    @property
-    def last_time(self) -> float:
-        """Time t of the last step written [s]; minus infinity if there is none."""
-        return self._last_time
-
     def append(self, output: Output) -> None:
         """Add one step, all of it or nothing.
 
@@ -157,10 +152,10 @@ class RecordWriter:
                 raise
 
     def _add(self, output: Output) -> None:
-        time, step, count, n = output.time, output.step, self._count, self._particles.count
-        if not self._last_time < time < np.inf:
+        time, step, count, n = output.time, output.step, self.count, self._particles.count
+        if not self.last_time < time < np.inf:
             raise RecordError(
-                f"a record's times must increase, got {time:.9g} s after {self._last_time:.9g} s; "
+                f"a record's times must increase, got {time:.9g} s after {self.last_time:.9g} s; "
                 "append each time once"
             )
         columns = self._history.names or ()
@@ -201,7 +196,7 @@ class RecordWriter:
             self._file.flush()
             self._step_count.write(np.array(count + 1))
             self._file.flush()
-        self._count, self._last_time = count + 1, time
+        self.count, self.last_time = count + 1, time
 
     def close(self, outcome: str = FINISHED) -> None:
         """End the record with its outcome; a second call changes nothing.
@@ -212,7 +207,7 @@ class RecordWriter:
         if self._file is None:
             return
         self._check_identity()
-        remedy = f"the {self._count} steps in it remain"
+        remedy = f"the {self.count} steps in it remain"
         with uninterrupted(), explained(f"cannot complete the record {self.path}", remedy):
             with self._abandoned_on_failure():
                 self._write_outcome(outcome)
@@ -257,7 +252,7 @@ class RecordWriter:
         self._close_file()
         self._is_draft = False  # there is nothing to remove
         raise RecordError(
-            f"the record {self.path} was {what} while the run wrote it, and its {self._count} "
+            f"the record {self.path} was {what} while the run wrote it, and its {self.count} "
             "steps are lost; run the scene again, and leave the file alone until the run has ended"
         )
 

@@ -36,6 +36,7 @@ class Recorder:
     def __init__(self, path: Path, since: RestartPoint | None = None) -> None:
         self._path = path
         self._since = since
+        self._kept_until = -np.inf if since is None else since.until  # of an earlier record [s]
         self._writer: RecordWriter | None = None
         self._folder: str | None = None  # where an earlier run's relative paths begin
         self._initial_energy = 0.0
@@ -43,15 +44,13 @@ class Recorder:
         self.final: dict[str, float] = {}  # columns of the history at the last output so far
 
     @implementation
-    def solidsph_setup(self, simulation: BuiltScene) -> None:
+    def solidsph_setup(self) -> None:
         # An earlier record stays until there is something to take its place.
         if self._since is None:
             check_no_other_file(self._path)
 
     @implementation
-    def solidsph_resume(
-        self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
-    ) -> None:
+    def solidsph_resume(self, simulation: BuiltScene, observation: Observation) -> None:
         self._writer = self._open(simulation, observation)
         self.final.update(self._history(simulation, observation))
 
@@ -71,7 +70,7 @@ class Recorder:
         self._writer.append(Output(state.time, state.step, state.positions, fields, columns))
 
     @implementation
-    def solidsph_finish(self, simulation: BuiltScene, outcome: str) -> None:
+    def solidsph_finish(self, outcome: str) -> None:
         if self._recorded is not None:
             self._recorded.close()
         if self._writer is not None:
@@ -107,10 +106,6 @@ class Recorder:
         if earlier is not None and observation.state.time <= writer.last_time:
             self._recorded = Record(self._path)
         return writer
-
-    @property
-    def _kept_until(self) -> float:
-        return -np.inf if self._since is None else self._since.until
 
     def _earlier(self) -> Record | None:
         """The record of the earlier run, if it holds a step that stays."""

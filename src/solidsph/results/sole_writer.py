@@ -34,12 +34,9 @@ def sole_writer(path: Path) -> Iterator[None]:
             written.
     """
     lock = _lock_of(path)
-    _check_lock(lock)
     try:
         lock.parent.mkdir(parents=True, exist_ok=True)
-        handle = _locked(lock)
-    except BlockingIOError:
-        raise RecordError(_refusal(path, lock)) from None
+        handle = _locked(lock, path)
     except OSError as cause:
         raise RecordError(
             f"cannot create {path}: {cause.strerror or cause}; choose a path in a folder that you "
@@ -58,49 +55,32 @@ def check_no_writer(path: Path) -> None:
         RecordError: a run is; the message names its process.
     """
     lock = _lock_of(path)
-    _check_lock(lock)
     if fcntl is None or not lock.exists():
         return
     with suppress(FileNotFoundError, PermissionError), lock.open("rb") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise RecordError(_refusal(path, lock)) from None
-        except OSError:  # a file system without locks
-            return
+        _lock(file.fileno(), fcntl.LOCK_SH, lock, path)
 
 
 def _lock_of(path: Path) -> Path:
+    """The lock file of `path`: no link, which could lead to a file of the user's, and no pipe,
+    which would keep `open` waiting."""
     real = Path(os.path.realpath(path))
-    return real.with_name(f".{real.name}.lock")
-
-
-def _check_lock(lock: Path) -> None:
-    """Check that nothing else has its name: a link could lead to a file of the user's, and a pipe
-    would keep `open` waiting."""
+    lock = real.with_name(f".{real.name}.lock")
     if lock.is_symlink() or (lock.exists() and not lock.is_file()):
         raise RecordError(
             f"{lock} is not a regular file, but has the name of a record's lock; move it away, "
             "or choose another place for the record"
         )
+    return lock
 
 
-def _locked(lock: Path) -> int:
-    """Open and lock the lock file; returns its handle.
-
-    Raises:
-        BlockingIOError: another run has locked it.
-    """
+def _locked(lock: Path, path: Path) -> int:
+    """Open, lock and fill the lock file; returns its handle."""
     while True:
         handle = os.open(lock, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
         try:
             if fcntl is not None:
-                try:
-                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except BlockingIOError:
-                    raise
-                except OSError:  # a file system without locks
-                    pass
+                _lock(handle, fcntl.LOCK_EX, lock, path)
             # Its last holder may have removed it after it was opened here.
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(handle), lock.stat()):
@@ -115,6 +95,28 @@ def _locked(lock: Path) -> int:
     _forget_in_forks()
     _held[handle] = os.getpid()
     return handle
+
+
+def _lock(handle: int, kind: int, lock: Path, path: Path) -> None:
+    """Lock an open file, if the file system has locks.
+
+    Raises:
+        RecordError: another run has locked it.
+    """
+    try:
+        fcntl.flock(handle, kind | fcntl.LOCK_NB)
+    except BlockingIOError:
+        try:
+            with lock.open("rb") as file:
+                holder = file.read(_LONGEST).decode(errors="replace").strip()
+        except OSError:
+            holder = ""
+        raise RecordError(
+            f"{path} is being written by another run ({holder or 'another process'}); wait until "
+            "it has ended, or record into another file"
+        ) from None
+    except OSError:  # a file system without locks
+        return
 
 
 def _release(handle: int, lock: Path) -> None:
@@ -136,15 +138,3 @@ def _forget() -> None:
     for handle in _held:
         os.close(handle)
     _held.clear()
-
-
-def _refusal(path: Path, lock: Path) -> str:
-    try:
-        with lock.open("rb") as file:
-            holder = file.read(_LONGEST).decode(errors="replace").strip()
-    except OSError:
-        holder = ""
-    return (
-        f"{path} is being written by another run ({holder or 'another process'}); wait until it "
-        "has ended, or record into another file"
-    )

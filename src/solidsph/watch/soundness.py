@@ -11,7 +11,6 @@ from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array
-from solidsph.model.particles import State
 from solidsph.run.accounts import Accounts
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.hooks import implementation
@@ -101,7 +100,7 @@ class Soundness:
             self._first_swing = _swing(simulation, observation)
 
     @implementation
-    def solidsph_keep(self, simulation: BuiltScene, kept: dict[str, Array]) -> None:
+    def solidsph_keep(self, kept: dict[str, Array]) -> None:
         kept[_KEPT] = np.append(self._accounts.kept(), self._first_swing)
         kept[_RISES] = self._rises
 
@@ -116,7 +115,7 @@ class Soundness:
             raise error
 
     @implementation
-    def solidsph_failure(self, simulation: BuiltScene, state: State, error: DivergedError) -> None:
+    def solidsph_failure(self, simulation: BuiltScene, error: DivergedError) -> None:
         before = self._error(simulation)
         if before is not None:
             error.cause += (

@@ -74,9 +74,7 @@ class Watchdog:
         self._is_clean = False  # whether nothing at all was wrong with `last_sound`
 
     @implementation(tryfirst=True)  # an unusable checkpoint is reported before the record changes
-    def solidsph_resume(
-        self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
-    ) -> None:
+    def solidsph_resume(self, observation: Observation, kept: Mapping[str, Array]) -> None:
         if _ACCOUNTS in kept:
             self._accounts = Accounts.taken(kept[_ACCOUNTS])
         else:  # the earlier run had no watchdog
@@ -114,7 +112,7 @@ class Watchdog:
         return False
 
     @implementation
-    def solidsph_keep(self, simulation: BuiltScene, kept: dict[str, Array]) -> None:
+    def solidsph_keep(self, kept: dict[str, Array]) -> None:
         kept[_ACCOUNTS] = self._accounts.kept()
 
     @implementation
