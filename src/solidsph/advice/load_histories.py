@@ -65,11 +65,6 @@ class MotionHistory(TimeHistory):
 
     speeds: Array  # (t,) [m/s]
 
-    @property
-    def jump(self) -> float:
-        """Speed at the first moment [m/s]."""
-        return float(self.speeds[0])
-
 
 def load_histories(simulation: BuiltScene) -> Iterator[LoadHistory]:
     """History of every load: at many times if it is a schedule, at a few if not.

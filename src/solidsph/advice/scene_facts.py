@@ -46,54 +46,36 @@ class BodyFacts:
 
     body: Body
     held_axes: Mask  # (d,) axes along which some constraint keeps it from moving away
+    name: str
+    extent: slice  # its place among all particles
+    dimension: int
+    spacing: float  # smallest of its particles [m]
+    exact_degree: int  # of the polynomials for which its gradient is exact
+    density: float  # [kg/m^3]
+    speed: float  # of confined waves [m/s]
+    modulus: float  # lambda + 2 mu [Pa]
+    poissons_ratio: float
+    youngs_modulus: float  # [Pa]
 
-    @property
-    def name(self) -> str:
-        return self.body.name
-
-    @property
-    def extent(self) -> slice:
-        """Its place among all particles."""
-        return self.body.extent
-
-    @property
-    def dimension(self) -> int:
-        return self.body.particles.dimension
-
-    @property
-    def spacing(self) -> float:
-        """Smallest spacing of its particles [m]."""
-        return float(self.body.particles.spacings.min())
-
-    @property
-    def exact_degree(self) -> int:
-        """Degree of the polynomials for which its gradient is exact."""
-        return self.body.formulation.gradient.exact_degree
-
-    @property
-    def speed(self) -> float:
-        """Speed of confined waves [m/s]."""
-        return self.body.material.wave_speed
-
-    @property
-    def density(self) -> float:
-        return self.body.material.density
-
-    @property
-    def modulus(self) -> float:
-        """lambda + 2 mu [Pa]."""
-        lam, mu = self.body.material.lame_parameters
-        return lam + 2.0 * mu
-
-    @property
-    def poissons_ratio(self) -> float:
-        lam, mu = self.body.material.lame_parameters
-        return lam / (2.0 * (lam + mu))
-
-    @property
-    def youngs_modulus(self) -> float:
-        _, mu = self.body.material.lame_parameters
-        return 2.0 * mu * (1.0 + self.poissons_ratio)
+    @classmethod
+    def of(cls, body: Body, held_axes: Mask) -> BodyFacts:
+        """Facts about `body`."""
+        lam, mu = body.material.lame_parameters
+        poissons_ratio = lam / (2.0 * (lam + mu))
+        return cls(
+            body=body,
+            held_axes=held_axes,
+            name=body.name,
+            extent=body.extent,
+            dimension=body.particles.dimension,
+            spacing=float(body.particles.spacings.min()),
+            exact_degree=body.formulation.gradient.exact_degree,
+            density=body.material.density,
+            speed=body.material.wave_speed,
+            modulus=lam + 2.0 * mu,
+            poissons_ratio=poissons_ratio,
+            youngs_modulus=2.0 * mu * (1.0 + poissons_ratio),
+        )
 
     @property
     def is_held(self) -> bool:
@@ -196,7 +178,7 @@ class SceneFacts:
     def bodies(self) -> Sequence[BodyFacts]:
         held = self._fixed_ghosts | (self.held & ~self.simulation.particles.ghosts[:, None])
         return [
-            BodyFacts(body, np.asarray(held[body.extent].any(axis=0)))
+            BodyFacts.of(body, np.asarray(held[body.extent].any(axis=0)))
             for body in self.simulation.model.bodies
         ]
 

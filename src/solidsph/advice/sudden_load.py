@@ -32,7 +32,7 @@ def sudden_load(facts: SceneFacts) -> Iterator[Advice]:
                 remedy=remedy,
             )
     if facts.velocity_jump > 0.0:
-        moving = [repr(motion.label) for motion in facts.motions if motion.jump > 0.0]
+        moving = [repr(motion.label) for motion in facts.motions if motion.speeds[0] > 0.0]
         what = f"{', '.join(moving)} starts" if moving else "the initial state moves"
         yield Advice(
             finding=f"{what} beside neighbours that do not, {100 * facts.velocity_jump:.2g} % of "

@@ -27,7 +27,7 @@ def viscosity_unneeded(facts: SceneFacts) -> Iterator[Advice]:
         loads = [load for load in facts.loads if load.on_surface and load.peak > 0.0]
         if (
             any(load.rise < slow for load in loads)
-            or any(motion.jump > 1e-4 * facts.fastest.speed for motion in facts.motions)
+            or any(motion.speeds[0] > 1e-4 * facts.fastest.speed for motion in facts.motions)
             or facts.vigour > _SLOW
             or facts.velocity_jump > 0.0
         ):

@@ -33,6 +33,8 @@ _MAGIC = "solidsph checkpoint"
 _LONGEST_HEAD = 200  # bytes
 _ARRAYS = ("positions", "velocities", "accelerations")
 _NAMED = ("memory", "applied")
+_OF_STATE = ("time", "step", "work")
+_OF_RUN = ("scene", "step_size", "steps", "halvings")
 
 # What reading an npz file may raise; behind a right digest, only by a fault of ours.
 _NPZ_ERRORS = (
@@ -141,18 +143,13 @@ def _packed(checkpoint: Checkpoint) -> bytes:
     for group, values in named.items():
         arrays |= {f"{group} {number}": value for number, value in enumerate(values.values())}
     facts = {
-        "time": state.time,
-        "step": state.step,
-        "work": dict(state.work),
+        **{name: getattr(state, name) for name in _OF_STATE},
+        **{name: getattr(checkpoint, name) for name in _OF_RUN},
         "names": {group: list(values) for group, values in named.items()},
-        "scene": checkpoint.scene,
-        "step_size": checkpoint.step_size,
-        "steps": checkpoint.steps,
-        "halvings": checkpoint.halvings,
-        "circumstances": dict(checkpoint.environment),
+        "circumstances": checkpoint.environment,
     }
     # JSON gives every finite double back, and has words for NaN and infinities that it reads.
-    text = np.frombuffer(json.dumps(facts).encode(), dtype=np.uint8)
+    text = np.frombuffer(json.dumps(facts, default=dict).encode(), dtype=np.uint8)
     file = io.BytesIO()
     np.savez(file, allow_pickle=False, facts=text, **arrays)
     return file.getvalue()
@@ -165,20 +162,17 @@ def _unpacked(body: bytes) -> Checkpoint:
     with np.load(io.BytesIO(body), allow_pickle=False) as data:
         arrays: dict[str, Any] = {name: data[name] for name in data.files}
     facts = json.loads(bytes(arrays.pop("facts")))
-    named = {
+    named: dict[str, Any] = {
         group: {name: arrays[f"{group} {number}"] for number, name in enumerate(names)}
         for group, names in facts["names"].items()
     }
     checkpoint = Checkpoint(
         state=State(
-            time=facts["time"],
-            step=facts["step"],
-            work=facts["work"],
+            **{name: facts[name] for name in _OF_STATE},
             **{name: arrays[name] for name in _ARRAYS},
-            memory=named["memory"],
-            applied=named["applied"],
+            **{name: named[name] for name in _NAMED},
         ),
-        **{name: facts[name] for name in ("scene", "step_size", "steps", "halvings")},
+        **{name: facts[name] for name in _OF_RUN},
         environment=facts["circumstances"],
         kept=named["kept"],
     )

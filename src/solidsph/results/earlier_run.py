@@ -20,11 +20,9 @@ _ENDED = (FINISHED, "diverged", "unsound", "ConvergenceError")
 class EarlierRun:
     """An earlier run, as far as its record tells."""
 
-    path: Path
     outcome: str = ""  # empty if the record cannot be read
     count: int = 0  # number of outputs
     last_time: float = 0.0  # of the last output [s]
-    scene: str = ""
 
     @property
     def can_resume(self) -> bool:
@@ -77,9 +75,9 @@ def earlier_run_at(path: Path) -> EarlierRun | None:
     try:
         with Record(path) as record:
             last_time = float(record.times[-1]) if record.count else 0.0
-            return EarlierRun(path, record.outcome, record.count, last_time, record.scene)
+            return EarlierRun(record.outcome, record.count, last_time)
     except RecordError:
-        return EarlierRun(path)
+        return EarlierRun()
 
 
 def check_replaceable(path: Path, *, overwrite: bool) -> EarlierRun | None:

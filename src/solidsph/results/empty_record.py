@@ -15,6 +15,7 @@ from solidsph.results.contents import BYTES, Reference
 from solidsph.results.layout import (
     FORMAT,
     OUTCOME_BYTES,
+    PARTICLE_ARRAYS,
     RUNNING,
     VTKHDF_VERSION,
     Field,
@@ -96,31 +97,16 @@ def _write_grid(file: Any, particles: Particles, fields: Sequence[Field]) -> Non
     for field in fields:
         _rows_per_step(data, field, n)
         offsets[field.name] = moving
-    values = _static_values(particles)
-    static = [(field, values[field.name]) for field in static_fields(particles.dimension)]
-    static += [
-        (Field(tag_name(tag), (), "-"), mask.astype(np.uint8))
-        for tag, mask in particles.tags.items()
-    ]
+    arrays = {name: getattr(particles, array) for name, array in PARTICLE_ARRAYS.items()}
+    arrays["body"] = np.full(n, -1, dtype=np.int32)
+    for number, extent in enumerate(particles.bodies.values()):
+        arrays["body"][extent] = number
+    static = [(field, arrays[field.name]) for field in static_fields(particles.dimension)]
+    static += [(Field(tag_name(tag), (), "-"), mask) for tag, mask in particles.tags.items()]
     for field, rows in static:
-        _describe(data.create_dataset(field.name, data=padded(rows, field.components)), field)
+        values = rows.astype(np.uint8) if rows.dtype == np.bool_ else rows
+        _describe(data.create_dataset(field.name, data=padded(values, field.components)), field)
         offsets[field.name] = shared
-
-
-def _static_values(particles: Particles) -> dict[str, Any]:
-    body = np.full(particles.count, -1, dtype=np.int32)
-    for number, rows in enumerate(particles.bodies.values()):
-        body[rows] = number
-    return {
-        "reference_position": particles.positions,
-        "volume": particles.volumes,
-        "cell": particles.cells,
-        "spacing": particles.spacings,
-        "area_vector": particles.area_vectors,
-        "ghost": particles.ghosts.astype(np.uint8),
-        "image": particles.images,
-        "body": body,
-    }
 
 
 def _write_run(file: Any, reference: Reference) -> None:

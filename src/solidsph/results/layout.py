@@ -63,6 +63,18 @@ class PluginUsed:
         return cls(entry.kind, entry.name, entry.distribution, entry.version, entry.target)
 
 
+PARTICLE_ARRAYS = {
+    "reference_position": "positions",
+    "volume": "volumes",
+    "cell": "cells",
+    "spacing": "spacings",
+    "area_vector": "area_vectors",
+    "ghost": "ghosts",
+    "image": "images",
+}
+"""Arrays of reference data: name in a record -> attribute of `Particles`."""
+
+
 def static_fields(dimension: int) -> tuple[Field, ...]:
     """Names, shapes and units of the particles' reference data in a record."""
     d = dimension

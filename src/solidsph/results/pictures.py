@@ -47,11 +47,9 @@ def largest_principal(stress: Array) -> Array:
 
 def _magnitudes(values: Array) -> Array:
     """Scalars, lengths of vectors, or largest principal values of tensors, (n,)."""
-    if values.ndim == 1:
-        return values
-    if values.ndim == 2:
-        return np.asarray(np.linalg.norm(values, axis=1), dtype=np.float64)
-    return largest_principal(values)
+    if values.ndim == 3:
+        return largest_principal(values)
+    return values if values.ndim == 1 else np.asarray(np.linalg.norm(values, axis=1))
 
 
 def _label(record: Record, field: str) -> str:
@@ -68,14 +66,12 @@ def _draw_histories(record: Record, field: str, path: Path) -> None:
     figure = Figure(figsize=(10.0, 4.5), layout="constrained")
     left, right = figure.subplots(1, 2)
     left.plot(record.times, record.positions[:][:, order, 0] - X, color="0.4", linewidth=0.6)
-    left.set_xlabel("time [s]")
-    left.set_ylabel("displacement [m]")
+    left.set(xlabel="time [s]", ylabel="displacement [m]")
     left.set_title(f"{len(order)} particles", fontsize=10)
     # In one dimension vectors and tensors have one component, drawn with its sign.
     values = record.field(field)[:].reshape(record.count, -1)[:, order]
     mesh = right.pcolormesh(X, record.times, values, cmap="cividis", shading="nearest")
-    right.set_xlabel("X [m]")
-    right.set_ylabel("time [s]")
+    right.set(xlabel="X [m]", ylabel="time [s]")
     figure.colorbar(mesh, ax=right, label=_label(record, field))
     figure.savefig(path, dpi=150)
 
@@ -97,9 +93,7 @@ def _draw_bodies(record: Record, field: str, path: Path) -> None:
         x = record.positions[k][real]
         dots = axis.scatter(*x.T, c=colours, s=size, cmap="cividis", vmin=low, vmax=high)
         axis.set_title(f"t = {record.times[k]:.4g} s", fontsize=10)
-        axis.set_xlabel("x [m]")
-        axis.set_ylabel("y [m]")
-        axis.set_aspect("equal")
+        axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     kind = ("", "length of ", "largest principal ")[len(record.field(field).shape) - 2]
     figure.colorbar(dots, ax=axes, shrink=0.8, label=kind + _label(record, field))
     figure.savefig(path, dpi=150)
@@ -118,7 +112,6 @@ def _draw_energies(times: Array, history: Mapping[str, Array], path: Path) -> No
             color=str(0.7 * index / max(1, len(energies))),
             label=name.removesuffix(" [J]"),
         )
-    axis.set_xlabel("time [s]")
-    axis.set_ylabel("energy [J]")
+    axis.set(xlabel="time [s]", ylabel="energy [J]")
     axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
     figure.savefig(path, dpi=150)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
-from types import MappingProxyType, TracebackType
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import h5py
@@ -22,6 +22,7 @@ from solidsph.results.hdf5_source import SIGNATURE, HDF5Source, is_unclosed
 from solidsph.results.layout import (
     FORMAT,
     HDF5_ERRORS,
+    PARTICLE_ARRAYS,
     Field,
     PluginUsed,
     reason,
@@ -209,27 +210,18 @@ class Record:
     def __enter__(self) -> Record:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def _particles(self, run: Any, data: Any) -> Particles:
-        values = {
-            field.name: unpadded(data[field.name][()], field.components)
+        arrays: dict[str, Any] = {
+            PARTICLE_ARRAYS[field.name]: unpadded(data[field.name][()], field.components)
             for field in static_fields(self.dimension)
+            if field.name in PARTICLE_ARRAYS
         }
+        arrays["ghosts"] = arrays["ghosts"].astype(np.bool_)
         return Particles(
-            positions=values["reference_position"],
-            volumes=values["volume"],
-            cells=values["cell"],
-            spacings=values["spacing"],
-            area_vectors=values["area_vector"],
-            ghosts=values["ghost"].astype(np.bool_),
-            images=values["image"],
+            **arrays,
             tags={tag: data[tag_name(tag)][()].astype(np.bool_) for tag in _lines(run, "tags")},
             bodies={
                 name: slice(int(start), int(stop))

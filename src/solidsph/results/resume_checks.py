@@ -12,14 +12,13 @@ from solidsph.errors import RecordError
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import Particles
 from solidsph.results.checkpoint import START_OVER, Checkpoint
+from solidsph.results.layout import PARTICLE_ARRAYS
 from solidsph.results.record import Record
 from solidsph.results.recorder import stress
 from solidsph.run.built_scene import BuiltScene
 
 # Other versions of libraries may round differently; a larger difference, in spacings, is a change.
 _ROUNDING = 1e-9
-
-_ARRAYS = ("positions", "images", "area_vectors", "volumes", "cells", "spacings", "ghosts")
 
 
 def check_same_particles(record: Record, built: Particles, *, exactly: bool) -> None:
@@ -102,7 +101,7 @@ def _differences(then: Particles, now: Particles, exactly: bool) -> Iterator[str
             return
     if then.bodies != now.bodies:
         yield "bodies have other numbers of particles"
-    arrays = [(name, getattr(then, name), getattr(now, name)) for name in _ARRAYS]
+    arrays = [(name, getattr(then, name), getattr(now, name)) for name in PARTICLE_ARRAYS.values()]
     arrays += [(f"tag {tag!r}", mask, now.tags[tag]) for tag, mask in then.tags.items()]
     arrays += [
         (f"{part} of face {name!r}", getattr(face, part), getattr(now.faces[name], part))
