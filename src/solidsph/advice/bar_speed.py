@@ -12,7 +12,7 @@ _NOTABLE = 0.01  # difference of speeds [-]
 
 
 def bar_speed(facts: SceneFacts) -> Iterator[Advice]:
-    """By the confined wave speed against that of a slender bar."""
+    """Compare the confined wave speed with that of a slender bar."""
     if facts.dimension != 1:
         return
     for body in facts.bodies:

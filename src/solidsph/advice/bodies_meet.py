@@ -17,7 +17,7 @@ _TIMES = 50  # at which the bounding boxes are compared
 
 
 def bodies_meet(facts: SceneFacts) -> Iterator[Advice]:
-    """By bounding boxes, moved by the momentum and the loads of the start."""
+    """Compare bounding boxes, moved by the momentum and the loads at the start."""
     if len(facts.bodies) < 2 or not facts.lacks(Need.MEETING):
         return
     times = np.linspace(0.0, facts.scene.duration if facts.is_motion else 0.0, _TIMES)

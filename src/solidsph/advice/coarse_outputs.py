@@ -12,7 +12,7 @@ _PER_PERIOD = 8.0  # outputs
 
 
 def coarse_outputs(facts: SceneFacts) -> Iterator[Advice]:
-    """By the slowest free vibration, if something is quick enough to excite it."""
+    """Compare outputs with the slowest free vibration, if something excites it."""
     if not facts.is_motion or facts.effects_for(Need.REST):
         return
     period, duration = facts.slowest_period, facts.scene.duration

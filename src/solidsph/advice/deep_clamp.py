@@ -16,7 +16,7 @@ _SHARE = 0.1
 
 
 def deep_clamp(facts: SceneFacts) -> Iterator[Advice]:
-    """By the distance of each held particle from the nearest free one."""
+    """Find held particles that are far from every free one."""
     for body in facts.bodies:
         real = ~body.body.particles.ghosts
         held: Mask = np.asarray(facts.held[body.extent][real].all(axis=1))

@@ -21,7 +21,7 @@ _ALONG = 10
 
 
 def few_across(facts: SceneFacts) -> Iterator[Advice]:
-    """By rays through the shape, normal to its surface."""
+    """Count particles along rays through the shape, normal to its surface."""
     for body in facts.bodies:
         least, usual = body.thicknesses
         across = least / body.spacing

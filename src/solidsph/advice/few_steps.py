@@ -11,7 +11,7 @@ _FEW = 10
 
 
 def few_steps(facts: SceneFacts) -> Iterator[Advice]:
-    """By the number of steps; a wave crosses about half a spacing in each."""
+    """Count steps; a wave crosses about half a spacing in each."""
     if not facts.is_motion or facts.simulation.steps >= _FEW:
         return
     longest = max(body.transit for body in facts.bodies)

@@ -16,7 +16,7 @@ _ON = 1e-6
 
 
 def half_supports(facts: SceneFacts) -> Iterator[Advice]:
-    """By constraints: particles on a face that are held along its normal and no other axis.
+    """Find particles on a face that are held along its normal and no other axis.
 
     The peak stress of a quarter of a sheet with a hole is a third too high there, with ever more
     particles (test_half_supports.py); with ghosts beyond the plane it is that of the whole sheet.

@@ -10,7 +10,7 @@ from solidsph.interfaces.effect import Need
 
 
 def hourglass_unneeded(facts: SceneFacts) -> Iterator[Advice]:
-    """By the dimension: a bar has no bending, and control only stiffens its shortest waves."""
+    """Find control in a bar, which has no bending: it only stiffens the shortest waves."""
     if facts.dimension > 1:
         return
     for label in facts.effects_for(Need.UNSEEN_MOTIONS):

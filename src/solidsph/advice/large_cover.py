@@ -23,7 +23,7 @@ _USUAL = 3.0
 
 
 def large_cover(facts: SceneFacts) -> Iterator[Advice]:
-    """By what the gradient holds on a lattice in rows, and by the number of neighbours."""
+    """Check what the gradient holds on a lattice in rows, and the number of neighbours."""
     d, cover = facts.dimension, facts.cover
     body = facts.simulation.model.bodies[0]
     kernel = body.smoothing.kernel

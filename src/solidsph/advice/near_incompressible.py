@@ -14,7 +14,7 @@ _TOO_NEARLY = 0.4999
 
 
 def near_incompressible(facts: SceneFacts) -> Iterator[Advice]:
-    """By Poisson's ratio: pressures oscillate, the body locks, or waves are too fast."""
+    """Check Poisson's ratio: near 0.5 pressures oscillate, bodies lock, and waves are fast."""
     if facts.dimension == 1:
         return
     for body in facts.bodies:

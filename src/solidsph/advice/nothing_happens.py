@@ -9,7 +9,7 @@ from solidsph.advice.scene_facts import SceneFacts
 
 
 def nothing_happens(facts: SceneFacts) -> Iterator[Advice]:
-    """By loads, prescribed motions and the initial state, if all are zero."""
+    """Check loads, prescribed motions and the initial state."""
     if facts.imposed or not facts.starts_at_rest:
         return
     loads = ", ".join(repr(load.label) for load in facts.loads)

@@ -14,7 +14,7 @@ _LONG = 0.3  # of the duration
 
 
 def overdamped(facts: SceneFacts) -> Iterator[Advice]:
-    """By the slowest free vibration, which a damping of 2 omega brings to rest the soonest."""
+    """Compare damping with the slowest vibration, which 2 omega brings to rest the soonest."""
     if not facts.is_motion:
         return
     omega = 2.0 * pi / facts.slowest_period

@@ -18,7 +18,7 @@ _UNITS = "check the units: Pa, m, s, m/s^2"
 
 
 def overloaded(facts: SceneFacts) -> Iterator[Advice]:
-    """By stress over stiffness, velocity over wave speed, displacement over size."""
+    """Compare stress with stiffness, velocity with wave speed, displacement with size."""
     softest = min(body.youngs_modulus for body in facts.bodies)
     for load in facts.loads:
         stress = float(load.stresses.max())

@@ -19,7 +19,7 @@ _LISTED = 3
 
 
 def pressed_at_start(facts: SceneFacts) -> Iterator[Advice]:
-    """By the forces between bodies at the start, over the faces of the particles' cells."""
+    """Divide the forces between bodies at the start by the faces of cells and the modulus."""
     particles = facts.simulation.particles
     faces = np.where(particles.ghosts, np.inf, particles.volumes) ** (1.0 - 1.0 / facts.dimension)
     moduli = np.concatenate([np.full(b.body.particles.count, b.modulus) for b in facts.bodies])

@@ -143,7 +143,7 @@ class SceneFacts:
 
     @property
     def is_motion(self) -> bool:
-        """Whether it is a motion, not an equilibrium."""
+        """True if it is a motion, not an equilibrium."""
         return self.scene.statics is None
 
     @property
@@ -159,7 +159,7 @@ class SceneFacts:
         }
 
     def lacks(self, need: Need) -> bool:
-        """Whether nothing answers a need; an effect that does not declare its needs may."""
+        """True if nothing answers a need; an effect that does not declare its needs may."""
         undeclared = any(effect.answers is None for effect in self.simulation.effects.values())
         return not self.effects_for(need) and not undeclared
 
@@ -170,7 +170,7 @@ class SceneFacts:
 
     @cached_property
     def fits_surface(self) -> bool:
-        """Whether the gradient is corrected for each body, so that sums are right at surfaces."""
+        """True if the gradient is corrected for each body, so that sums are right at surfaces."""
         formulation: Formulation = construct("formulations", self.scene.formulation)
         return type(formulation.gradient).of_body is not Gradient.of_body
 
@@ -243,7 +243,7 @@ class SceneFacts:
 
     @property
     def starts_at_rest(self) -> bool:
-        """Whether nothing moves or is displaced at the start."""
+        """True if nothing moves or is displaced at the start."""
         return not (self.velocities.any() or self.displacements.any())
 
     @cached_property

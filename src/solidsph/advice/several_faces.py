@@ -23,7 +23,7 @@ _AHEAD, _TOUCHING = 0.75, 1.5
 
 
 def several_faces(facts: SceneFacts) -> Iterator[Advice]:
-    """By the area that a load takes of each face.
+    """Compare the areas that a load takes of each face.
 
     A corner that is picked by coordinates owns some of every face that meets there. A condition
     with "surface", or of names alone, such as "not left", means all of it. So does the name of a
@@ -86,7 +86,7 @@ def _shares(pieces: Pieces, chosen: Mask) -> dict[str, float]:
 
 
 def _in_several_bodies(pieces: Pieces, chosen: Mask, names: frozenset[str]) -> bool:
-    """Whether a condition that names no body names a face of several."""
+    """True if a condition that names no body names a face of several."""
     particles = pieces.particles
     if len(particles.bodies) < 2 or names & {*particles.bodies, *pieces.conditions}:
         return False
@@ -95,7 +95,7 @@ def _in_several_bodies(pieces: Pieces, chosen: Mask, names: frozenset[str]) -> b
 
 
 def _covered(pieces: Pieces, chosen: Mask) -> bool:
-    """Whether some of the chosen surface faces a particle of another body that touches it."""
+    """True if some of the chosen surface faces a particle of another body that touches it."""
     particles = pieces.particles
     X, spacings = particles.positions, particles.spacings
     numbers = np.flatnonzero(chosen)

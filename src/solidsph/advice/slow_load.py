@@ -17,7 +17,7 @@ _REMEDY = "[statics] finds the equilibrium in a few load steps (statics, in plac
 
 
 def slow_load(facts: SceneFacts) -> Iterator[Advice]:
-    """By the slowest period of a body; not if its material has a history, or waves are imposed."""
+    """Compare rises with the slowest period, without material history or initial velocity."""
     if (
         not facts.is_motion
         or any(isinstance(b.material, HistoryMaterial) for b in facts.simulation.model.bodies)

@@ -20,7 +20,7 @@ _PLACES = (0.0, 0.25, 0.5)
 
 
 def small_cover(facts: SceneFacts) -> Iterator[Advice]:
-    """By the largest error of the kernel's sum over a lattice, which should be 1."""
+    """Sum the kernel over a lattice; the sum should be 1."""
     own = facts.simulation.model.bodies[0].smoothing
     error = _error(own, facts.cover)
     if error <= _WRONG:

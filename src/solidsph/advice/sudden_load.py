@@ -13,7 +13,7 @@ _CELLS = 4.0
 
 
 def sudden_load(facts: SceneFacts) -> Iterator[Advice]:
-    """By the time of rise against that of a wave across a spacing."""
+    """Compare rise times with the time of a wave across a spacing."""
     if not facts.is_motion or not facts.lacks(Need.SHOCKS):
         return
     time = facts.cell_time

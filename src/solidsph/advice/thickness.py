@@ -156,7 +156,7 @@ def _normals(surface: Boundary, ends: Array) -> Array:
 def _meet(
     surface: Boundary, starts: Array, directions: Array, lengths: Array, normals: Array
 ) -> Mask:
-    """Whether the planes through both ends of a ray meet where the surface is, (k,)."""
+    """True if the planes through both ends of a ray meet where the surface is, (k,)."""
     facing = np.einsum("ki,ki->k", normals, directions)
     along = normals - facing[:, None] * directions
     slope = np.linalg.norm(along, axis=1)  # the sine of the angle between the planes

@@ -1,4 +1,4 @@
-"""The same effect twice: it acts twice as much."""
+"""Two equal effects, which act twice as much as one."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from solidsph.advice.scene_facts import SceneFacts
 
 
 def twice(facts: SceneFacts) -> Iterator[Advice]:
-    """By kind and parameters."""
+    """Compare effects by kind and parameters."""
     for (a, first), (b, second) in combinations(facts.simulation.effects.items(), 2):
         if first == second:
             yield Advice(

@@ -15,7 +15,7 @@ _FAR = 5.0  # lengths of the body
 
 
 def unheld(facts: SceneFacts) -> Iterator[Advice]:
-    """By how far the forces carry it in the duration; or an equilibrium does not exist."""
+    """Find how far the forces carry a body, or that an equilibrium does not exist."""
     if not facts.lacks(Need.MEETING):
         return
     for body in facts.bodies:

@@ -16,7 +16,7 @@ _SPEED_REMEDY = "youngs_modulus is in Pa and density in kg/m^3: steel has 210e9 
 
 
 def units(facts: SceneFacts) -> Iterator[Advice]:
-    """By density and wave speed of every body, where mass has any effect."""
+    """Check density and wave speed of every body, where mass has any effect."""
     weights = (load.accelerations.any() and not load.on_surface for load in facts.loads)
     if not facts.is_motion and not any(weights):
         return

@@ -14,7 +14,7 @@ _VIOLENT = 0.05
 
 
 def unseen_motions(facts: SceneFacts) -> Iterator[Advice]:
-    """By the largest velocity; docs/hourglass.md measures such motions in a column."""
+    """Check the largest velocity; docs/hourglass.md measures such motions in a column."""
     if facts.dimension == 1 or not facts.is_motion or not facts.lacks(Need.UNSEEN_MOTIONS):
         return
     degree = max(body.exact_degree for body in facts.bodies)

@@ -13,7 +13,7 @@ _CELLS, _SLOW = 20.0, 0.02
 
 
 def viscosity_unneeded(facts: SceneFacts) -> Iterator[Advice]:
-    """By loads, prescribed motions and initial velocities, if all are smooth and slow."""
+    """Check whether loads, prescribed motions and initial velocities are smooth and slow."""
     viscous = facts.effects_for(Need.SHOCKS)
     if not viscous or len(facts.bodies) > 1:
         return

@@ -24,6 +24,8 @@ import numpy as np
 from solidsph.errors import RecordError
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
+from solidsph.results.layout import HDF5_ERRORS
+from solidsph.results.record_file import explained
 from solidsph.scene.scene_data import MOST_STEPS
 from solidsph.system.files import content
 from solidsph.system.signals import uninterrupted
@@ -36,11 +38,8 @@ _NAMED = ("memory", "applied")
 _OF_STATE = ("time", "step", "work")
 _OF_RUN = ("scene", "step_size", "steps", "halvings")
 
-# What reading an npz file may raise; behind a right digest, only by a fault of ours.
-_NPZ_ERRORS = (
-    *(OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError),
-    *(zipfile.BadZipFile, MemoryError, RecursionError, NotImplementedError),
-)
+# Errors in reading an npz file; if its digest is right, only a fault of ours can cause them.
+_NPZ_ERRORS = (*HDF5_ERRORS, zipfile.BadZipFile)
 
 _MOST_HALVINGS = 60  # of a step: beyond, adding a step to a time would not change it
 
@@ -80,8 +79,12 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
     body = _packed(checkpoint)
     head = f"{_MAGIC} {FORMAT} {_digest(body)}\n".encode()
     draft = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    remedy = (
+        "the record and any earlier checkpoint are as they were: free some space or choose another "
+        "folder, then resume"
+    )
     try:
-        with uninterrupted():
+        with uninterrupted(), explained(f"cannot write the checkpoint {path}", remedy):
             path.parent.mkdir(parents=True, exist_ok=True)
             with draft.open("wb") as file:
                 file.write(head)
@@ -89,12 +92,6 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
                 file.flush()
                 os.fsync(file.fileno())
             draft.replace(path)
-    except OSError as cause:
-        raise RecordError(
-            f"cannot write the checkpoint {path}: {cause.strerror or cause}; the record and any "
-            "earlier checkpoint are as they were: free some space or choose another folder, then "
-            "resume"
-        ) from None
     finally:
         with suppress(OSError):  # after a success there is no draft any more
             draft.unlink()
@@ -106,12 +103,8 @@ def read_checkpoint(path: Path) -> Checkpoint:
     Raises:
         RecordError: there is none, it is damaged, or a newer solidsph wrote it.
     """
-    try:
+    with explained(f"the checkpoint {path} cannot be read", "check the path"):
         data = content(path, sys.maxsize)
-    except OSError as cause:
-        raise RecordError(
-            f"the checkpoint {path} cannot be read: {cause.strerror or cause}; check the path"
-        ) from None
     head, end, body = data[:_LONGEST_HEAD].partition(b"\n")
     words = head.decode("ascii", errors="replace").removeprefix(_MAGIC).split()
     if not (end and head.startswith(_MAGIC.encode()) and len(words) == 2 and words[0].isdecimal()):

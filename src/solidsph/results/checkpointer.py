@@ -84,7 +84,7 @@ class Checkpointer:
 
     @property
     def _is_recorded(self) -> bool:
-        """Whether the record is still there, and no other file in its place."""
+        """True if the record is still there, and no other file in its place."""
         try:
             return self._recorded is not None and samestat(self._recorded, self._record.stat())
         except OSError:

@@ -52,7 +52,7 @@ def _installed() -> dict[str, str]:
 
 @attrs.frozen(eq=False, kw_only=True)
 class Reference:
-    """What a record holds once, for all steps."""
+    """Data of a record that all its steps share."""
 
     particles: Particles
     scene: str  # what was asked for, as TOML text

@@ -1,4 +1,4 @@
-"""What an earlier run has left where a new one is to be recorded."""
+"""The earlier run whose record is where a new one is to be written."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class EarlierRun:
 
     @property
     def can_resume(self) -> bool:
-        """Whether `resume` can go on with it, so that replacing it would lose work."""
+        """True if `resume` can go on with it, so that replacing it would lose work."""
         return self.count > 1 and not self.outcome.startswith(_ENDED)
 
     @property
     def description(self) -> str:
-        """What it is, in words."""
+        """Description in words."""
         if not self.outcome:
             return "a record that cannot be read"
         end = f"up to t = {self.last_time:.6g} s"

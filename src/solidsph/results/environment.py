@@ -33,7 +33,7 @@ def run_environment(simulation: BuiltScene) -> Mapping[str, str]:
 
 
 def is_part(name: str) -> bool:
-    """Whether an entry is about a part, which not every run uses."""
+    """True if an entry is about a part, which not every run uses."""
     return " " in name and not name.startswith(_CODE)
 
 
@@ -83,7 +83,7 @@ def _threads() -> str:
 
 
 def differences(then: Mapping[str, str], now: Mapping[str, str]) -> Sequence[str]:
-    """What has changed between two environments, in words."""
+    """Changes between two environments, in words."""
     return [
         f"{name} was {then.get(name, 'not there')}, is {now.get(name, 'not there')}"
         for name in dict.fromkeys((*then, *now))

@@ -27,7 +27,7 @@ _WORD = 0xFFFFFFFF
 
 
 def is_unclosed(head: bytes | bytearray) -> bool:
-    """Whether a file that begins with these bytes is marked as open for writing."""
+    """True if a file that begins with these bytes is marked as open for writing."""
     return len(head) >= _SIZE and head.startswith(SIGNATURE + b"\x03\x08\x08") and head[11] != 0
 
 

@@ -49,7 +49,7 @@ class Field:
 
 @attrs.frozen
 class PluginUsed:
-    """Where one part of a run came from."""
+    """Origin of one part of a run."""
 
     group: str  # "solidsph.kernels"
     name: str  # "cubic-spline"
@@ -59,7 +59,7 @@ class PluginUsed:
 
     @classmethod
     def of(cls, entry: Entry) -> PluginUsed:
-        """The same part, from its entry in the registry."""
+        """Convert an entry of the registry."""
         return cls(entry.kind, entry.name, entry.distribution, entry.version, entry.target)
 
 

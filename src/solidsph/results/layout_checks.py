@@ -1,4 +1,4 @@
-"""Whether a file has the layout of a record: what must be where, of which type and shape.
+"""Checks that a file has the layout of a record: entries, types and shapes.
 
 `layout` says what each entry means; here is what the reader relies on, as one table. What only VTK
 reads is not checked. A file that does not fit gives a `ValueError` that says where.
@@ -44,7 +44,7 @@ class Entry:
         return f"{self.path}@{self.attribute}" if self.attribute else self.path
 
     def fits(self, shape: tuple[int, ...]) -> bool:
-        """Whether something of this shape is as it must be."""
+        """True if `shape` is allowed."""
         if self.may_have_more_rows and shape:
             shape = (min(shape[0], int(self.shape[0])), *shape[1:])
         return len(shape) == len(self.shape) and all(

@@ -140,7 +140,7 @@ class Record:
 
     @property
     def reference(self) -> Reference:
-        """What all steps share, as `RecordWriter` takes it."""
+        """Data that all steps share, as `RecordWriter` takes them."""
         return Reference(
             particles=self.particles,
             scene=self.scene,

@@ -24,7 +24,7 @@ from solidsph.run.restart_point import RestartPoint
 from solidsph.system.files import working_folder
 
 COMPOSED = "# this scene was composed in Python"
-"""How the text of a scene begins that has no file form."""
+"""Beginning of the text of a scene that has no file form."""
 
 # What must come out the same if a run repeats an output that its record holds.
 _REPEATED = ("velocity", "cauchy_stress")

@@ -1,4 +1,4 @@
-"""Whether a run can go on: what is built now must be what the record was made with."""
+"""Checks before a run goes on: what is built now must be what the record was made with."""
 
 from __future__ import annotations
 

@@ -15,6 +15,7 @@ from functools import cache
 from pathlib import Path
 
 from solidsph.errors import RecordError
+from solidsph.results.record_file import explained
 
 try:
     import fcntl
@@ -34,14 +35,9 @@ def sole_writer(path: Path) -> Iterator[None]:
             written.
     """
     lock = _lock_of(path)
-    try:
+    with explained(f"cannot create {path}", "choose a path in a folder that you may write to"):
         lock.parent.mkdir(parents=True, exist_ok=True)
         handle = _locked(lock, path)
-    except OSError as cause:
-        raise RecordError(
-            f"cannot create {path}: {cause.strerror or cause}; choose a path in a folder that you "
-            "may write to"
-        ) from None
     try:
         yield
     finally:

@@ -14,7 +14,7 @@ from solidsph.run.built_scene import BuiltScene
 
 
 class Grade(Enum):
-    """How much a finding matters."""
+    """Severity of a finding."""
 
     WARNING = "warning"  # the run may go on, its result is in doubt
     FAILURE = "failure"  # going on is of no use
