@@ -19,7 +19,7 @@ def coarse_outputs(facts: SceneFacts) -> Iterator[Advice]:
     interval = duration / min(facts.scene.outputs, facts.simulation.steps)
     if interval <= period / _PER_PERIOD or duration <= period:
         return
-    is_excited = not facts.starts_at_rest or any(one.rise < period for one in facts.imposed)
+    is_excited = not facts.starts_at_rest or any(h.rise < period for h in facts.imposed)
     if is_excited and all(body.is_held for body in facts.bodies):
         yield Advice(
             finding=f"an output every {interval:.2g} s, and the slowest free vibration has a "

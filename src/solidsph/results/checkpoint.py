@@ -71,11 +71,7 @@ def checkpoint_path(record: Path) -> Path:
 
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
-    """Write a whole checkpoint to the disk; until then an older one stays.
-
-    Raises:
-        RecordError: it cannot be written; an older one is still there.
-    """
+    """Write a whole checkpoint to the disk; if that fails, RecordError, and an older one stays."""
     body = _packed(checkpoint)
     head = f"{_MAGIC} {FORMAT} {_digest(body)}\n".encode()
     draft = path.with_name(f"{path.name}.{os.getpid()}.partial")
@@ -98,11 +94,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
-    """Read a checkpoint.
-
-    Raises:
-        RecordError: there is none, it is damaged, or a newer solidsph wrote it.
-    """
+    """Read a checkpoint; RecordError if there is none, or it is damaged or of another format."""
     with explained(f"the checkpoint {path} cannot be read", "check the path"):
         data = content(path, sys.maxsize)
     head, end, body = data[:_LONGEST_HEAD].partition(b"\n")
@@ -174,11 +166,7 @@ def _unpacked(body: bytes) -> Checkpoint:
 
 
 def _check(checkpoint: Checkpoint) -> None:
-    """Check types and sizes: a digest shows only that the file is whole.
-
-    Raises:
-        ValueError: something is not as a run leaves it.
-    """
+    """Raise ValueError for types or sizes that no run leaves: a digest shows only a whole file."""
     state = checkpoint.state
     shape = state.positions.shape
     moving = {name: getattr(state, name) for name in _ARRAYS}

@@ -43,11 +43,7 @@ class EarlierRun:
 
 
 def check_no_other_file(path: Path) -> None:
-    """Check that a record may be written there: in place of another record, but of nothing else.
-
-    Raises:
-        RecordError: there is something else.
-    """
+    """Raise RecordError if anything other than a record is there, which must not be replaced."""
     check_writable(path, overwrite=True)
     if not _has_content(path):
         return
@@ -64,11 +60,7 @@ def _has_content(path: Path) -> bool:
 
 
 def earlier_run_at(path: Path) -> EarlierRun | None:
-    """The run whose record is there; None if there is no file, or an empty one.
-
-    Raises:
-        RecordError: there is something other than a record, which a record must not replace.
-    """
+    """The run whose record is there, None without a file or in an empty one; or RecordError."""
     check_no_other_file(path)
     if not _has_content(path):
         return None

@@ -31,11 +31,7 @@ _LARGEST_CHUNK = 2**30  # bytes; HDF5 allows just under 4 GiB
 
 
 def check_fields(fields: Sequence[Field], particles: Particles) -> None:
-    """Check that a record of these particles can hold these fields.
-
-    Raises:
-        RecordError: a name is taken or impossible, or components are no scalar, vector or tensor.
-    """
+    """Raise RecordError unless a record of these particles can hold these fields."""
     d = particles.dimension
     taken = {field.name for field in static_fields(d)} | {tag_name(tag) for tag in particles.tags}
     for field in fields:

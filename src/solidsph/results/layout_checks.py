@@ -71,11 +71,7 @@ _FIRST = (
 
 
 def check_first(tree: Tree) -> None:
-    """Check the entries that say what else there is.
-
-    Raises:
-        ValueError: something does not fit.
-    """
+    """Raise ValueError unless the entries that say what else there is fit."""
     for entry in _FIRST:
         _check(tree, entry)
     dimension = tree.item("solidsph").attrs["dimension"]
@@ -90,11 +86,7 @@ def check_first(tree: Tree) -> None:
 
 
 def check_rest(tree: Tree, steps: int, fields: Sequence[str], tags: Sequence[str]) -> None:
-    """Check everything else, for this number of steps.
-
-    Raises:
-        ValueError: something does not fit.
-    """
+    """Raise ValueError unless everything else fits, for this number of steps."""
     for entry in _rest(tree, steps, fields, tags):
         _check(tree, entry)
 
@@ -182,11 +174,7 @@ class Tree:
     _known: dict[str, Any] = attrs.field(factory=dict, init=False)
 
     def item(self, path: str, *, is_optional: bool = False) -> Any:
-        """A group or a dataset; None if it is optional and missing.
-
-        Raises:
-            ValueError: it is missing, or a link to elsewhere.
-        """
+        """A group or a dataset; None if it is optional and missing, else ValueError."""
         if path not in self._known:
             above, _, name = path.rpartition("/")
             holder = self.item(above) if above else self.file
@@ -216,11 +204,7 @@ def _check_data(dataset: Any, where: str) -> None:
 
 
 def check_values(particles: Particles, times: Any, steps: Any) -> None:
-    """Check that values make sense together.
-
-    Raises:
-        ValueError: something does not.
-    """
+    """Raise ValueError unless values make sense together."""
     n = particles.count
     for name in ("positions", "volumes", "cells", "spacings", "area_vectors", "images"):
         if not np.isfinite(getattr(particles, name)).all():

@@ -165,11 +165,7 @@ class Record:
         )
 
     def checked_output(self, place: int) -> Output:
-        """All of one step, checked to be what was written, to the last bit.
-
-        Raises:
-            RecordError: it is not; the file was damaged.
-        """
+        """All of one step; RecordError unless it is what was written, to the last bit."""
         output = self.output(place)
         digests = self._file["solidsph/digests"]
         written: NDArray[np.uint8] = self._with_retries(lambda: digests[place])
@@ -181,11 +177,7 @@ class Record:
         return output
 
     def field(self, name: str) -> TimeSeries:
-        """The named field over time: (steps, n, *components), lazily.
-
-        Raises:
-            RecordError: the record has no such field.
-        """
+        """The named field over time: (steps, n, *components), lazily; RecordError without it."""
         if name not in self._fields:
             near = get_close_matches(name, self.field_names, n=1)
             hint = f"did you mean {near[0]!r}? " if near else ""
@@ -303,11 +295,7 @@ def _run(file: Any, path: Path) -> Any:
 
 
 def check_is_record(path: Path) -> None:
-    """Check that the file is a record, damaged or not; only little of it is read.
-
-    Raises:
-        NotARecordError: it is something else.
-    """
+    """Raise NotARecordError unless a file is a record, damaged or not; little of it is read."""
     _head(path)
     with suppress(*HDF5_ERRORS), HDF5Source(path) as opened, h5py.File(opened, "r") as file:
         _run(file, path)

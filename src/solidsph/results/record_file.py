@@ -14,11 +14,7 @@ from solidsph.results.layout import HDF5_ERRORS, reason
 
 @contextmanager
 def explained(problem: str, remedy: str) -> Iterator[None]:
-    """Replace errors of the file system or of HDF5 by one clear message.
-
-    Raises:
-        RecordError: in place of such an error.
-    """
+    """Replace an error of the file system or of HDF5 by a RecordError with a clear message."""
     try:
         yield
     except HDF5_ERRORS as error:
@@ -26,10 +22,9 @@ def explained(problem: str, remedy: str) -> Iterator[None]:
 
 
 def check_space(path: Path, size: int) -> None:
-    """Check that a file can grow by `size` bytes, without HDF5, which a failed write would damage.
+    """Raise OSError if a device, quota or limit has no room for `size` more bytes of a file.
 
-    Raises:
-        OSError: the device is full, or a quota or a limit does not allow it.
+    This is found without HDF5, which a failed write would damage.
     """
     if not hasattr(os, "posix_fallocate"):
         return
@@ -45,11 +40,7 @@ def check_space(path: Path, size: int) -> None:
 
 
 def check_writable(path: Path, *, overwrite: bool) -> None:
-    """Check that a record may be written to `path`; only `overwrite` allows to replace a file.
-
-    Raises:
-        RecordError: it may not.
-    """
+    """Raise RecordError unless a record may be written to `path`, or may `overwrite` a file."""
     if path.is_dir():
         example = path / "result.vtkhdf"
         raise RecordError(f"{path} is a folder, not a file; write to {example} for example")

@@ -14,11 +14,7 @@ from solidsph.run.restart_point import RestartPoint
 
 @contextmanager
 def recording(record: Path, since: RestartPoint | None) -> Iterator[tuple[Checkpointer, Recorder]]:
-    """Observers of a run that write `record`; within the block no other run does.
-
-    Raises:
-        RecordError: another run writes the record.
-    """
+    """Observers of a run that write `record`; RecordError if another run writes it."""
     # A run from the first state has no use for an earlier checkpoint.
     is_resumed = since is not None and since.state is not None
     with sole_writer(record):

@@ -45,11 +45,7 @@ def sole_writer(path: Path) -> Iterator[None]:
 
 
 def check_no_writer(path: Path) -> None:
-    """Check that no run is writing `path` now.
-
-    Raises:
-        RecordError: a run is; the message names its process.
-    """
+    """Raise RecordError if a run is writing `path` now; the message names its process."""
     lock = _lock_of(path)
     if fcntl is None or not lock.exists():
         return
@@ -94,11 +90,7 @@ def _locked(lock: Path, path: Path) -> int:
 
 
 def _lock(handle: int, kind: int, lock: Path, path: Path) -> None:
-    """Lock an open file, if the file system has locks.
-
-    Raises:
-        RecordError: another run has locked it.
-    """
+    """Lock an open file, if the file system has locks; RecordError if another run has done so."""
     try:
         fcntl.flock(handle, kind | fcntl.LOCK_NB)
     except BlockingIOError:
