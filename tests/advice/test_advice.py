@@ -123,16 +123,16 @@ def test_its_cost_does_not_grow_with_the_body(monkeypatch: pytest.MonkeyPatch) -
         count = 0
 
         def heights(
-            self: thickness.Boundary,
+            self: thickness.SampledSurface,
             points: Array,
-            plain: Callable[..., tuple[Array, Array]] = thickness.Boundary.heights,
+            plain: Callable[..., tuple[Array, Array]] = thickness.SampledSurface.heights,
         ) -> tuple[Array, Array]:
             nonlocal count
             count += len(points)
             return plain(self, points)
 
         with monkeypatch.context() as patched:
-            patched.setattr(thickness.Boundary, "heights", heights)
+            patched.setattr(thickness.SampledSurface, "heights", heights)
             advise(simulation)
         asked[spacing] = count
     # Every step along a ray is one; near a surface steps are a part of the spacing, half as long.

@@ -17,7 +17,7 @@ from solidsph.advice.load_histories import (
     load_histories,
     motion_histories,
 )
-from solidsph.advice.thickness import through
+from solidsph.advice.thickness import rays_through
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.formulation import Formulation
@@ -104,7 +104,7 @@ class BodyFacts:
         samples = self.real[:: max(1, len(self.real) // _SAMPLES)]
         if (shape.signed_distance(samples) > self.spacing).mean() > 0.02:
             raise ValueError("particles do not stand where the shape is")
-        rays = through(shape, self.spacing)
+        rays = rays_through(shape, self.spacing)
         some = self.real[:: max(1, len(self.real) // _LOOKED_AT)]
         widest = 2.0 * float(-shape.signed_distance(some).min())
         return rays.least(widest), rays.usual(widest)

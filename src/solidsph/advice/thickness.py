@@ -72,7 +72,7 @@ def _below(lengths: Array, areas: Array, part: float) -> float:
 
 
 @attrs.frozen(eq=False)
-class Boundary:
+class SampledSurface:
     """Samples of a surface, and how to find the nearest."""
 
     points: Array  # (m, d) [m]
@@ -95,7 +95,7 @@ class Boundary:
         return np.asarray(gaps), np.asarray(near, dtype=np.intp)
 
 
-def through(shape: Shape, spacing: float) -> Rays:
+def rays_through(shape: Shape, spacing: float) -> Rays:
     """Rays through `shape`, whose surface is sampled for this spacing [m]."""
     surface = _boundary(shape, spacing)
     count = len(surface.points)
@@ -112,18 +112,18 @@ def through(shape: Shape, spacing: float) -> Rays:
     return Rays(lengths, areas[ended], facing, corner)
 
 
-def _boundary(shape: Shape, spacing: float) -> Boundary:
+def _boundary(shape: Shape, spacing: float) -> SampledSurface:
     surface = shape.surface(spacing)
     sizes = np.linalg.norm(surface.area_vectors, axis=1)
     owned = sizes > 0.0
     points, sizes = surface.points[owned], sizes[owned]
     inward = -surface.area_vectors[owned] / sizes[:, None]
     step = float(np.median(sizes) ** (1.0 / (shape.dimension - 1)))
-    return Boundary(points, inward, sizes, cKDTree(points), step)
+    return SampledSurface(points, inward, sizes, cKDTree(points), step)
 
 
 def _lengths(
-    surface: Boundary, starts: Array, directions: Array, spacing: float
+    surface: SampledSurface, starts: Array, directions: Array, spacing: float
 ) -> tuple[Array, Mask]:
     """Length of each ray inside (k,) [m], and whether it left within the steps made."""
     # No ray begins at an edge, along which it would run: a third of a spacing to the middle.
@@ -144,7 +144,7 @@ def _lengths(
     return lengths, ended
 
 
-def _normals(surface: Boundary, ends: Array) -> Array:
+def _normals(surface: SampledSurface, ends: Array) -> Array:
     """Inward normals where rays leave, (k, d); at the tip of a notch the mean of its sides."""
     gaps, near = surface.nearest(ends, 8)
     weights = (gaps <= gaps[:, :1] + 1.5 * surface.step).astype(np.float64)
@@ -154,7 +154,7 @@ def _normals(surface: Boundary, ends: Array) -> Array:
 
 
 def _meet(
-    surface: Boundary, starts: Array, directions: Array, lengths: Array, normals: Array
+    surface: SampledSurface, starts: Array, directions: Array, lengths: Array, normals: Array
 ) -> Mask:
     """True if the planes through both ends of a ray meet where the surface is, (k,)."""
     facing = np.einsum("ki,ki->k", normals, directions)
@@ -166,7 +166,7 @@ def _meet(
     return np.asarray((-facing < _PARALLEL) & (gaps < 0.1 * lengths + surface.step))
 
 
-def _notches(surface: Boundary) -> tuple[Array, Array]:
+def _notches(surface: SampledSurface) -> tuple[Array, Array]:
     """Rays from the tips of notches, between the normals of their sides, each (k, d)."""
     points, inward = surface.points, surface.inward
     pairs = surface.tree.query_pairs(1.5 * surface.step, output_type="ndarray")

@@ -10,7 +10,7 @@ import numpy as np
 from solidsph.errors import PluginError, RecordError
 from solidsph.interfaces.terms import EnergyTerm, FieldTerm, Observation, Term
 from solidsph.maths.arrays import Array
-from solidsph.results.layout import field_name, static_fields, tag_name
+from solidsph.results.layout import Field, field_name, static_fields, tag_name
 from solidsph.run.energy import BY_BODY, ledger
 from solidsph.scene import returned_values
 
@@ -46,13 +46,23 @@ def history(observation: Observation, initial: float, terms: Sequence[Term]) -> 
     return columns
 
 
-def fields(observation: Observation, terms: Sequence[Term]) -> Iterator[tuple[str, str, Array]]:
-    """Name, unit and values of every field that terms record."""
+def fields(observation: Observation, terms: Sequence[Term]) -> Iterator[tuple[Field, Array]]:
+    """Every field and its values: those of every record, then those of terms."""
+    basic = (observation.state.velocities, stress(observation), observation.volume_ratios)
+    for (name, unit), values in zip(BASIC_FIELDS.items(), basic, strict=True):
+        yield Field(name, values.shape[1:], unit), values
     for term in terms:
         if isinstance(term, FieldTerm):
             for name, values in term.fields(observation).items():
                 quantity, unit = split_unit(name)
-                yield field_name(quantity), unit, values
+                yield Field(field_name(quantity), np.shape(values)[1:], unit), values
+
+
+def stress(observation: Observation) -> Array:
+    """Cauchy stress P F^T / J of every particle, (n, d, d) [Pa]."""
+    F, P = observation.deformation_gradients, observation.stresses
+    sigma: Array = np.einsum("pik,pjk->pij", P, F) / observation.volume_ratios[:, None, None]
+    return sigma
 
 
 def split_unit(name: str) -> tuple[str, str]:

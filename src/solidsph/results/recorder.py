@@ -12,9 +12,8 @@ from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array
 from solidsph.results.contents import Output, Reference
 from solidsph.results.earlier_run import check_no_other_file
-from solidsph.results.layout import Field, PluginUsed
-from solidsph.results.output_fields import BASIC_FIELDS, history, split_unit
-from solidsph.results.output_fields import fields as term_fields
+from solidsph.results.layout import PluginUsed
+from solidsph.results.output_fields import fields, history, split_unit
 from solidsph.results.record import Record
 from solidsph.results.record_writer import RecordWriter
 from solidsph.run.built_scene import BuiltScene
@@ -59,15 +58,13 @@ class Recorder:
         if self._writer is None:
             self._writer = self._open(simulation, observation)
         state = observation.state
-        fields = _basic_fields(observation) | {
-            name: values for name, _, values in term_fields(observation, simulation.terms)
-        }
+        values = {field.name: array for field, array in fields(observation, simulation.terms)}
         columns = self._history(simulation, observation)
         self.final.update(columns)
         if state.time <= self._writer.last_time:
-            self._check_repeated(observation, fields)
+            self._check_repeated(observation, values)
             return
-        self._writer.append(Output(state.time, state.step, state.positions, fields, columns))
+        self._writer.append(Output(state.time, state.step, state.positions, values, columns))
 
     @implementation
     def solidsph_finish(self, outcome: str) -> None:
@@ -84,19 +81,11 @@ class Recorder:
             first = (earlier.history[name][0] for name in (KINETIC, STRAIN))
             self._initial_energy = float(sum(first))
         columns = self._history(simulation, observation)
-        fields = [
-            Field(name, values.shape[1:], BASIC_FIELDS[name])
-            for name, values in _basic_fields(observation).items()
-        ]
-        fields += [
-            Field(name, values.shape[1:], unit)
-            for name, unit, values in term_fields(observation, simulation.terms)
-        ]
         reference = Reference(
             particles=simulation.particles,
             scene=scene_text(simulation),
             plugins=[PluginUsed.of(entry) for entry in simulation.parts],
-            fields=fields,
+            fields=[field for field, _ in fields(observation, simulation.terms)],
             columns={name: split_unit(name)[1] for name in columns},
             notes=() if self._since is None else self._since.notes,
             folder=str(working_folder()) if self._folder is None else self._folder,
@@ -118,7 +107,7 @@ class Recorder:
             return None
         return record
 
-    def _check_repeated(self, observation: Observation, fields: Mapping[str, Array]) -> None:
+    def _check_repeated(self, observation: Observation, values: Mapping[str, Array]) -> None:
         """Check that an output which the record holds has come out the same again."""
         if self._recorded is None or self._since is None or not self._since.repeats:
             return
@@ -127,7 +116,7 @@ class Recorder:
         is_same = place < recorded.count and recorded.times[place] == state.time
         if is_same:
             pairs = [(recorded.positions[place], state.positions)]
-            pairs += [(recorded.field(name)[place], fields[name]) for name in _REPEATED]
+            pairs += [(recorded.field(name)[place], values[name]) for name in _REPEATED]
             is_same = all(np.array_equal(*pair, equal_nan=True) for pair in pairs)
         if not is_same:
             raise RecordError(
@@ -156,18 +145,3 @@ def scene_text(simulation: BuiltScene) -> str:
     except SceneError as cause:
         # A scene of Python objects runs all the same; its record says why it cannot be rerun.
         return f"{COMPOSED} and has no file form: {cause}\n"
-
-
-def stress(observation: Observation) -> Array:
-    """Cauchy stress P F^T / J of every particle, (n, d, d) [Pa]."""
-    F, P = observation.deformation_gradients, observation.stresses
-    sigma: Array = np.einsum("pik,pjk->pij", P, F) / observation.volume_ratios[:, None, None]
-    return sigma
-
-
-def _basic_fields(observation: Observation) -> dict[str, Array]:
-    return {
-        "velocity": observation.state.velocities,
-        "cauchy_stress": stress(observation),
-        "volume_ratio": observation.volume_ratios,
-    }

@@ -13,8 +13,8 @@ from solidsph.maths.arrays import Array
 from solidsph.model.particles import Particles
 from solidsph.results.checkpoint import START_OVER, Checkpoint
 from solidsph.results.layout import PARTICLE_ARRAYS
+from solidsph.results.output_fields import stress
 from solidsph.results.record import Record
-from solidsph.results.recorder import stress
 from solidsph.run.built_scene import BuiltScene
 
 # Other versions of libraries may round differently; a larger difference, in spacings, is a change.
