@@ -25,7 +25,7 @@ import numpy as np
 from solidsph.maths.arrays import Array
 from solidsph.registry.registry import Entry
 
-FORMAT = 2  # a reader refuses a higher number than its own
+FORMAT = 2  # a reader refuses any other
 VTKHDF_VERSION = (2, 0)  # the first with time; higher ones add nothing that is used here
 RECORD_SUFFIXES = (".h5", ".vtkhdf")  # `.vtkhdf` is what VTK and PyVista know it by
 RUNNING = "running"  # the outcome until the writer is closed

@@ -19,12 +19,7 @@ BASIC_FIELDS = {"velocity": "m/s", "cauchy_stress": "Pa", "volume_ratio": "-"}
 
 
 def history(observation: Observation, initial: float, terms: Sequence[Term]) -> dict[str, float]:
-    """Columns "quantity [unit]": the energy ledger, then what terms report.
-
-    Args:
-        observation: one output.
-        initial: energy at the start [J].
-        terms: of the scene.
+    """Columns "quantity [unit]": the ledger, by the initial energy [J], then what terms report.
 
     Raises:
         RecordError: two columns would have one name.
@@ -74,9 +69,7 @@ def split_unit(name: str) -> tuple[str, str]:
 def name_clashes(at_rest: Observation, terms: Sequence[Term]) -> Iterator[str]:
     """Problem and remedy for each name that two fields or two columns would have.
 
-    Args:
-        at_rest: a state in which nothing has happened yet: names do not depend on it.
-        terms: of the scene.
+    Names do not depend on the state, so one in which nothing has happened yet is enough.
     """
     columns = dict.fromkeys(ledger(at_rest, 0.0), "the energies")
     d = at_rest.particles.dimension

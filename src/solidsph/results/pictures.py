@@ -16,16 +16,9 @@ _STRESS = "cauchy_stress"
 
 
 def draw(record: Record, folder: Path, stem: str, field: str = _STRESS) -> Sequence[Path]:
-    """Draw a record into files in `folder`; returns their paths.
+    """Draw a record, coloured by a field, into files in `folder` that begin with `stem`.
 
-    Args:
-        record: what to draw.
-        folder: made if it is missing.
-        stem: beginning of the file names.
-        field: the field that colours the particles.
-
-    Raises:
-        RecordError: the record has no such field.
+    Returns their paths; RecordError if the record has no such field.
     """
     record.field(field)
     folder.mkdir(parents=True, exist_ok=True)

@@ -22,15 +22,9 @@ _ROUNDING = 1e-9
 
 
 def check_same_particles(record: Record, built: Particles, *, exactly: bool) -> None:
-    """Check that the particles are those of the record, which does not hold the files it read.
+    """Raise RecordError unless its scene gives the particles of the record: exactly, or rounded.
 
-    Args:
-        record: of the run.
-        built: the particles that its scene gives now.
-        exactly: whether to the last bit, or up to rounding.
-
-    Raises:
-        RecordError: they differ; it names the files that the scene reads, and the difference.
+    They may come from files, which the record does not hold; the message names these.
     """
     difference = next(_differences(record.particles, built, exactly), None)
     if difference is None:
@@ -47,19 +41,10 @@ def check_same_particles(record: Record, built: Particles, *, exactly: bool) -> 
 def check_same_output(
     record: Record, checkpoint: Checkpoint, simulation: BuiltScene, *, exactly: bool
 ) -> None:
-    """Check that a checkpoint is an output of the record, and still gives the same stresses.
+    """Raise RecordError unless a checkpoint is an output of the record and fits the simulation.
 
-    This refuses a checkpoint of another run, and parts or materials whose code or data have
-    changed: their outputs must not follow those in the record.
-
-    Args:
-        record: of the run.
-        checkpoint: of one of its outputs.
-        simulation: what its scene gives now.
-        exactly: whether stresses are compared as well.
-
-    Raises:
-        RecordError: it does not fit the simulation, is no output of the record, or gives others.
+    Exactly: it must also give the same stresses. Parts or materials whose code or data have changed
+    are refused so: their outputs must not follow those in the record.
     """
     state, start = checkpoint.state, simulation.start()
     beside = f"the checkpoint beside {record.path}"

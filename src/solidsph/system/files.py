@@ -37,16 +37,13 @@ def relative_to(folder: Path | None) -> Iterator[None]:
 
 
 def content(path: Path, most: int) -> bytes:
-    """Read all bytes of a regular file.
+    """Read all bytes of a regular file, or of one behind a link.
 
     Pipes and devices are refused, since they could have no end.
 
-    Args:
-        path: of the file, or of a link to it.
-        most: number of bytes that it may have.
-
     Raises:
-        OSError: it cannot be read, is no regular file, has more bytes, or is being changed.
+        OSError: it cannot be read, is no regular file, has more than `most` bytes, or is being
+            changed.
     """
     # A pipe without a writer would otherwise keep `open` waiting.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))

@@ -50,10 +50,4 @@ class Symptom(ABC):
     def look(
         self, simulation: BuiltScene, observation: Observation, accounts: Accounts
     ) -> Finding | None:
-        """The worst finding at this output.
-
-        Args:
-            simulation: what runs.
-            observation: the output.
-            accounts: energies up to and including this output.
-        """
+        """The worst finding at this output, which `accounts` include."""
