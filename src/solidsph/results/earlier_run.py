@@ -60,7 +60,11 @@ def _has_content(path: Path) -> bool:
 
 
 def earlier_run_at(path: Path) -> EarlierRun | None:
-    """The run whose record is there, None without a file or in an empty one; or RecordError."""
+    """The run whose record is there; None if the file is missing or empty.
+
+    Raises:
+        RecordError: there is something other than a record, which must not be replaced.
+    """
     check_no_other_file(path)
     if not _has_content(path):
         return None

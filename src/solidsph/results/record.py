@@ -177,7 +177,11 @@ class Record:
         return output
 
     def field(self, name: str) -> TimeSeries:
-        """The named field over time: (steps, n, *components), lazily; RecordError without it."""
+        """The named field over time: (steps, n, *components), lazily.
+
+        Raises:
+            RecordError: the record has no such field.
+        """
         if name not in self._fields:
             near = get_close_matches(name, self.field_names, n=1)
             hint = f"did you mean {near[0]!r}? " if near else ""

@@ -22,9 +22,10 @@ _ROUNDING = 1e-9
 
 
 def check_same_particles(record: Record, built: Particles, *, exactly: bool) -> None:
-    """Raise RecordError unless its scene gives the particles of the record: exactly, or rounded.
+    """Raise RecordError unless the scene still gives the particles of its record.
 
-    They may come from files, which the record does not hold; the message names these.
+    They must agree `exactly`, or else up to rounding. The message names the files that the scene
+    reads, which the record does not hold.
     """
     difference = next(_differences(record.particles, built, exactly), None)
     if difference is None:
@@ -43,8 +44,8 @@ def check_same_output(
 ) -> None:
     """Raise RecordError unless a checkpoint is an output of the record and fits the simulation.
 
-    Exactly: it must also give the same stresses. Parts or materials whose code or data have changed
-    are refused so: their outputs must not follow those in the record.
+    If `exactly`, it must also give the recorded stresses. So parts or materials whose code or data
+    have changed are refused: their outputs must not follow those in the record.
     """
     state, start = checkpoint.state, simulation.start()
     beside = f"the checkpoint beside {record.path}"
