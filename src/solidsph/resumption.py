@@ -1,4 +1,4 @@
-"""Resuming: an earlier run is gone on with in its own record, bit for bit."""
+"""Resuming: an earlier run goes on in its own record, bit for bit."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from pathlib import Path
 import attrs
 
 from solidsph.errors import RecordError
-from solidsph.results.checkpoint import Checkpoint, checkpoint_path, read_checkpoint
-from solidsph.results.circumstances import circumstances, differences, is_part, named_parts
+from solidsph.results.checkpoint import START_OVER, Checkpoint, checkpoint_path, read_checkpoint
+from solidsph.results.environment import differences, is_part, part_versions, run_environment
 from solidsph.results.record import Record
 from solidsph.results.recorder import COMPOSED, scene_text
-from solidsph.results.same import check_same_output, check_same_particles
+from solidsph.results.resume_checks import check_same_output, check_same_particles
 from solidsph.results.sole_writer import check_no_writer
 from solidsph.run.outcome import Result, is_over
 from solidsph.run.restart_point import RestartPoint
@@ -22,20 +22,20 @@ from solidsph.scene.scene_data import MOST_STEPS
 from solidsph.simulation import Simulation
 from solidsph.system.files import relative_to
 
-# Of a step: an end that is missed by less is met.
+# Part of a step by which an end may be missed.
 _NEAR = 1e-6
 
 
 @attrs.frozen(eq=False)
 class Pending:
-    """A run that is not over, made ready to go on."""
+    """A run that is not over, ready to go on."""
 
     path: Path
     simulation: Simulation
     since: RestartPoint
 
     def solve(self, observers: Sequence[object] = ()) -> Result:
-        """Go on to the end; the record is then what one run without a break would have left."""
+        """Go on to the end; the record is then that of one run without a break."""
         return self.simulation.run(record=self.path, observers=observers, since=self.since)
 
 
@@ -51,22 +51,22 @@ def resume(
 
     Args:
         path: the record.
-        simulation: what was run; by default it is built from the scene in the record, which one
-            that was composed of Python objects does not have.
+        simulation: what was run; by default it is built from the scene in the record, which is not
+            possible for a scene that was composed of Python objects.
         until: a later end than the scene's duration [s], rounded up to a whole step.
-        force: go on although versions, plugins or threads are not as they were: the bits may then
-            be others than those of one run without a break.
+        force: go on although versions, plugins or the number of threads have changed; the last
+            digits may then differ from those of one run without a break.
         observers: as in `Simulation.run`.
 
     Raises:
-        RecordError: the run is finished, the record or its checkpoint cannot be read or do not
-            belong together, another run is writing it, or something that decides the bits is not
-            as it was: a version, the particles that a file gives.
+        RecordError: the run is finished; the record or its checkpoint cannot be read or do not
+            belong together; another run is writing it; or something has changed that the last
+            digits depend on, such as a version, or the particles in a file.
     """
-    found = pending(Path(path), simulation=simulation, until=until, force=force)
-    if found is None:
+    run = pending(Path(path), simulation=simulation, until=until, force=force)
+    if run is None:
         raise RecordError(f"the run in {path} is over; give `until` to extend it")
-    return found.solve(observers)
+    return run.solve(observers)
 
 
 def pending(
@@ -76,36 +76,32 @@ def pending(
     until: float | None = None,
     force: bool = False,
 ) -> Pending | None:
-    """As `resume`, but only made ready; None if the run is over."""
+    """Make a run ready to go on, with the arguments and errors of `resume`; None if it is over."""
     check_no_writer(path)
     with Record(path) as record, relative_to(Path(record.folder) if record.folder else None):
         if is_over(record.outcome) and until is None:
             return None
         checkpoint = _checkpoint(record)
-        if simulation is not None and scene_text(simulation) != record.scene:
+        if simulation is None:
+            simulation = _built(record)
+        elif scene_text(simulation) != record.scene:
             raise RecordError(
                 f"the record {path} is of another scene than the one given; give the same, or "
                 "record into another file"
             )
-        own = simulation or _built(record)
-        check_same_particles(record, own.particles, exactly=not force)
-        own = _as_before(own, checkpoint)
+        check_same_particles(record, simulation.particles, exactly=not force)
+        simulation = _as_before(simulation, checkpoint)
         if not force:
-            _check_circumstances(record, checkpoint, own)
+            _check_environment(record, checkpoint, simulation)
         notes = list(record.notes)
         if until is not None:
-            own = _extended(own, until)
-            notes.append(f"extended to t = {own.steps * own.step_size:.9g} s")
-        usable = checkpoint is not None and checkpoint.state.time in record.times
-        if checkpoint is not None and usable:
-            check_same_output(record, checkpoint, own, exactly=not force)
-        if checkpoint is None or not usable:
-            return Pending(path, own, RestartPoint(notes=notes, repeats=not force))
-        return Pending(
-            path,
-            own,
-            RestartPoint(checkpoint.state, checkpoint.kept, notes=notes, repeats=not force),
-        )
+            simulation = _extended(simulation, until)
+            notes.append(f"extended to t = {simulation.steps * simulation.step_size:.9g} s")
+        since = RestartPoint(notes=notes, repeats=not force)
+        if checkpoint is not None and checkpoint.state.time in record.times:
+            check_same_output(record, checkpoint, simulation, exactly=not force)
+            since = attrs.evolve(since, state=checkpoint.state, kept=checkpoint.kept)
+        return Pending(path, simulation, since)
 
 
 def _checkpoint(record: Record) -> Checkpoint | None:
@@ -115,8 +111,7 @@ def _checkpoint(record: Record) -> Checkpoint | None:
     checkpoint = read_checkpoint(path)
     if checkpoint.scene != record.scene:
         raise RecordError(
-            f"the checkpoint {path} is of another scene than the record {record.path}; delete the "
-            "checkpoint and resume again: the run is then carried out from its first state"
+            f"the checkpoint {path} is of another scene than the record {record.path}; {START_OVER}"
         )
     return checkpoint
 
@@ -132,7 +127,7 @@ def _built(record: Record) -> Simulation:
 
 
 def _as_before(simulation: Simulation, checkpoint: Checkpoint | None) -> Simulation:
-    """With the step, and as many steps, as the run had."""
+    """The simulation with the step size and the number of steps that the run had."""
     if checkpoint is None:
         return simulation
     for _ in range(checkpoint.halvings - simulation.halvings):
@@ -145,27 +140,27 @@ def _as_before(simulation: Simulation, checkpoint: Checkpoint | None) -> Simulat
     return simulation.extended(max(simulation.steps, checkpoint.steps))
 
 
-def _check_circumstances(
+def _check_environment(
     record: Record, checkpoint: Checkpoint | None, simulation: Simulation
 ) -> None:
-    now = circumstances(simulation)
+    now = run_environment(simulation)
     if checkpoint is not None:
-        then = checkpoint.circumstances
+        then = checkpoint.environment
     else:
-        then = _recorded(record)
+        then = _recorded_environment(record)
         now = {name: value for name, value in now.items() if name in then or is_part(name)}
-    found = differences(then, now)
-    if found:
+    changes = differences(then, now)
+    if changes:
         raise RecordError(
-            f"the run in {record.path} cannot go on bit for bit: {'; '.join(found)}. Install what "
-            "it was begun with, or force it (--force) and accept other last digits"
+            f"the run in {record.path} cannot go on bit for bit: {'; '.join(changes)}. Install "
+            "what it was begun with, or force it (--force) and accept other last digits"
         )
 
 
-def _recorded(record: Record) -> Mapping[str, str]:
-    """Of the circumstances what a record without a checkpoint tells."""
+def _recorded_environment(record: Record) -> Mapping[str, str]:
+    """The part of the environment that the record itself holds."""
     software = {k: v for k, v in record.versions.items() if k not in ("h5py", "hdf5")}
-    return {**software, **named_parts(record.plugins)}
+    return {**software, **part_versions(record.plugins)}
 
 
 def _extended(simulation: Simulation, until: float) -> Simulation:

@@ -12,8 +12,8 @@ import attrs
 import pytest
 
 from solidsph import BuildError, Scene, SceneError, Simulation
-from solidsph.advice import ADVICE, Advice, advised, catalogue, thickness
-from solidsph.advice.seen import Seen
+from solidsph.advice import ADVICE, Advice, advise, catalogue, thickness
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.maths.arrays import Array
 from tests.commands.test_cli import solidsph
 from tests.helpers.advised_scenes import FLAWED, SOUND, Flawed
@@ -27,7 +27,7 @@ def built(toml: str) -> Simulation:
 
 
 def heard(toml: str) -> tuple[Advice, ...]:
-    return advised(built(toml))
+    return advise(built(toml))
 
 
 def title(toml: str) -> str:
@@ -40,7 +40,7 @@ def test_a_flaw_is_named_and_nothing_else(flawed: Flawed) -> None:
     found = heard(flawed.toml)
     assert {one.name for one in found} == {flawed.name}
     assert flawed.remedy in found[0].remedy
-    assert found[0].found
+    assert found[0].finding
     assert found[0].expected
 
 
@@ -56,14 +56,14 @@ def test_every_warning_has_a_flawed_scene() -> None:
 
 @pytest.mark.parametrize("toml", [*(one.toml for one in FLAWED), *SOUND], ids=title)
 def test_no_warning_fails_where_it_could_be_formed(toml: str) -> None:
-    """`advised` leaves out what fails; here it would show."""
-    seen = Seen(built(toml))
-    for look in ADVICE.values():
-        list(look(seen))
+    """`advise` leaves out what fails; here it would show."""
+    facts = SceneFacts(built(toml))
+    for check in ADVICE.values():
+        list(check(facts))
 
 
 def test_a_warning_that_fails_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(seen: Seen) -> Iterator[Advice]:
+    def broken(facts: SceneFacts) -> Iterator[Advice]:
         raise RuntimeError("a fault")
         yield
 
@@ -80,7 +80,7 @@ def test_silence_goes_to_toml_and_back() -> None:
     assert Scene.from_toml(scene.to_toml()).silence == (flawed.name,)
     said = Simulation.builder(built(flawed.toml).scene).silence(flawed.name).scene()
     assert said.silence == (flawed.name,)
-    assert advised(Simulation.builder(said).build()) == ()
+    assert advise(Simulation.builder(said).build()) == ()
 
 
 def test_an_unknown_name_is_one_clear_error() -> None:
@@ -123,17 +123,17 @@ def test_its_cost_does_not_grow_with_the_body(monkeypatch: pytest.MonkeyPatch) -
         count = 0
 
         def heights(
-            self: thickness.Boundary,
+            self: thickness.SampledSurface,
             points: Array,
-            plain: Callable[..., tuple[Array, Array]] = thickness.Boundary.heights,
+            plain: Callable[..., tuple[Array, Array]] = thickness.SampledSurface.heights,
         ) -> tuple[Array, Array]:
             nonlocal count
             count += len(points)
             return plain(self, points)
 
         with monkeypatch.context() as patched:
-            patched.setattr(thickness.Boundary, "heights", heights)
-            advised(simulation)
+            patched.setattr(thickness.SampledSurface, "heights", heights)
+            advise(simulation)
         asked[spacing] = count
     # Every step along a ray is one; near a surface steps are a part of the spacing, half as long.
     assert 0 < asked["0.00625"] < 2 * asked["0.0125"]
@@ -146,5 +146,5 @@ def test_beside_an_effect_that_does_not_say_what_it_is_for_nothing_is_lacking() 
     class Silent:
         answers = None
 
-    assert {one.name for one in advised(simulation)} == {"sudden-load"}
-    assert advised(attrs.evolve(simulation, effects={"other": Silent()})) == ()
+    assert {one.name for one in advise(simulation)} == {"sudden-load"}
+    assert advise(attrs.evolve(simulation, effects={"other": Silent()})) == ()

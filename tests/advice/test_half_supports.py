@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solidsph import SceneError, Simulation
-from solidsph.advice import Advice, advised
+from solidsph.advice import Advice, advise
 from solidsph.errors import BuildError
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.simulation import Simulation as Built
@@ -60,7 +60,7 @@ def peak(built: Built) -> float:
 
 
 def warnings(built: Built) -> list[Advice]:
-    return [one for one in advised(built) if one.name == "half-supports"]
+    return [one for one in advise(built) if one.name == "half-supports"]
 
 
 def test_a_quarter_without_ghosts_is_wrong_and_warned_of_and_the_remedies_are_right() -> None:
@@ -94,7 +94,7 @@ def test_the_plane_is_named(axis: str) -> None:
     behind = {"x": "bottom", "y": "left"}[axis]
     built = quarter({**ON, "ghosts": 4, "ghost_faces": [behind]}).build()
     (heard,) = warnings(built)
-    assert f"on the plane of symmetry {axis} = 0 m (" in heard.found
+    assert f"on the plane of symmetry {axis} = 0 m (" in heard.finding
     assert "ghosts = 4" in heard.remedy
 
 
@@ -110,7 +110,7 @@ def test_rollers_on_a_face_are_a_plane_of_symmetry_too() -> None:
 def test_a_plane_is_told_without_its_rounding() -> None:
     """The rows of a lattice that conforms come to rest at 1e-20 m, and that is no place."""
     for one in warnings(quarter("conforming-lattice").build()):
-        assert " = 0 m (" in one.found
+        assert " = 0 m (" in one.finding
 
 
 def test_no_false_alarm() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from solidsph.advice.thickness import Rays, through
+from solidsph.advice.thickness import Rays, rays_through
 from solidsph.registry.construct import construct
 
 Table = Mapping[str, Any]
@@ -32,7 +32,7 @@ def polygon(*vertices: tuple[float, float]) -> Table:
 
 
 def rays(shape: Table, spacing: float) -> Rays:
-    return through(construct("shapes", shape), spacing)
+    return rays_through(construct("shapes", shape), spacing)
 
 
 WEB = polygon(

@@ -34,11 +34,11 @@ def test_the_scenes_shown_can_be_built_and_the_static_one_run() -> None:
 
 
 def test_the_scenes_shown_are_sound() -> None:
-    from solidsph.advice import advised
+    from solidsph.advice import advise
 
     for text in blocks("docs/scenes.md", "toml"):
         built = Simulation.builder(Scene.from_toml(text)).build()
-        assert [one.line for one in advised(built)] == []
+        assert [one.line for one in advise(built)] == []
 
 
 def test_every_builtin_part_is_listed() -> None:

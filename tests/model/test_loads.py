@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from solidsph import BuildError, Simulation, solve
-from solidsph.advice import advised
+from solidsph.advice import advise
 from solidsph.maths.arrays import Array
 from solidsph.scene.scene_builder import SceneBuilder
 from tests.helpers.scenes import SOFT
@@ -230,7 +230,7 @@ def test_faces_that_are_met_and_not_named_are_told_with_their_shares(
     where: Any, tags: Mapping[str, Any], shares: str | None
 ) -> None:
     made = scene(tags=tags).boundary("traction", where=where, traction={"y": 1.0}).build()
-    told = [one.found for one in advised(made) if one.name == "several-faces"]
+    told = [one.finding for one in advise(made) if one.name == "several-faces"]
     assert len(told) == (shares is not None)
     assert all(str(shares) in one for one in told)
 
@@ -393,7 +393,7 @@ def test_what_ghosts_hold_is_held() -> None:
             .statics()
             .build()
         )
-        return [one.found for one in advised(made) if one.name == "unheld"]
+        return [one.finding for one in advise(made) if one.name == "unheld"]
 
     assert quarter(x=1.0) == []
     (told,) = quarter(y=1.0)  # along the plane nothing holds it
@@ -408,4 +408,4 @@ def test_ghosts_that_only_continue_a_field_hold_nothing() -> None:
         .statics()
         .build()
     )
-    assert "unheld" in {one.name for one in advised(made)}
+    assert "unheld" in {one.name for one in advise(made)}

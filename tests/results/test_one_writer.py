@@ -16,7 +16,7 @@ import pytest
 from solidsph import BusyError, Record, RecordError, Scene, Simulation, resume
 from solidsph.cli import cli
 from solidsph.results.checkpoint import checkpoint_path
-from solidsph.results.left import Left, left_at
+from solidsph.results.earlier_run import EarlierRun, earlier_run_at
 from solidsph.results.sole_writer import check_no_writer, sole_writer
 from solidsph.run.hooks import implementation
 from tests.helpers.resuming import Stop, assert_same_record
@@ -227,7 +227,7 @@ def test_a_full_disk_at_the_first_output_keeps_the_older_record(
                 raise OSError("the disk is full")
 
         calls.clear()
-        monkeypatch.setattr("solidsph.results.record_writer._try_room", full)
+        monkeypatch.setattr("solidsph.results.record_writer.check_space", full)
         assert "the disk is full" in refusal(lambda: moving().run(record=path))
         assert path.read_bytes() == before
         assert not list(tmp_path.glob("*.partial"))
@@ -291,10 +291,10 @@ def test_records_of_two_suffixes_have_a_checkpoint_each(tmp_path: Path) -> None:
     assert len({checkpoint_path(tmp_path / name) for name in names}) == len(names)
 
 
-def test_an_unsound_run_did_not_end_early(tmp_path: Path) -> None:
-    left = Left(tmp_path / "run.h5", "unsound: the energies do not add up", 5, 0.25)
-    assert left.told() == "an unsound run up to t = 0.25 s"
-    assert not left.can_go_on
+def test_an_unsound_run_did_not_end_early() -> None:
+    earlier = EarlierRun("unsound: the energies do not add up", 5, 0.25)
+    assert earlier.description == "an unsound run up to t = 0.25 s"
+    assert not earlier.can_resume
 
 
 def test_a_link_stays_and_a_file_without_a_byte_is_nothing(tmp_path: Path) -> None:
@@ -303,7 +303,7 @@ def test_a_link_stays_and_a_file_without_a_byte_is_nothing(tmp_path: Path) -> No
     link.symlink_to(real)
     moving().run(record=link)
     assert link.is_symlink()
-    assert left_at(real).outcome == "finished"
+    assert earlier_run_at(real).outcome == "finished"
 
 
 @pytest.mark.parametrize("what", ["record", "folder", "replaced"])
@@ -360,7 +360,7 @@ def test_run_asks_before_it_replaces_what_can_be_gone_on_with(
     out, err = capsys.readouterr()
     assert json.loads(out)["record"] == "results/scene/record.h5"
     assert "holds an interrupted run up to t = 0.00" in err
-    assert left_at(path).outcome == "finished"
+    assert earlier_run_at(path).outcome == "finished"
     # What is finished may be replaced, which is said.
     command("run", "scene.toml", "--quiet", "--json")
     assert "holds a finished run up to t = 0.01 s; it is replaced" in capsys.readouterr().err
@@ -380,7 +380,7 @@ def test_scenes_of_one_name_in_two_folders_are_told_of(
 
 def test_a_record_may_have_the_suffix_of_vtk(folder: Path) -> None:
     command("run", "scene.toml", "--quiet", "--output", "out/plate.vtkhdf")
-    assert left_at(folder / "out" / "plate.vtkhdf").outcome == "finished"
+    assert earlier_run_at(folder / "out" / "plate.vtkhdf").outcome == "finished"
     command("resume", "out")
     assert not stat.S_ISDIR((folder / "out" / "plate.vtkhdf").stat().st_mode)
 

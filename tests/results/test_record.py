@@ -23,11 +23,13 @@ from hypothesis import strategies as st
 
 from solidsph.errors import DivergedError, RecordError
 from solidsph.model.particles import Face, Particles
+from solidsph.results.contents import Output, Reference
+from solidsph.results.hdf5_source import _lookup3
 from solidsph.results.layout import FORMAT, Field, PluginUsed
-from solidsph.results.record import Record, TimeSeries
+from solidsph.results.record import Record
 from solidsph.results.record_writer import RecordWriter
 from solidsph.results.repair import repaired
-from solidsph.results.unclosed import _lookup3
+from solidsph.results.time_series import TimeSeries
 from tests.helpers.waiting import wait_for
 
 PLUGINS = (
@@ -71,22 +73,11 @@ def some_fields(dimension: int) -> list[Field]:
     ]
 
 
-@attrs.frozen
-class Step:
-    """What is appended at one time."""
-
-    time: float
-    step: int
-    positions: np.ndarray
-    fields: dict[str, np.ndarray]
-    history: dict[str, float]
-
-
-def some_step(number: int, particles: Particles, seed: int = 0) -> Step:
+def some_step(number: int, particles: Particles, seed: int = 0) -> Output:
     """The same for the same arguments, in every process."""
     random = np.random.default_rng([seed, number])
     n, d = particles.count, particles.dimension
-    return Step(
+    return Output(
         time=1e-3 * number,
         step=10 * number,
         positions=random.normal(size=(n, d)),
@@ -95,23 +86,21 @@ def some_step(number: int, particles: Particles, seed: int = 0) -> Step:
     )
 
 
+def reference(particles: Particles, **others: object) -> Reference:
+    shown = {"scene": SCENE, "plugins": PLUGINS, "columns": COLUMNS, **others}
+    return Reference(particles=particles, **shown)
+
+
 def opened(path: Path, particles: Particles, **others: object) -> RecordWriter:
-    return RecordWriter(
-        path,
-        particles,
-        scene=SCENE,
-        plugins=PLUGINS,
-        fields=some_fields(particles.dimension),
-        columns=COLUMNS,
-        **others,
-    )
+    fields = some_fields(particles.dimension)
+    return RecordWriter(path, reference(particles, fields=fields), **others)
 
 
-def append(writer: RecordWriter, step: Step) -> None:
-    writer.append(step.time, step.step, step.positions, step.fields, step.history)
+def append(writer: RecordWriter, step: Output) -> None:
+    writer.append(step)
 
 
-def written(path: Path, count: int, dimension: int, steps: int, seed: int = 0) -> list[Step]:
+def written(path: Path, count: int, dimension: int, steps: int, seed: int = 0) -> list[Output]:
     """Writes a closed record; returns what went into it."""
     particles = some_particles(count, dimension, seed)
     content = [some_step(number, particles, seed) for number in range(steps)]
@@ -142,7 +131,7 @@ def assert_same_particles(a: Particles, b: Particles) -> None:
     }, "Particles has grown: a record must hold the new array too"  # fmt: skip
 
 
-def assert_holds(record: Record, content: list[Step]) -> None:
+def assert_holds(record: Record, content: list[Output]) -> None:
     """Every number of every step."""
     assert record.count == len(record.positions) == len(content)
     np.testing.assert_array_equal(record.times, [step.time for step in content])
@@ -205,8 +194,8 @@ def test_units_stand_at_the_arrays(tmp_path: Path) -> None:
 def test_a_record_without_plugins_fields_columns_tags(tmp_path: Path) -> None:
     particles = attrs.evolve(some_particles(3, 1), tags={}, bodies={}, faces={})
     path = tmp_path / "run.vtkhdf"
-    with RecordWriter(path, particles, scene="", plugins=[], fields=[], columns={}) as writer:
-        writer.append(0.0, 0, particles.positions, {}, {})
+    with RecordWriter(path, reference(particles, plugins=[], fields=[], columns={})) as writer:
+        writer.append(Output(0.0, 0, particles.positions, {}, {}))
     with Record(path) as record:
         assert (record.plugins, record.field_names, dict(record.history)) == ((), (), {})
         np.testing.assert_array_equal(record.positions[0], particles.positions)
@@ -226,11 +215,10 @@ def test_a_small_run_makes_a_small_file(tmp_path: Path) -> None:
     particles = some_particles(60, 1)
     fields = [Field("velocity", (1,), "m/s")]
     step = some_step(0, particles)
-    with RecordWriter(
-        path, particles, scene=SCENE, plugins=PLUGINS, fields=fields, columns=COLUMNS
-    ) as writer:
+    with RecordWriter(path, reference(particles, fields=fields)) as writer:
         for i in range(200):
-            writer.append(i, i, step.positions, {"velocity": step.positions}, step.history)
+            fields_of_step = {"velocity": step.positions}
+            writer.append(Output(i, i, step.positions, fields_of_step, step.history))
     content = 200 * 60 * (3 + 3) * 8
     assert path.stat().st_size < content + 100_000
 
@@ -530,7 +518,7 @@ from tests.results.test_record import append, opened, some_particles, some_step
 path = Path({path!r})
 particles = some_particles(500, 3)
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-record_writer._try_room = lambda path, size: None  # as if the device failed all of a sudden
+record_writer.check_space = lambda path, size: None  # as if the device failed all of a sudden
 with opened(path, particles) as writer:
     for number in range(9):
         if number == 2:  # no file may grow beyond this, which HDF5 learns when it writes
@@ -660,9 +648,7 @@ def test_a_step_that_does_not_fit_is_refused_whole(
 )
 def test_a_field_that_cannot_be_held(tmp_path: Path, field: Field) -> None:
     with pytest.raises(RecordError, match="field"):
-        RecordWriter(
-            tmp_path / "run", some_particles(3, 2), scene="", plugins=[], fields=[field], columns={}
-        )
+        RecordWriter(tmp_path / "run", reference(some_particles(3, 2), fields=[field], columns={}))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -782,7 +768,7 @@ def test_a_newer_format_is_refused(tmp_path: Path) -> None:
     written(path, 3, 2, 1)
     with h5py.File(path, "r+") as file:
         file["solidsph"].attrs["format"] = FORMAT + 1
-    assert_refused(path, f"format {FORMAT + 1}.*up to {FORMAT}.*update")
+    assert_refused(path, f"has format {FORMAT + 1}, this solidsph reads {FORMAT}; update")
 
 
 def test_an_older_format_is_refused(tmp_path: Path) -> None:
@@ -790,7 +776,9 @@ def test_an_older_format_is_refused(tmp_path: Path) -> None:
     written(path, 3, 2, 1)
     with h5py.File(path, "r+") as file:
         file["solidsph"].attrs["format"] = FORMAT - 1
-    assert_refused(path, f"older format {FORMAT - 1}.*reads {FORMAT}; run its scene again")
+    assert_refused(
+        path, f"has format {FORMAT - 1}, this solidsph reads {FORMAT}; run its scene again"
+    )
 
 
 def test_a_truncated_record_is_refused(tmp_path: Path) -> None:

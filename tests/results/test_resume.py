@@ -296,11 +296,11 @@ def test_other_versions_and_plugins_are_refused_unless_forced(
     simulation = stopped(path)
     if not kept:
         checkpoint_path(path).unlink()
-    from solidsph.results import circumstances
+    from solidsph.results import environment
 
-    real = circumstances.metadata.version
+    real = environment.metadata.version
     monkeypatch.setattr(
-        circumstances.metadata, "version", lambda name: "0.0.1" if name == "scipy" else real(name)
+        environment.metadata, "version", lambda name: "0.0.1" if name == "scipy" else real(name)
     )
     monkeypatch.setattr(
         registry,
@@ -401,9 +401,9 @@ def test_every_damage_of_a_checkpoint_is_noticed(tmp_path: Path) -> None:
             read_checkpoint(file)
     assert_refused(path, "checkpoint .* is damaged; delete it")
     file.write_bytes(data.replace(b"checkpoint 1 ", b"checkpoint 2 ", 1))
-    assert_refused(path, "format 2, this solidsph reads up to 1; update")
+    assert_refused(path, "has format 2, this solidsph reads 1; update")
     file.write_bytes(data.replace(b"checkpoint 1 ", b"checkpoint 0 ", 1))
-    assert_refused(path, "the older format 0, this solidsph reads 1; delete it")
+    assert_refused(path, "has format 0, this solidsph reads 1; delete it")
     file.unlink()
     resume(path)
     with Record(path) as record:
@@ -677,7 +677,7 @@ def test_an_end_that_never_comes_is_refused(tmp_path: Path) -> None:
         ({"steps": lambda n: 10**18}, "damaged"),
         ({"halvings": lambda n: 10**9}, "damaged"),
         ({"step_size": lambda h: 0.0}, "damaged"),
-        ({"circumstances": lambda c: {"numpy": 3}}, "damaged"),
+        ({"environment": lambda e: {"numpy": 3}}, "damaged"),
         *(
             ({"kept": lambda k, name=name, wrong=wrong: {**k, name: wrong}}, "delete it and resume")
             for name in ("soundness", "soundness rises")

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from solidsph import Scene, Simulation
-from solidsph.advice import advised
+from solidsph.advice import advise
 from solidsph.errors import BuildError
 from solidsph.interfaces.kernel import Kernel
 from solidsph.maths.arrays import Array
@@ -61,20 +61,20 @@ def test_neighbours_in_a_row_are_as_far_apart_as_they_must_be(kernel: str) -> No
     assert found.min() > 0.67
     assert found.max() < 1.33
     assert found.mean() == pytest.approx(1.0, abs=0.02)
-    assert "large-cover" not in {one.name for one in advised(simulation)}
+    assert "large-cover" not in {one.name for one in advise(simulation)}
 
 
 def test_the_width_of_another_kernel_blinds_the_spline() -> None:
     """What the default was for every kernel: errors of many times the difference, and a warning."""
     simulation = bar("cubic-spline", 3.5).build()
     assert np.abs(stretches(simulation) - 1.0).max() > 10.0
-    (heard,) = [one for one in advised(simulation) if one.name == "large-cover"]
+    (heard,) = [one for one in advise(simulation) if one.name == "large-cover"]
     assert heard.remedy == "cover = 2.6, or add [[effect]] 'hourglass-control'"
     controlled = bar("cubic-spline", 3.5).effect("hourglass-control").build()
     found = stretches(controlled)
     assert found.min() > 0.85
     assert found.max() < 1.15
-    assert "large-cover" not in {one.name for one in advised(controlled)}
+    assert "large-cover" not in {one.name for one in advise(controlled)}
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
@@ -83,7 +83,7 @@ def test_a_blind_cover_is_warned_of_and_a_good_one_is_not(kernel: str, cover: fl
     """Blind: a difference with the wrong sign or of twice its size."""
     simulation = bar(kernel, cover, spacing=0.05).build()
     found = stretches(simulation)
-    names = {one.name for one in advised(simulation)}
+    names = {one.name for one in advise(simulation)}
     warned = bool(names & {"large-cover", "small-cover"})
     if found.min() < 0.0 or found.max() > 2.0:
         assert warned

@@ -11,7 +11,7 @@ import pytest
 
 from solidsph import BuildError, Record, RecordError, Scene, Simulation, resume
 from solidsph.results import recorder
-from solidsph.results.digest import Reference
+from solidsph.results.contents import Reference
 from solidsph.results.repair import repaired
 from solidsph_builtin.discretisations import _checks
 from tests.helpers.fuzzing import campaign, tried, within
@@ -226,7 +226,7 @@ def test_no_scene_in_a_record_runs_code(
     path = tmp_path / "run.h5"
     path.write_bytes(records["killed"])
     with Record(path) as record:
-        right = record._reference().digest()
+        right = record.reference.digest()
     old = b"1e3*min(t/0.005, 1)"
     new = b"__import__('os')   "
     assert len(old) == len(new)

@@ -22,7 +22,7 @@ from solidsph import (
 from solidsph.run.energy import RESIDUAL
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.watch import Watchdog
-from solidsph.watch.hourglass import StoredBesides
+from solidsph.watch.hourglass_energy import HourglassEnergy
 from tests.helpers.faulty import HalfTheStress
 from tests.helpers.scenes import SOFT, box
 
@@ -225,13 +225,13 @@ def test_watching_passes_over_pairs_once_in_a_thousand_steps(
 ) -> None:
     """What a control stores is a pass over all pairs; other looks are at particles alone."""
     looks = []
-    look = StoredBesides.look
+    look = HourglassEnergy.look
 
     def counted(self: Any, simulation: Any, observation: Any, accounts: Any) -> Any:
         looks.append(observation.state.step)
         return look(self, simulation, observation, accounts)
 
-    monkeypatch.setattr(StoredBesides, "look", counted)
+    monkeypatch.setattr(HourglassEnergy, "look", counted)
     simulation = box(1, 12).effect("hourglass-control").duration(1.0).outputs(300).build()
     simulation.run(observers=[Watchdog()])
     assert simulation.steps // 1000 <= len(looks) <= simulation.steps // 1000 + 1

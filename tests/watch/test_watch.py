@@ -16,11 +16,11 @@ from solidsph.results.checkpoint import checkpoint_path, read_checkpoint
 from solidsph.run.accounts import Accounts
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.watch import Grade, Symptom, Watchdog, run_watched
-from solidsph.watch.crowding import CollapsingNeighbours
-from solidsph.watch.hourglass import StoredBesides
-from solidsph.watch.speed import FasterThanSound
+from solidsph.watch.collapsing_neighbours import CollapsingNeighbours
+from solidsph.watch.faster_than_sound import FasterThanSound
+from solidsph.watch.hourglass_energy import HourglassEnergy
 from solidsph.watch.symptom import Finding
-from solidsph.watch.volume import VanishingVolume
+from solidsph.watch.vanishing_volume import VanishingVolume
 from tests.helpers.resuming import OFTEN, Stop, assert_same_record
 from tests.helpers.scenes import SCENE_TOML, SOFT, box
 from tests.helpers.waiting import HANG
@@ -63,7 +63,7 @@ def test_a_body_at_rest_has_no_symptom() -> None:
         VanishingVolume(),
         FasterThanSound(),
         CollapsingNeighbours(),
-        StoredBesides(),
+        HourglassEnergy(),
     ):
         assert found(symptom, box(2).effect("hourglass-control")) is None, symptom
 
@@ -124,12 +124,12 @@ def test_hourglass_share() -> None:
     """A zigzag, which the gradient of a lattice hardly sees."""
     bar = box(1, 20).effect("hourglass-control")
     zigzag = 1e-4 * (-1.0) ** np.arange(20)[:, None]
-    finding = found(StoredBesides(), bar, displacements=zigzag)
+    finding = found(HourglassEnergy(), bar, displacements=zigzag)
     # The ends of the bar see it, so that the strain energy is not nothing.
     assert finding.grade is Grade.WARNING
-    assert found(StoredBesides(failure=0.2), bar, displacements=zigzag).grade is Grade.FAILURE
+    assert found(HourglassEnergy(failure=0.2), bar, displacements=zigzag).grade is Grade.FAILURE
     X = bar.build().particles.positions
-    assert found(StoredBesides(), bar, displacements=0.01 * X) is None
+    assert found(HourglassEnergy(), bar, displacements=0.01 * X) is None
 
 
 # Runs
@@ -306,8 +306,8 @@ def test_what_it_knows_survives_an_interruption(
         simulation.run(record=path, observers=[first, Stop(4)])
     resume(path, simulation=simulation, observers=[second])
     kept: list[dict[str, np.ndarray]] = [{}, {}]
-    whole.solidsph_keep(simulation, kept[0])
-    second.solidsph_keep(simulation, kept[1])
+    whole.solidsph_keep(kept[0])
+    second.solidsph_keep(kept[1])
     assert np.array_equal(kept[0]["watchdog accounts"], kept[1]["watchdog accounts"])
     assert np.all(kept[0]["watchdog accounts"] != 0.0)
 

@@ -1,6 +1,6 @@
-"""Warnings ahead of a run: one a file, each with what was found, expected, and the remedy."""
+"""Warnings ahead of a run: one a file, each with a finding, what is expected, and the remedy."""
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.catalogue import ADVICE, advised, unknown
+from solidsph.advice.catalogue import ADVICE, advise, unknown_names
 
-__all__ = ["ADVICE", "Advice", "advised", "unknown"]
+__all__ = ["ADVICE", "Advice", "advise", "unknown_names"]

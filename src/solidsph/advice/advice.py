@@ -1,4 +1,4 @@
-"""Advice: what a scene seems to call for and does not name, or names and does not need."""
+"""One warning ahead of a run: something that a scene seems to lack, or names without need."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import attrs
 
 @attrs.frozen
 class Advice:
-    """One warning ahead of a run. Nothing follows from it: the run goes on as it is asked to."""
+    """One warning ahead of a run. It changes nothing: the run goes on as it was asked for."""
 
-    found: str  # with the value, and where
+    finding: str  # with the value, and where
     expected: str
     remedy: str
     name: str = ""  # by which a scene silences it
 
     @property
     def line(self) -> str:
-        """As one line of text."""
-        return f"{self.name}: {self.found}; expected: {self.expected}; {self.remedy}"
+        """All of it in one line of text."""
+        return f"{self.name}: {self.finding}; expected: {self.expected}; {self.remedy}"

@@ -1,35 +1,29 @@
-"""Outputs so far apart that what vibrates is not seen between them."""
+"""Outputs so far apart that vibrations between them are not seen."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 
-_A_PERIOD = 8.0  # outputs
+_PER_PERIOD = 8.0  # outputs
 
 
-def coarse_outputs(seen: Seen) -> Iterator[Advice]:
-    """Of the slowest free vibration: quicker ones are seen less still."""
-    if not seen.moves or seen.answering(Need.REST):
+def coarse_outputs(facts: SceneFacts) -> Iterator[Advice]:
+    """Compare outputs with the slowest free vibration, if something excites it."""
+    if not facts.is_motion or facts.effects_for(Need.REST):
         return
-    period, duration = seen.slowest_period, seen.scene.duration
-    interval = duration / min(seen.scene.outputs, seen.simulation.steps)
-    if interval <= period / _A_PERIOD or duration <= period or not _vibrates(seen, period):
+    period, duration = facts.slowest_period, facts.scene.duration
+    interval = duration / min(facts.scene.outputs, facts.simulation.steps)
+    if interval <= period / _PER_PERIOD or duration <= period:
         return
-    yield Advice(
-        found=f"an output every {interval:.2g} s, and the slowest free vibration has a period of "
-        f"about {period:.2g} s",
-        expected=f"{_A_PERIOD:g} outputs a period",
-        remedy=f"outputs = {round(_A_PERIOD * duration / period)}",
-    )
-
-
-def _vibrates(seen: Seen, period: float) -> bool:
-    """Whether something comes quickly enough to set the slowest vibration off."""
-    imposed = [one for one in (*seen.loads, *seen.motions) if one.peak > 0.0]
-    quick = any(one.rise < period for one in imposed)
-    held = all(one.supported for one in seen.bodies)
-    return held and (quick or bool(seen.velocities.any()) or bool(seen.displacements.any()))
+    is_excited = not facts.starts_at_rest or any(h.rise < period for h in facts.imposed)
+    if is_excited and all(body.is_held for body in facts.bodies):
+        yield Advice(
+            finding=f"an output every {interval:.2g} s, and the slowest free vibration has a "
+            f"period of about {period:.2g} s",
+            expected=f"{_PER_PERIOD:g} outputs a period",
+            remedy=f"outputs = {round(_PER_PERIOD * duration / period)}",
+        )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 
 # Particles across, for gradients exact for linear fields and for quadratic ones. A cantilever ten
 # times as long as thick, at rest under its weight, sags too far by 117, 50, 29, 13 and 7 % with 3,
@@ -13,30 +13,31 @@ from solidsph.advice.seen import Seen
 _LINEAR, _QUADRATIC = 5, 3
 _BENT = 9
 
-# Length over thickness from which a body that is held somewhere is taken to bend.
+# Length over thickness from which a held body is assumed to bend.
 _SLENDER = 5.0
 
 # Along a bar, so that a wave or a stretch has a shape at all.
 _ALONG = 10
 
 
-def few_across(seen: Seen) -> Iterator[Advice]:
-    """By rays through the shape, normal to its surface."""
-    for one in seen.bodies:
-        least, usual = one.thicknesses
-        across = least / one.spacing
-        wanted, word, remedy = _ALONG, "along it", ""
-        if seen.dimension > 1:
-            quadratic = one.body.formulation.gradient.exact_degree >= 2
-            bends = one.supported and one.length >= _SLENDER * usual
-            wanted = _QUADRATIC if quadratic else _BENT if bends else _LINEAR
-            word = "across its thinnest part"
-            remedy = "" if quadratic else f", or gradient = 'quadratic', which needs {_QUADRATIC}"
+def few_across(facts: SceneFacts) -> Iterator[Advice]:
+    """Count particles along rays through the shape, normal to its surface."""
+    for body in facts.bodies:
+        least, usual = body.thicknesses
+        across = least / body.spacing
+        wanted, where, remedy = _ALONG, "along it", ""
+        if facts.dimension > 1:
+            is_quadratic = body.exact_degree >= 2
+            bends = body.is_held and body.length >= _SLENDER * usual
+            wanted = _QUADRATIC if is_quadratic else _BENT if bends else _LINEAR
+            where = "across its thinnest part"
+            if not is_quadratic:
+                remedy = f", or gradient = 'quadratic', which needs {_QUADRATIC}"
         if round(across, 1) > wanted - 0.5:
             continue
+        slender = ", in a body so slender" if wanted == _BENT else ""
         yield Advice(
-            found=f"body {one.name!r} has {across:.2g} particles {word}, {least:.4g} m",
-            expected=f"at least {wanted} with this gradient"
-            + (", in a body so slender" if wanted == _BENT else ""),
+            finding=f"body {body.name!r} has {across:.2g} particles {where}, {least:.4g} m",
+            expected=f"at least {wanted} with this gradient{slender}",
             remedy=f"spacing = {least / wanted:.3g}{remedy}",
         )

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 
 _FEW = 10
 
 
-def few_steps(seen: Seen) -> Iterator[Advice]:
-    """A wave crosses about half a spacing a step."""
-    if not seen.moves or seen.simulation.steps >= _FEW:
+def few_steps(facts: SceneFacts) -> Iterator[Advice]:
+    """Count steps; a wave crosses about half a spacing in each."""
+    if not facts.is_motion or facts.simulation.steps >= _FEW:
         return
-    longest = max(one.transit for one in seen.bodies)
+    longest = max(body.transit for body in facts.bodies)
     yield Advice(
-        found=f"the duration of {seen.scene.duration:.3g} s is {seen.simulation.steps} steps of "
-        f"{seen.simulation.step_size:.2g} s",
-        expected=f"as long as a wave needs through the body, {longest:.2g} s, or longer",
+        finding=f"the duration of {facts.scene.duration:.3g} s is {facts.simulation.steps} steps "
+        f"of {facts.simulation.step_size:.2g} s",
+        expected=f"at least the time of a wave through the body, {longest:.2g} s",
         remedy="a longer duration, or check the units of modulus and density",
     )

@@ -1,4 +1,4 @@
-"""How what a scene imposes goes on in time: asked at some times, ahead of the run."""
+"""Time histories of loads and prescribed motions, sampled ahead of the run."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from solidsph.interfaces.terms import Load, SurfaceLoad
 from solidsph.maths.arrays import Array
 from solidsph.run.built_scene import BuiltScene
 
-# Numbers asked of one condition at most, and times.
+# Most numbers, and most times, that are asked of one term.
 _ENTRIES, _TIMES = 2_000_000, 160
 
 
 @attrs.frozen(eq=False)
-class Signal:
-    """The size of something imposed, over time."""
+class TimeHistory:
+    """Size of something imposed, over time."""
 
     label: str
     times: Array  # (t,) [s], increasing
-    sizes: Array  # (t,) of the largest entry, in the unit of what it is
+    sizes: Array  # (t,) largest entry, in the unit of what is imposed
 
     @property
     def peak(self) -> float:
-        """Its largest size."""
+        """Largest size."""
         return float(self.sizes.max())
 
     @property
@@ -42,17 +42,17 @@ class Signal:
 
     @property
     def settled(self) -> float:
-        """Time from which it does not change any more [s]; infinite if it changes to the end."""
-        moves = np.abs(self.sizes - self.sizes[-1]) > 1e-6 * self.peak
-        if not moves.any():
+        """Time from which it is constant [s]; infinite if it changes to the end."""
+        changes = np.abs(self.sizes - self.sizes[-1]) > 1e-6 * self.peak
+        if not changes.any():
             return 0.0
-        last = int(np.flatnonzero(moves)[-1])
+        last = int(np.flatnonzero(changes)[-1])
         return float(self.times[last + 1]) if last + 2 < len(self.times) else np.inf
 
 
 @attrs.frozen(eq=False)
-class LoadHistory(Signal):
-    """A force, by the stress or the acceleration that it makes."""
+class LoadHistory(TimeHistory):
+    """A force [N], and the stress and the acceleration that it makes."""
 
     stresses: Array  # (t,) largest force over the area that its particle owns [Pa]; 0 inside
     accelerations: Array  # (t,) largest force over mass [m/s^2]
@@ -60,87 +60,64 @@ class LoadHistory(Signal):
 
 
 @attrs.frozen(eq=False)
-class Motion(Signal):
-    """A displacement imposed [m], with its velocity."""
+class MotionHistory(TimeHistory):
+    """A prescribed displacement [m], and its velocity."""
 
     speeds: Array  # (t,) [m/s]
-    condition: ScheduledConstraint
-
-    @property
-    def jump(self) -> float:
-        """Speed that it has from the first moment on [m/s]."""
-        return float(self.speeds[0])
 
 
-def loads(simulation: BuiltScene) -> Iterator[LoadHistory]:
-    """Of every force: at many times where it is a schedule, at a few where it is not.
+def load_histories(simulation: BuiltScene) -> Iterator[LoadHistory]:
+    """History of every load: at many times if it is a schedule, at a few if not.
 
-    What answers to the motion is asked at the start, where nothing has moved.
+    A load that depends on the motion is asked for the start, where nothing has moved.
     """
     areas = np.linalg.norm(simulation.particles.area_vectors, axis=1)
     for load in simulation.dynamics.loads:
-        yield _of_load(simulation, load, areas[load.particles])
+        yield _load_history(simulation, load, areas[load.particles])
 
 
-def _of_load(simulation: BuiltScene, load: Load, areas: Array) -> LoadHistory:
+def _load_history(simulation: BuiltScene, load: Load, areas: Array) -> LoadHistory:
     start, masses = simulation.initial, simulation.model.masses[load.particles]
-    ask = _asked(load, start.positions, start.velocities)
     times = _times(simulation, len(masses) * simulation.particles.dimension)
     if not isinstance(load, ScheduledLoad):
         times = times[:: max(1, len(times) // 4)]
     owns, real = areas > 0.0, masses > 0.0
 
-    def found(some: Array) -> tuple[Array, ...]:
-        forces = np.linalg.norm(ask(some), axis=2)
-        pulls = (forces[:, real] / masses[real]).max(axis=1, initial=0.0)
-        # A particle at an edge owns of both faces, and so is loaded less than the others.
-        pressed = (forces[:, owns] / areas[owns]).max(axis=1, initial=0.0)
-        return forces.max(axis=1, initial=0.0), pulls, pressed
+    def sample(some: Array) -> tuple[Array, ...]:
+        if isinstance(load, ScheduledLoad):
+            forces = load.schedule(some)
+            forces = np.broadcast_to(forces, (len(some), *forces.shape[1:]))
+        else:
+            x, v = start.positions, start.velocities
+            forces = np.stack([load.forces(float(t), x, v) for t in some])
+        sizes = np.linalg.norm(forces, axis=2)
+        accelerations = (sizes[:, real] / masses[real]).max(axis=1, initial=0.0)
+        # A particle at an edge owns area of both faces, so its stress is less than the others'.
+        stresses = (sizes[:, owns] / areas[owns]).max(axis=1, initial=0.0)
+        return sizes.max(axis=1, initial=0.0), accelerations, stresses
 
-    times, (sizes, pulls, pressed) = _refined(times, found(times), found)
+    times, (sizes, accelerations, stresses) = _sampled(times, sample)
     on_surface = isinstance(load, SurfaceLoad)
-    return LoadHistory(
-        label=load.label,
-        times=times,
-        sizes=sizes,
-        stresses=pressed if on_surface else np.zeros_like(sizes),
-        accelerations=pulls,
-        on_surface=on_surface,
-    )
+    stresses = stresses if on_surface else np.zeros_like(sizes)
+    return LoadHistory(load.label, times, sizes, stresses, accelerations, on_surface)
 
 
-def motions(simulation: BuiltScene) -> Iterator[Motion]:
-    """Of every motion that is a schedule."""
+def motion_histories(simulation: BuiltScene) -> Iterator[MotionHistory]:
+    """History of every constraint that is a schedule."""
     for motion in simulation.dynamics.constraints:
         if isinstance(motion, ScheduledConstraint):
-            yield _of_motion(simulation, motion)
 
+            def sample(some: Array, motion: ScheduledConstraint = motion) -> tuple[Array, ...]:
+                values = (np.abs(motion.schedule(some, k)).max(axis=1, initial=0.0) for k in (0, 1))
+                return tuple(np.broadcast_to(value, (len(some),)) for value in values)
 
-def _of_motion(simulation: BuiltScene, motion: ScheduledConstraint) -> Motion:
-    times = _times(simulation, len(motion.entries[0]))
-
-    def found(some: Array) -> tuple[Array, ...]:
-        values = (np.abs(motion.schedule(some, k)).max(axis=1, initial=0.0) for k in (0, 1))
-        return tuple(np.broadcast_to(one, (len(some),)) for one in values)
-
-    times, (sizes, speeds) = _refined(times, found(times), found)
-    return Motion(motion.label, times, sizes, speeds, motion)
-
-
-def _asked(load: Load, x: Array, v: Array) -> Callable[[Array], Array]:
-    """Forces (t, k, d) at times (t,)."""
-    if isinstance(load, ScheduledLoad):
-
-        def scheduled(times: Array) -> Array:
-            found = load.schedule(times)
-            return np.broadcast_to(found, (len(times), *found.shape[1:]))
-
-        return scheduled
-    return lambda times: np.stack([load.forces(float(t), x, v) for t in times])
+            times = _times(simulation, len(motion.entries[0]))
+            times, (sizes, speeds) = _sampled(times, sample)
+            yield MotionHistory(motion.label, times, sizes, speeds)
 
 
 def _times(simulation: BuiltScene, width: int) -> Array:
-    """From 0 to the end of the duration, close together at the start."""
+    """Times from 0 to the end, dense at the start, for `width` numbers at each."""
     end = simulation.scene.duration
     count = max(8, min(_TIMES, _ENTRIES // max(1, width)))
     first = min(simulation.step_size, 0.1 * end)
@@ -148,19 +125,18 @@ def _times(simulation: BuiltScene, width: int) -> Array:
     return np.unique(np.concatenate([[0.0], early, np.linspace(0.0, end, count - count // 2)]))
 
 
-def _refined(
-    times: Array, values: tuple[Array, ...], found: Callable[[Array], tuple[Array, ...]]
+def _sampled(
+    times: Array, sample: Callable[[Array], tuple[Array, ...]]
 ) -> tuple[Array, tuple[Array, ...]]:
-    """The same with times between the two at which the first rise was passed over."""
-    sizes = values[0]
-    if len(times) < 3 or not sizes.max() > 0.0:
-        return times, values
-    above = int(np.argmax(sizes >= 0.9 * sizes.max()))
-    if above == 0 or sizes[above - 1] > 0.1 * sizes.max():
+    """Times and samples, with more of them between two times that skip the first rise."""
+    values = sample(times)
+    sizes, peak = values[0], values[0].max()
+    above = int(np.argmax(sizes >= 0.9 * peak))
+    if len(times) < 3 or not peak > 0.0 or above == 0 or sizes[above - 1] > 0.1 * peak:
         return times, values
     between = np.linspace(times[above - 1], times[above], min(len(times), 34))[1:-1]
-    own = found(between)
     joined = tuple(
-        np.concatenate([a[:above], b, a[above:]]) for a, b in zip(values, own, strict=True)
+        np.concatenate([a[:above], b, a[above:]])
+        for a, b in zip(values, sample(between), strict=True)
     )
     return np.concatenate([times[:above], between, times[above:]]), joined

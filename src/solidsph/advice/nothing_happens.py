@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 
 
-def nothing_happens(seen: Seen) -> Iterator[Advice]:
-    """No force, no imposed motion, no initial state."""
-    if any(one.peak > 0.0 for one in seen.loads) or any(one.peak > 0.0 for one in seen.motions):
+def nothing_happens(facts: SceneFacts) -> Iterator[Advice]:
+    """Check loads, prescribed motions and the initial state."""
+    if facts.imposed or not facts.starts_at_rest:
         return
-    if seen.velocities.any() or seen.displacements.any():
-        return
-    loads = ", ".join(repr(one.label) for one in seen.loads)
+    loads = ", ".join(repr(load.label) for load in facts.loads)
     yield Advice(
-        found="nothing acts: no initial state, no motion imposed, "
+        finding="nothing acts: no initial state, no prescribed motion, "
         + (f"and no force by {loads}" if loads else "and no load"),
         expected="something that moves the bodies",
         remedy="add a load, [[initial]] or 'prescribed-motion'; a load must not be 0",

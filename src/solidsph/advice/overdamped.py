@@ -1,4 +1,4 @@
-"""Damping so strong that a body creeps."""
+"""Damping so strong that a body creeps through the whole duration."""
 
 from __future__ import annotations
 
@@ -6,26 +6,26 @@ from collections.abc import Iterator
 from math import pi
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 
 _STRONG = 5.0  # times critical
 _LONG = 0.3  # of the duration
 
 
-def overdamped(seen: Seen) -> Iterator[Advice]:
-    """Against the slowest free vibration, which damping at 2 omega brings to rest the soonest."""
-    if not seen.moves:
+def overdamped(facts: SceneFacts) -> Iterator[Advice]:
+    """Compare damping with the slowest vibration, which 2 omega brings to rest the soonest."""
+    if not facts.is_motion:
         return
-    omega = 2.0 * pi / seen.slowest_period
-    for label in seen.answering(Need.REST):
-        rate = seen.simulation.load_of(label).damping_rate
+    omega = 2.0 * pi / facts.slowest_period
+    for label in facts.effects_for(Need.REST):
+        rate = facts.simulation.load_of(label).damping_rate
         creeping = rate / omega**2
-        if rate > _STRONG * 2.0 * omega and creeping > _LONG * seen.scene.duration:
+        if rate > _STRONG * 2.0 * omega and creeping > _LONG * facts.scene.duration:
             yield Advice(
-                found=f"{label!r} damps at {rate:.3g}/s, {rate / (2.0 * omega):.3g} times what is "
-                f"critical: the slowest motion takes {creeping:.2g} s to follow, of a duration of "
-                f"{seen.scene.duration:.2g} s",
+                finding=f"{label!r} damps at {rate:.3g}/s, {rate / (2.0 * omega):.3g} times the "
+                f"critical rate: the slowest motion takes {creeping:.2g} s to follow, of a "
+                f"duration of {facts.scene.duration:.2g} s",
                 expected=f"about 2 omega = {2.0 * omega:.2g}/s",
                 remedy=f"rate = {2.0 * omega:.2g}, or [statics] if only the end matters",
             )

@@ -1,4 +1,4 @@
-"""A load out of all proportion to what it acts on."""
+"""A load, velocity, displacement or weight out of all proportion to the body."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 
 _STRAIN = 3.0  # a stress, over Young's modulus
 _SPEED = 1.0  # a velocity, over the wave speed
@@ -17,58 +17,55 @@ _SAG = 30.0  # deflection of a cantilever under its weight by small strains, ove
 _UNITS = "check the units: Pa, m, s, m/s^2"
 
 
-def overloaded(seen: Seen) -> Iterator[Advice]:
-    """Stress over stiffness, velocity over wave speed, displacement over size."""
-    soft = min(seen.bodies, key=lambda one: one.youngs_modulus)
-    for load in seen.loads:
-        strain = float(load.stresses.max()) / soft.youngs_modulus
-        if strain > _STRAIN:
+def overloaded(facts: SceneFacts) -> Iterator[Advice]:
+    """Compare stress with stiffness, velocity with wave speed, displacement with size."""
+    softest = min(body.youngs_modulus for body in facts.bodies)
+    for load in facts.loads:
+        stress = float(load.stresses.max())
+        if stress / softest > _STRAIN:
             yield Advice(
-                found=f"{load.label!r} loads a surface with {load.stresses.max():.3g} Pa, "
-                f"{strain:.3g} times Young's modulus",
+                finding=f"{load.label!r} loads a surface with {stress:.3g} Pa, "
+                f"{stress / softest:.3g} times Young's modulus",
                 expected=f"at most {_STRAIN:g} times",
                 remedy=_UNITS,
             )
-        sag = 0.0 if load.on_surface else _sag(seen, float(load.accelerations.max()))
+        acceleration = float(load.accelerations.max())
+        sag = 0.0 if load.on_surface else _sag(facts, acceleration)
         if sag > _SAG:
             yield Advice(
-                found=f"under {load.label!r} of {load.accelerations.max():.3g} m/s^2 a cantilever "
+                finding=f"under {load.label!r} of {acceleration:.3g} m/s^2 a cantilever "
                 f"so long and thin would sag by {sag:.3g} of its lengths",
                 expected=f"less than {_SAG:g}",
                 remedy="check youngs_modulus, the acceleration and the lengths: Pa, m/s^2 and m",
             )
-    fastest = float(np.linalg.norm(seen.velocities, axis=1).max(initial=0.0))
-    speeds = [("the initial state", fastest / seen.first.speed)]
-    speeds += [(f"{m.label!r}", float(m.speeds.max()) / seen.first.speed) for m in seen.motions]
-    for what, part in speeds:
-        if part > _SPEED:
+    initial = float(np.linalg.norm(facts.velocities, axis=1).max(initial=0.0))
+    speeds = [("the initial state", initial)]
+    speeds += [(repr(motion.label), float(motion.speeds.max())) for motion in facts.motions]
+    for what, speed in speeds:
+        if speed / facts.fastest.speed > _SPEED:
             yield Advice(
-                found=f"{what} moves at {part:.3g} times the wave speed",
-                expected="less: nothing solid stays whole",
+                finding=f"{what} moves at {speed / facts.fastest.speed:.3g} times the wave speed",
+                expected="less: no solid stays whole",
                 remedy=_UNITS,
             )
-    longest = max(one.length for one in seen.bodies)
-    for motion in seen.motions:
+    longest = max(body.length for body in facts.bodies)
+    for motion in facts.motions:
         if motion.peak > _TRAVEL * longest:
             yield Advice(
-                found=f"{motion.label!r} moves by {motion.peak:.3g} m, {motion.peak / longest:.3g} "
-                "times the length of the largest body",
+                finding=f"{motion.label!r} moves by {motion.peak:.3g} m, "
+                f"{motion.peak / longest:.3g} times the length of the largest body",
                 expected=f"at most {_TRAVEL:g} times",
                 remedy=_UNITS,
             )
 
 
-def _sag(seen: Seen, acceleration: float) -> float:
-    """q L^4 / (8 E I) of the slenderest supported body, over its length [-]."""
-    if not acceleration > 0.0:
-        return 0.0
+def _sag(facts: SceneFacts, acceleration: float) -> float:
+    """Deflection q L^4 / (8 E I) of the slenderest held body, over its length [-]."""
     sags = [0.0]
-    for one in seen.bodies:
-        if one.supported:
-            weight = one.density * acceleration
-            if seen.dimension == 1:
-                sags.append(weight * one.length / one.youngs_modulus)
-            else:
-                slender = one.length / one.thicknesses[1]
-                sags.append(1.5 * weight * one.length * slender**2 / one.youngs_modulus)
+    for body in facts.bodies if acceleration > 0.0 else ():
+        if body.is_held:
+            stretch = body.density * acceleration * body.length / body.youngs_modulus
+            if facts.dimension > 1:
+                stretch *= 1.5 * (body.length / body.thicknesses[1]) ** 2
+            sags.append(stretch)
     return max(sags)

@@ -1,4 +1,4 @@
-"""A load on several faces, of which its condition names none."""
+"""A load on several faces that its condition does not name."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.maths.arrays import Mask
 from solidsph.model.regions import AXES, Where, names_used
@@ -22,15 +22,15 @@ _SHOWN = 6  # faces of one load
 _AHEAD, _TOUCHING = 0.75, 1.5
 
 
-def several_faces(seen: Seen) -> Iterator[Advice]:
-    """By the area that a load takes of each face.
+def several_faces(facts: SceneFacts) -> Iterator[Advice]:
+    """Compare the areas that a load takes of each face.
 
-    A corner that is picked by coordinates owns some of every face that meets there. Where the
-    condition says "surface", or consists of names alone, such as "not left", all of it is meant. So
-    are the faces of one name on several bodies, unless one of them lies against another body.
+    A corner that is picked by coordinates owns some of every face that meets there. A condition
+    with "surface", or of names alone, such as "not left", means all of it. So does the name of a
+    face that several bodies have, unless one such face lies against another body.
     """
-    pieces = seen.simulation.model.pieces()
-    for entry in seen.scene.boundaries:
+    pieces = facts.simulation.model.pieces()
+    for entry in facts.scene.boundaries:
         handler: BoundaryHandler = construct("boundaries", entry.part)
         where: Where | None = getattr(handler, "where", None)
         if not handler.loads_surface or where is None:
@@ -41,9 +41,8 @@ def several_faces(seen: Seen) -> Iterator[Advice]:
         shares = _shares(pieces, chosen)
         picked = names & {*AXES} and "surface" not in {name.split(".")[-1] for name in names}
         if loose.any() and len(shares) > 1 and picked:
-            why = (
-                "names no face" if loose.sum() == chosen.sum() else "names one face, and meets more"
-            )
+            none = loose.sum() == chosen.sum()
+            why = "names no face" if none else "names one face, and meets more"
         elif _in_several_bodies(pieces, chosen, names) and _covered(pieces, chosen):
             why = "names a face that several bodies have, one of which lies against another"
         else:
@@ -53,10 +52,10 @@ def several_faces(seen: Seen) -> Iterator[Advice]:
         listed = [f"{face} {shares[face] / total:.0%}" for face in largest[:_SHOWN]]
         if len(largest) > _SHOWN:
             listed.append(f"{len(largest) - _SHOWN} more")
-        unit = {1: "", 2: " m", 3: " m^2"}[seen.dimension]
+        unit = {1: "", 2: " m", 3: " m^2"}[facts.dimension]
         shown = f"where = {where!r}" if isinstance(where, str) else "its function"
         yield Advice(
-            found=f"{entry.label or type(handler).__name__}: {shown} {why}, and what it loads, "
+            finding=f"{entry.label or type(handler).__name__}: {shown} {why}, and what it loads, "
             f"{total:.4g}{unit}, is on {', '.join(listed)}",
             expected="a load on the faces that its condition names",
             remedy=_remedy(where, largest, names),
@@ -64,19 +63,18 @@ def several_faces(seen: Seen) -> Iterator[Advice]:
 
 
 def _names(pieces: Pieces, where: Where) -> frozenset[str]:
-    """What a condition names, and the conditions of the scene's own tags in it."""
+    """Names in a condition, and in the conditions of the scene's own tags in it."""
     if not isinstance(where, str):
         return frozenset(AXES)  # a function of positions
     names = names_used(pieces.particles, where)
-    own = [name.split(".")[-1] for name in names]
-    for tag in own:
+    for tag in [name.split(".")[-1] for name in names]:
         for _, condition in pieces.conditions.get(tag, ()):
             names |= _names(pieces, condition)
     return names
 
 
 def _shares(pieces: Pieces, chosen: Mask) -> dict[str, float]:
-    """Area by face [m^(d-1)], of each body where there are several."""
+    """Area by face [m^(d-1)], and by body where there are several."""
     bodies = list(pieces.particles.bodies)
     areas: dict[str, float] = {}
     each = np.stack([pieces.bodies[chosen], pieces.faces[chosen]], axis=1)
@@ -88,7 +86,7 @@ def _shares(pieces: Pieces, chosen: Mask) -> dict[str, float]:
 
 
 def _in_several_bodies(pieces: Pieces, chosen: Mask, names: frozenset[str]) -> bool:
-    """Whether a face was named by a condition that names no body."""
+    """True if a condition that names no body names a face of several."""
     particles = pieces.particles
     if len(particles.bodies) < 2 or names & {*particles.bodies, *pieces.conditions}:
         return False
@@ -97,7 +95,7 @@ def _in_several_bodies(pieces: Pieces, chosen: Mask, names: frozenset[str]) -> b
 
 
 def _covered(pieces: Pieces, chosen: Mask) -> bool:
-    """Whether some of the chosen surface faces a particle of another body that touches it."""
+    """True if some of the chosen surface faces a particle of another body that touches it."""
     particles = pieces.particles
     X, spacings = particles.positions, particles.spacings
     numbers = np.flatnonzero(chosen)
@@ -120,8 +118,7 @@ def _covered(pieces: Pieces, chosen: Mask) -> bool:
 def _remedy(where: Where, faces: list[str], names: frozenset[str]) -> str:
     if not isinstance(where, str):
         return f"name the face: where = {faces[0]!r} and tags"
-    if not names & {*AXES}:
-        every = " or ".join(faces[:_SHOWN])
-        return f"name the body: where = {faces[0]!r}, or {every!r} if all are meant"
     every = " or ".join(faces[:_SHOWN])
+    if not names & {*AXES}:
+        return f"name the body: where = {faces[0]!r}, or {every!r} if all are meant"
     return f"where = '{faces[0]} and ({where})', or '({every}) and ({where})' if all are meant"

@@ -1,4 +1,4 @@
-"""A load so slow that nothing moves but what it moves: an equilibrium."""
+"""A load so slow that the motion is an equilibrium at every moment."""
 
 from __future__ import annotations
 
@@ -6,43 +6,42 @@ from collections.abc import Iterator
 from math import isfinite
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 from solidsph.interfaces.history import HistoryMaterial
 
 # Slowest periods in which a load rises, and in which a damped motion has long come to rest.
 _RISING, _RESTING = 20.0, 40.0
 
+_REMEDY = "[statics] finds the equilibrium in a few load steps (statics, in place of integrator)"
 
-def slow_load(seen: Seen) -> Iterator[Advice]:
-    """By the slowest period of the bodies; not where materials remember, or waves are imposed."""
+
+def slow_load(facts: SceneFacts) -> Iterator[Advice]:
+    """Compare rises with the slowest period, without material history or initial velocity."""
     if (
-        not seen.moves
-        or any(isinstance(b.material, HistoryMaterial) for b in seen.simulation.model.bodies)
-        or not all(one.supported for one in seen.bodies)
-        or seen.simulation.initial.velocities.any()
-        or len(seen.bodies) > 1
+        not facts.is_motion
+        or any(isinstance(b.material, HistoryMaterial) for b in facts.simulation.model.bodies)
+        or not all(body.is_held for body in facts.bodies)
+        or facts.simulation.initial.velocities.any()
+        or len(facts.bodies) > 1
+        or not facts.imposed
     ):
         return
-    imposed = [s for s in (*seen.loads, *seen.motions) if s.peak > 0.0]
-    period, duration = seen.slowest_period, seen.scene.duration
-    if not imposed:
-        return
-    remedy = "[statics] finds the equilibrium in a few load steps (statics, in place of integrator)"
-    rise = min(one.rise for one in imposed)
-    settled = max(one.settled for one in imposed)
-    damped = bool(seen.answering(Need.REST))
+    period = facts.slowest_period
+    rise = min(history.rise for history in facts.imposed)
+    settled = max(history.settled for history in facts.imposed)
+    resting = facts.scene.duration - settled
     if isfinite(rise) and rise > _RISING * period:
         yield Advice(
-            found=f"the quickest load takes {rise:.3g} s to rise, {rise / period:.3g} times the "
+            finding=f"the quickest load takes {rise:.3g} s to rise, {rise / period:.3g} times the "
             f"slowest period, about {period:.2g} s",
             expected=f"less than {_RISING:g} periods, if something is to move",
-            remedy=remedy,
+            remedy=_REMEDY,
         )
-    elif damped and isfinite(settled) and duration - settled > _RESTING * period:
+    elif facts.effects_for(Need.REST) and isfinite(settled) and resting > _RESTING * period:
         yield Advice(
-            found=f"after {settled:.2g} s nothing changes, and damping has "
-            f"{(duration - settled) / period:.3g} of the slowest periods to bring it to rest",
+            finding=f"after {settled:.2g} s nothing changes, and damping has "
+            f"{resting / period:.3g} of the slowest periods to bring it to rest",
             expected=f"less than {_RESTING:g} periods",
-            remedy=remedy,
+            remedy=_REMEDY,
         )

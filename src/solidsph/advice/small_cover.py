@@ -1,4 +1,4 @@
-"""A support too small for the kernel: sums over neighbours miss what they should find."""
+"""A support too small for the kernel: sums over neighbours are wrong."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel, smoothing_kernel
 from solidsph.maths.arrays import Array
 
@@ -19,30 +19,30 @@ _WRONG = 0.03
 _PLACES = (0.0, 0.25, 0.5)
 
 
-def small_cover(seen: Seen) -> Iterator[Advice]:
-    """How far the kernel's sum over a lattice is from 1, at worst."""
-    own = seen.simulation.model.bodies[0].smoothing
-    wrong = _unevenness(own, seen.cover)
-    if wrong <= _WRONG:
+def small_cover(facts: SceneFacts) -> Iterator[Advice]:
+    """Sum the kernel over a lattice; the sum should be 1."""
+    own = facts.simulation.model.bodies[0].smoothing
+    error = _error(own, facts.cover)
+    if error <= _WRONG:
         return
     enough = next(
         (
             cover
-            for cover in np.arange(np.ceil(10.0 * seen.cover), 60.0) / 10.0
-            if _unevenness(smoothing_kernel(own.kernel, own.dimension, cover), cover) <= _WRONG
+            for cover in np.arange(np.ceil(10.0 * facts.cover), 60.0) / 10.0
+            if _error(smoothing_kernel(own.kernel, own.dimension, cover), cover) <= _WRONG
         ),
         None,
     )
     yield Advice(
-        found=f"with cover = {seen.cover:g} the kernel's sum over a lattice is "
-        f"{100 * wrong:.2g} % off",
+        finding=f"with cover = {facts.cover:g} the kernel's sum over a lattice is "
+        f"{100 * error:.2g} % off",
         expected=f"at most {100 * _WRONG:g} %: a smooth kernel needs more neighbours",
         remedy="choose another kernel" if enough is None else f"cover = {enough:.2g} or more",
     )
 
 
-def _unevenness(kernel: SmoothingKernel, cover: float) -> float:
-    """Largest distance of the sum over neighbours from 1 [-]."""
+def _error(kernel: SmoothingKernel, cover: float) -> float:
+    """Largest difference of the sum over neighbours from 1 [-]."""
     d, spacing = kernel.dimension, kernel.support_radius / cover
     along = np.arange(-np.ceil(cover) - 1.0, np.ceil(cover) + 2.0)
     lattice: Array = np.array(list(product(along, repeat=d)))
@@ -51,4 +51,4 @@ def _unevenness(kernel: SmoothingKernel, cover: float) -> float:
         for shift in _PLACES
     ]
     lost = kernel.kernel.lost_mass(d)
-    return max(abs(one - 1.0 + lost) for one in sums)
+    return max(abs(total - 1.0 + lost) for total in sums)

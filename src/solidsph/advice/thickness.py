@@ -1,8 +1,8 @@
-"""How thick a body is: by rays through it that leave where its surface faces the other way.
+"""Thickness of a body, by rays through it that leave where its surface faces the other way.
 
-A ray that starts beside a corner leaves through the other side of that corner, and its length tells
-how near the corner is. So a ray counts only where the two sides are nearly parallel and do not meet
-in a corner ahead: as those of a plate, a web, or a beam that tapers to a blunt end.
+A ray that starts beside a corner leaves through the other side of that corner, and its length shows
+only how near the corner is. So a ray counts only where the two sides are nearly parallel and do not
+meet in a corner ahead: as those of a plate, a web, or a beam that tapers to a blunt end.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from solidsph.maths.arrays import Array, Indices, Mask
 _RAYS = {2: 2000, 3: 600}  # by dimension: many find a narrow web, and cost time
 _MARCHES = 200
 
-# Angle between the two sides of a thin part at most; below the second, they meet too far away.
+# Largest angle between the two sides of a thin part; below the second they meet too far away.
 _TAPERING, _PARALLEL = cos(radians(30.0)), cos(radians(1.0))
 
-# Of the surface of thin parts: a few rays beside rims and cut edges find less than there is.
+# Share of the surface of thin parts: rays beside rims and cut edges find less than there is.
 _STRAY = 0.03
 
-# Of the rays: a body with no more of them has no thin part, but corners alone.
+# Share of the rays: a body with fewer of them has no thin part, only corners.
 _FEW = 0.01
 
 # Directions between the two sides of a notch, and places along notches.
@@ -35,10 +35,10 @@ _TURNS = np.linspace(0.0, 1.0, 9)[1:-1]
 
 @attrs.frozen(eq=False)
 class Rays:
-    """Straight ways through a body from many places of its surface, along the normal there."""
+    """Straight lines through a body, each from a place of its surface along the normal there."""
 
     lengths: Array  # (k,) [m]
-    areas: Array  # (k,) of the surface that each stands for [m^(d-1)]
+    areas: Array  # (k,) area of the surface that each represents [m^(d-1)]
     facing: Array  # (k,) cosine of the angle between the two sides [-]
     corner: Mask  # (k,) whether the two sides meet in a corner
 
@@ -57,12 +57,12 @@ class Rays:
         return min(widest, _below(self.lengths[blade], self.areas[blade], 0.5) or widest)
 
     def usual(self, widest: float) -> float:
-        """Half of the surface has more behind it [m]."""
+        """Thickness that half of the surface exceeds [m]."""
         return _below(self.lengths, self.areas, 0.5) or widest
 
 
 def _below(lengths: Array, areas: Array, part: float) -> float:
-    """The length that this part of the area stays below; 0 if there is none."""
+    """Length that rays of this share of the area stay below [m]; 0 without any area."""
     if not areas.sum() > 0.0:
         return 0.0
     order = np.argsort(lengths)
@@ -72,7 +72,7 @@ def _below(lengths: Array, areas: Array, part: float) -> float:
 
 
 @attrs.frozen(eq=False)
-class Boundary:
+class SampledSurface:
     """Samples of a surface, and how to find the nearest."""
 
     points: Array  # (m, d) [m]
@@ -95,7 +95,7 @@ class Boundary:
         return np.asarray(gaps), np.asarray(near, dtype=np.intp)
 
 
-def through(shape: Shape, spacing: float) -> Rays:
+def rays_through(shape: Shape, spacing: float) -> Rays:
     """Rays through `shape`, whose surface is sampled for this spacing [m]."""
     surface = _boundary(shape, spacing)
     count = len(surface.points)
@@ -112,39 +112,39 @@ def through(shape: Shape, spacing: float) -> Rays:
     return Rays(lengths, areas[ended], facing, corner)
 
 
-def _boundary(shape: Shape, spacing: float) -> Boundary:
+def _boundary(shape: Shape, spacing: float) -> SampledSurface:
     surface = shape.surface(spacing)
     sizes = np.linalg.norm(surface.area_vectors, axis=1)
     owned = sizes > 0.0
     points, sizes = surface.points[owned], sizes[owned]
     inward = -surface.area_vectors[owned] / sizes[:, None]
     step = float(np.median(sizes) ** (1.0 / (shape.dimension - 1)))
-    return Boundary(points, inward, sizes, cKDTree(points), step)
+    return SampledSurface(points, inward, sizes, cKDTree(points), step)
 
 
 def _lengths(
-    surface: Boundary, starts: Array, directions: Array, spacing: float
+    surface: SampledSurface, starts: Array, directions: Array, spacing: float
 ) -> tuple[Array, Mask]:
-    """How far each ray goes inside (k,) [m], and whether it left within the steps made."""
+    """Length of each ray inside (k,) [m], and whether it left within the steps made."""
     # No ray begins at an edge, along which it would run: a third of a spacing to the middle.
     begin, least = 0.05 * spacing, 0.25 * spacing
-    gone = np.full(len(starts), begin)
+    lengths = np.full(len(starts), begin)
     inside = np.arange(len(starts))
     for _ in range(_MARCHES):
-        gaps, heights = surface.heights(starts[inside] + gone[inside, None] * directions[inside])
+        gaps, heights = surface.heights(starts[inside] + lengths[inside, None] * directions[inside])
         out = heights < 0.0
-        gone[inside[out]] += heights[out]  # back to the surface
+        lengths[inside[out]] += heights[out]  # back to the surface
         inside, gaps = inside[~out], gaps[~out]
         if not len(inside):
             break
         free = np.sqrt(np.maximum(gaps**2 - 0.5 * surface.step**2, 0.0))  # between samples
-        gone[inside] += np.maximum(free, least)
-    ended = gone > 2.0 * begin  # others stand at an edge, on which the normal is not inward
+        lengths[inside] += np.maximum(free, least)
+    ended = lengths > 2.0 * begin  # others start at an edge, where the normal is not inward
     ended[inside] = False
-    return gone, ended
+    return lengths, ended
 
 
-def _normals(surface: Boundary, ends: Array) -> Array:
+def _normals(surface: SampledSurface, ends: Array) -> Array:
     """Inward normals where rays leave, (k, d); at the tip of a notch the mean of its sides."""
     gaps, near = surface.nearest(ends, 8)
     weights = (gaps <= gaps[:, :1] + 1.5 * surface.step).astype(np.float64)
@@ -154,9 +154,9 @@ def _normals(surface: Boundary, ends: Array) -> Array:
 
 
 def _meet(
-    surface: Boundary, starts: Array, directions: Array, lengths: Array, normals: Array
+    surface: SampledSurface, starts: Array, directions: Array, lengths: Array, normals: Array
 ) -> Mask:
-    """Whether the planes through both ends of a ray meet where the surface is, (k,)."""
+    """True if the planes through both ends of a ray meet where the surface is, (k,)."""
     facing = np.einsum("ki,ki->k", normals, directions)
     along = normals - facing[:, None] * directions
     slope = np.linalg.norm(along, axis=1)  # the sine of the angle between the planes
@@ -166,7 +166,7 @@ def _meet(
     return np.asarray((-facing < _PARALLEL) & (gaps < 0.1 * lengths + surface.step))
 
 
-def _notches(surface: Boundary) -> tuple[Array, Array]:
+def _notches(surface: SampledSurface) -> tuple[Array, Array]:
     """Rays from the tips of notches, between the normals of their sides, each (k, d)."""
     points, inward = surface.points, surface.inward
     pairs = surface.tree.query_pairs(1.5 * surface.step, output_type="ndarray")

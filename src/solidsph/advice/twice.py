@@ -1,4 +1,4 @@
-"""The same effect twice."""
+"""Two equal effects, which act twice as much as one."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from collections.abc import Iterator
 from itertools import combinations
 
 from solidsph.advice.advice import Advice
-from solidsph.advice.seen import Seen
+from solidsph.advice.scene_facts import SceneFacts
 
 
-def twice(seen: Seen) -> Iterator[Advice]:
-    """Two of one kind with the same parameters act twice as much."""
-    for (a, first), (b, other) in combinations(seen.simulation.effects.items(), 2):
-        if first == other:
+def twice(facts: SceneFacts) -> Iterator[Advice]:
+    """Compare effects by kind and parameters."""
+    for (a, first), (b, second) in combinations(facts.simulation.effects.items(), 2):
+        if first == second:
             yield Advice(
-                found=f"{a!r} and {b!r} are the same effect with the same parameters",
+                finding=f"{a!r} and {b!r} are the same effect with the same parameters",
                 expected="each once",
                 remedy="leave one out, or state where each acts",
             )

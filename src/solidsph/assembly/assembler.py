@@ -40,7 +40,7 @@ from solidsph.model.particles import Particles, State
 from solidsph.model.regions import select
 from solidsph.registry import registry
 from solidsph.registry.origin import described
-from solidsph.results.shown import clashes
+from solidsph.results.output_fields import name_clashes
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.dynamics import Dynamics
 from solidsph.run.stable_step import stable_step
@@ -71,7 +71,7 @@ class Assembler:
         if scene.silence:
             from solidsph import advice  # only where its names are asked for
 
-            problems.add(advice.unknown(scene.silence))
+            problems.add(advice.unknown_names(scene.silence))
         words = self._words
         words.stop_if_any()
         parts = words.parts
@@ -134,7 +134,7 @@ class Assembler:
         remembered = [body for body in made if isinstance(body.material, HistoryMaterial)]
         if remembered:
             terms.append(HistoryFields(remembered, particles.count))
-        problems.add(clashes(_at_rest(problems.settled(initial), model, terms), terms))
+        problems.add(name_clashes(_at_rest(problems.settled(initial), model, terms), terms))
         problems.stop_if_any()
 
         made_ready = kind(

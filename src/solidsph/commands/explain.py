@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import click
 
-from solidsph.advice import advised
+from solidsph.advice import advise
 from solidsph.commands import prediction as told
 from solidsph.commands.console import say, show_json, show_table
 from solidsph.commands.target import parameters, resolve
@@ -140,8 +140,8 @@ def _explained(
         "cost": told.prediction_rows(found),
         "effects": _effects(simulation.effects, simulation, shares(simulation, machine)),
         "warnings": [
-            {"name": a.name, "found": a.found, "expected": a.expected, "remedy": a.remedy}
-            for a in advised(simulation)
+            {"name": a.name, "found": a.finding, "expected": a.expected, "remedy": a.remedy}
+            for a in advise(simulation)
         ],
         "silenced": list(scene.silence),
     }

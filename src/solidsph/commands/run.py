@@ -139,13 +139,13 @@ def run(
 
 def _make_way(path: Path, *, overwrite: bool) -> None:
     """Say what a new record takes the place of, if it may."""
-    from solidsph.results.left import check_replaceable
+    from solidsph.results.earlier_run import check_replaceable
     from solidsph.results.sole_writer import check_no_writer
 
     check_no_writer(path)
-    left = check_replaceable(path, overwrite=overwrite)
-    if left is not None and left.count:
-        err.print(escape(f"{path} holds {left.told()}; it is replaced"), soft_wrap=True)
+    earlier = check_replaceable(path, overwrite=overwrite)
+    if earlier is not None and earlier.count:
+        err.print(escape(f"{path} holds {earlier.description}; it is replaced"), soft_wrap=True)
 
 
 def _checked(scene: Scene) -> None:
@@ -183,7 +183,7 @@ def _run_scene(
     shown: bool,
     as_json: bool,
 ) -> None:
-    from solidsph.advice import advised
+    from solidsph.advice import advise
     from solidsph.commands import prediction as told
     from solidsph.commands.receipted import of_scene, show_receipts
     from solidsph.commands.warned import warn
@@ -192,7 +192,7 @@ def _run_scene(
     known = facts()
     known |= {"scene": target, "record": str(path), "warnings": []}
     simulation, build = told.built(scene)
-    advice = advised(simulation)
+    advice = advise(simulation)
     known["warnings"] += [one.line for one in advice]
     if not as_json:
         warn({"": advice})
@@ -210,7 +210,11 @@ def _run_scene(
 
                 heard = _Once(known["warnings"])
                 result = run_watched(
-                    simulation, record=path, roll_backs=watched, observers=observers, told=heard
+                    simulation,
+                    record=path,
+                    roll_backs=watched,
+                    observers=observers,
+                    on_finding=heard,
                 )
         except UnsoundError as cause:
             # What it came to is shown, and then that it is not to be used.
@@ -285,7 +289,7 @@ def _run_case(
     shown: bool,
     as_json: bool,
 ) -> None:
-    from solidsph.advice import Advice, advised
+    from solidsph.advice import Advice, advise
     from solidsph.commands import prediction as told
     from solidsph.commands.receipted import of_case, show_case_receipts
     from solidsph.commands.warned import warn
@@ -302,7 +306,7 @@ def _run_case(
             case_predictions[name] = told.of_run(simulation, None, frozenset(compiled))
             compiled.update(told.compilations(case_predictions[name]))
             before = {one.name for several in advice.values() for one in several}
-            advice[name] = advised(simulation)
+            advice[name] = advise(simulation)
             if advice[name]:
                 known["warnings"][name] = [one.line for one in advice[name]]
             if not as_json:  # each warning once a case, at the first scene that it is about

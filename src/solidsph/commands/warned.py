@@ -15,7 +15,7 @@ def warn(advice: Mapping[str, Sequence[Advice]]) -> None:
     for scene, several in advice.items():
         for one in several:
             where = f"{scene}, " if scene else ""
-            text = f"warning, {where}{one.name}: {one.found}. Remedy: {one.remedy}"
+            text = f"warning, {where}{one.name}: {one.finding}. Remedy: {one.remedy}"
             err.print(escape(text), soft_wrap=True)
     if any(advice.values()):
         err.print(

@@ -1,7 +1,7 @@
 """Checkpoint: a complete state in a file of its own, from which a run goes on bit for bit.
 
-The file begins with a line of text, `solidsph checkpoint FORMAT DIGEST`, and goes on in what NumPy
-calls npz. The digest is of all that follows the line, so that no damage goes unnoticed, and nothing
+The file begins with a line of text, `solidsph checkpoint FORMAT DIGEST`; an npz file of NumPy
+follows. The digest is of all that follows the line, so that no damage goes unnoticed, and nothing
 in the file is ever executed.
 """
 
@@ -24,6 +24,8 @@ import numpy as np
 from solidsph.errors import RecordError
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
+from solidsph.results.layout import HDF5_ERRORS
+from solidsph.results.record_file import explained
 from solidsph.scene.scene_data import MOST_STEPS
 from solidsph.system.files import content
 from solidsph.system.signals import uninterrupted
@@ -33,14 +35,19 @@ _MAGIC = "solidsph checkpoint"
 _LONGEST_HEAD = 200  # bytes
 _ARRAYS = ("positions", "velocities", "accelerations")
 _NAMED = ("memory", "applied")
+_OF_STATE = ("time", "step", "work")
+_OF_RUN = ("scene", "step_size", "steps", "halvings")
 
-# What reading an npz may raise; after the digest only a fault of ours can.
-_NPZ_ERRORS = (
-    *(OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError),
-    *(zipfile.BadZipFile, MemoryError, RecursionError, NotImplementedError),
+# Errors in reading an npz file; if its digest is right, only a fault of ours can cause them.
+_NPZ_ERRORS = (*HDF5_ERRORS, zipfile.BadZipFile)
+
+_MOST_HALVINGS = 60  # of a step: beyond, adding a step to a time would not change it
+
+START_OVER = (
+    "delete it and resume again: the run then starts from its first state, and what is recorded "
+    "stays"
 )
-
-_MOST_HALVINGS = 60  # of a step: then a double no longer tells one from the next
+"""Remedy where a checkpoint is of no use."""
 
 
 @attrs.frozen(eq=False)
@@ -50,30 +57,30 @@ class Checkpoint:
     state: State
     scene: str  # as in the record
     step_size: float  # [s]
-    steps: int  # in all
-    halvings: int  # of the scene's own step
-    circumstances: Mapping[str, str]
-    kept: Mapping[str, Array]  # what listeners keep, by names of theirs
+    steps: int  # of the whole run
+    halvings: int  # of the step that the scene asks for
+    environment: Mapping[str, str]
+    kept: Mapping[str, Array]  # arrays of observers (`solidsph_keep`)
 
 
 def checkpoint_path(record: Path) -> Path:
-    """Where the checkpoint of a record is: beside the file itself, where the path is a link."""
+    """Path of the checkpoint of a record: beside the file itself, where `record` is a link."""
     real = Path(os.path.realpath(record))
     # Records of two suffixes may have one stem.
     return real.with_name(f"{real.stem if real.suffix == '.h5' else real.name}.checkpoint")
 
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
-    """Write it to the disk, whole; an older one stays until then.
-
-    Raises:
-        RecordError: it cannot be written; an older one is still there.
-    """
+    """Write a whole checkpoint to the disk; if that fails, RecordError, and an older one stays."""
     body = _packed(checkpoint)
     head = f"{_MAGIC} {FORMAT} {_digest(body)}\n".encode()
     draft = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    remedy = (
+        "the record and any earlier checkpoint are as they were: free some space or choose another "
+        "folder, then resume"
+    )
     try:
-        with uninterrupted():
+        with uninterrupted(), explained(f"cannot write the checkpoint {path}", remedy):
             path.parent.mkdir(parents=True, exist_ok=True)
             with draft.open("wb") as file:
                 file.write(head)
@@ -81,50 +88,27 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
                 file.flush()
                 os.fsync(file.fileno())
             draft.replace(path)
-    except OSError as cause:
-        raise RecordError(
-            f"cannot write the checkpoint {path}: {cause.strerror or cause}; the record, and the "
-            "checkpoint before this one if there was any, are as they were: free some space or "
-            "choose another folder, then resume"
-        ) from None
     finally:
-        with suppress(OSError):  # it is gone after a success
+        with suppress(OSError):  # after a success there is no draft any more
             draft.unlink()
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
-    """The checkpoint in a file.
-
-    Raises:
-        RecordError: there is none, it is damaged, or a newer solidsph wrote it.
-    """
-    try:
+    """Read a checkpoint; RecordError if there is none, or it is damaged or of another format."""
+    with explained(f"the checkpoint {path} cannot be read", "check the path"):
         data = content(path, sys.maxsize)
-    except OSError as cause:
-        raise RecordError(
-            f"the checkpoint {path} cannot be read: {cause.strerror or cause}; check the path"
-        ) from None
     head, end, body = data[:_LONGEST_HEAD].partition(b"\n")
     words = head.decode("ascii", errors="replace").removeprefix(_MAGIC).split()
     if not (end and head.startswith(_MAGIC.encode()) and len(words) == 2 and words[0].isdecimal()):
         raise RecordError(f"{path} is not a checkpoint of solidsph, or its beginning is lost")
-    # Bounded, since a number of any length would be as good a file.
-    if len(words[0]) > 9 or int(words[0]) > FORMAT:
+    if words[0] != str(FORMAT):
+        number = words[0][:9]  # one of any length would take long to convert
         raise RecordError(
-            f"the checkpoint {path} has format {words[0][:9]}, this solidsph reads up to {FORMAT}; "
-            "update solidsph"
-        )
-    if int(words[0]) < FORMAT:
-        raise RecordError(
-            f"the checkpoint {path} has the older format {words[0]}, this solidsph reads {FORMAT}; "
-            "delete it and resume again: the run is then carried out from its first state, and "
-            "what is recorded stays"
+            f"the checkpoint {path} has format {number}, this solidsph reads {FORMAT}; "
+            f"{'update solidsph' if int(number) > FORMAT else START_OVER}"
         )
     body = data[len(head) + 1 :]
-    damaged = (
-        f"the checkpoint {path} is damaged; delete it and resume again: the run is then carried "
-        "out from its first state, and what is recorded stays"
-    )
+    damaged = f"the checkpoint {path} is damaged; {START_OVER}"
     if _digest(body) != words[1]:
         raise RecordError(damaged)
     try:
@@ -144,18 +128,13 @@ def _packed(checkpoint: Checkpoint) -> bytes:
     for group, values in named.items():
         arrays |= {f"{group} {number}": value for number, value in enumerate(values.values())}
     facts = {
-        "time": state.time,
-        "step": state.step,
-        "work": dict(state.work),
+        **{name: getattr(state, name) for name in _OF_STATE},
+        **{name: getattr(checkpoint, name) for name in _OF_RUN},
         "names": {group: list(values) for group, values in named.items()},
-        "scene": checkpoint.scene,
-        "step_size": checkpoint.step_size,
-        "steps": checkpoint.steps,
-        "halvings": checkpoint.halvings,
-        "circumstances": dict(checkpoint.circumstances),
+        "circumstances": checkpoint.environment,
     }
-    # JSON gives every finite double back, and says NaN and infinities in words that it reads.
-    text = np.frombuffer(json.dumps(facts).encode(), dtype=np.uint8)
+    # JSON gives every finite double back, and has words for NaN and infinities that it reads.
+    text = np.frombuffer(json.dumps(facts, default=dict).encode(), dtype=np.uint8)
     file = io.BytesIO()
     np.savez(file, allow_pickle=False, facts=text, **arrays)
     return file.getvalue()
@@ -163,44 +142,32 @@ def _packed(checkpoint: Checkpoint) -> bytes:
 
 def _unpacked(body: bytes) -> Checkpoint:
     with zipfile.ZipFile(io.BytesIO(body)) as parts:
-        if sum(one.file_size for one in parts.infolist()) > len(body):
+        if sum(part.file_size for part in parts.infolist()) > len(body):
             raise ValueError("it claims more bytes than it has")
     with np.load(io.BytesIO(body), allow_pickle=False) as data:
         arrays: dict[str, Any] = {name: data[name] for name in data.files}
     facts = json.loads(bytes(arrays.pop("facts")))
-    named = {
+    named: dict[str, Any] = {
         group: {name: arrays[f"{group} {number}"] for number, name in enumerate(names)}
         for group, names in facts["names"].items()
     }
-    found = Checkpoint(
+    checkpoint = Checkpoint(
         state=State(
-            time=facts["time"],
-            step=facts["step"],
-            work=facts["work"],
-            positions=arrays["positions"],
-            velocities=arrays["velocities"],
-            accelerations=arrays["accelerations"],
-            memory=named["memory"],
-            applied=named["applied"],
+            **{name: facts[name] for name in _OF_STATE},
+            **{name: arrays[name] for name in _ARRAYS},
+            **{name: named[name] for name in _NAMED},
         ),
-        scene=facts["scene"],
-        step_size=facts["step_size"],
-        steps=facts["steps"],
-        halvings=facts["halvings"],
-        circumstances=facts["circumstances"],
+        **{name: facts[name] for name in _OF_RUN},
+        environment=facts["circumstances"],
         kept=named["kept"],
     )
-    _check(found)
-    return found
+    _check(checkpoint)
+    return checkpoint
 
 
-def _check(found: Checkpoint) -> None:
-    """That all is of the types and sizes that a run leaves; a digest tells only that it is whole.
-
-    Raises:
-        ValueError: something is not.
-    """
-    state = found.state
+def _check(checkpoint: Checkpoint) -> None:
+    """Raise ValueError for types or sizes that no run leaves: a digest shows only a whole file."""
+    state = checkpoint.state
     shape = state.positions.shape
     moving = {name: getattr(state, name) for name in _ARRAYS}
     for name, array in (*moving.items(), *state.applied.items()):
@@ -208,22 +175,22 @@ def _check(found: Checkpoint) -> None:
             raise ValueError(f"{name} is {array.dtype} of shape {array.shape}, not of {shape}")
         if not np.isfinite(array).all():
             raise ValueError(f"{name} is not finite")
-    for name, array in (*state.memory.items(), *found.kept.items()):
+    for name, array in (*state.memory.items(), *checkpoint.kept.items()):
         if array.dtype.kind not in "fiub":
             raise ValueError(f"{name} holds {array.dtype}, which are no numbers")
     for name, value, least in (
-        *(("time", state.time, 0.0), ("step size", found.step_size, 5e-324)),
+        *(("time", state.time, 0.0), ("step size", checkpoint.step_size, 5e-324)),
         *((name, value, -np.inf) for name, value in state.work.items()),
     ):
         if not isinstance(value, float) or not np.isfinite(value) or value < least:
             raise ValueError(f"{name} is {value!r}")
     for name, count, most in (
-        ("steps", found.steps, MOST_STEPS),
-        ("step", state.step, found.steps),
-        ("halvings", found.halvings, _MOST_HALVINGS),
+        ("steps", checkpoint.steps, MOST_STEPS),
+        ("step", state.step, checkpoint.steps),
+        ("halvings", checkpoint.halvings, _MOST_HALVINGS),
     ):
         if type(count) is not int or not 0 <= count <= most:
             raise ValueError(f"{name} is {count!r}")
-    texts = (found.scene, *found.circumstances, *found.circumstances.values())
-    if not all(isinstance(one, str) for one in texts):
-        raise ValueError("the scene or the circumstances are no texts")
+    texts = (checkpoint.scene, *checkpoint.environment, *checkpoint.environment.values())
+    if not all(isinstance(text, str) for text in texts):
+        raise ValueError("the scene or the environment is no text")

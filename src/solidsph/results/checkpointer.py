@@ -7,64 +7,59 @@ import time as clock
 from collections.abc import Mapping
 from os.path import samestat
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from solidsph.errors import RecordError
 from solidsph.interfaces.terms import Observation
+from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 from solidsph.results.checkpoint import Checkpoint, checkpoint_path, write_checkpoint
-from solidsph.results.circumstances import circumstances
+from solidsph.results.environment import run_environment
 from solidsph.results.recorder import scene_text
+from solidsph.run.built_scene import BuiltScene
 from solidsph.run.hooks import implementation
 from solidsph.run.outcome import is_over
 
-if TYPE_CHECKING:
-    from solidsph.maths.arrays import Array
-    from solidsph.run.built_scene import BuiltScene
-
-# Of the time that a run takes, what checkpoints may take.
+# Share of a run's time that checkpoints may take.
 SHARE = 0.01
 
-# What the first one takes before it is known [s], and [s/byte]: a disk that is not fast.
+# Time that the first checkpoint is assumed to take [s], and [s/byte]: by a disk that is not fast.
 _WRITING, _BYTE = 0.02, 5e-9
 
 
 class Checkpointer:
-    """Writes a checkpoint at outputs, as often as a hundredth of the time that has gone by allows.
+    """Writes a checkpoint at outputs, as often as a hundredth of the run's time allows.
 
-    At its end a run leaves one of its last output, whether it got to the end that was asked for,
-    so that it can be extended, or not. One that is killed before the first was due leaves none, and
-    is gone on with from its first state.
+    A run leaves a checkpoint of its last output when it ends, finished or not: a finished one can
+    be extended. A run that is killed before the first was due leaves none; `resume` then starts
+    from its first state.
     """
 
     def __init__(self, record: Path, *, is_resumed: bool = False) -> None:
         self._record = record
         self._path = checkpoint_path(record)
-        self._is_ours = is_resumed  # not of an older run, which this one takes the place of
-        self._recorded: os.stat_result | None = None  # which file is the record
+        self._is_ours = is_resumed  # the checkpoint; otherwise it is of a run that is replaced
+        self._recorded: os.stat_result | None = None  # identity of the record's file
         self._state: State | None = None
         self._kept: Mapping[str, Array] = {}
-        self._found: Mapping[str, str] = {}  # the circumstances, once they have been asked for
+        self._environment: Mapping[str, str] = {}  # once it has been asked for
         self._is_written = False
         self._last = clock.perf_counter()
-        self._cost: float | None = None  # of the last one [s]
+        self._cost: float | None = None  # of the last checkpoint [s]
 
     @implementation(trylast=True)
-    def solidsph_resume(
-        self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
-    ) -> None:
-        # At once: the end of the run, or its step, may be another than the older one says.
-        self._hear(simulation, observation)
+    def solidsph_resume(self, simulation: BuiltScene, observation: Observation) -> None:
+        # At once: the end of the run, or its step, may differ from those in the older checkpoint.
+        self._take(simulation, observation)
         self._write(simulation)
 
     @implementation(trylast=True)
     def solidsph_step_end(self, simulation: BuiltScene, observation: Observation) -> None:
-        # Last of all listeners: one that stops the run keeps this state from being gone on with.
+        # Last of all observers: where one stops the run, this state gets no checkpoint.
         if not self._is_ours:
-            # The record is the new run's by now, so the older one's checkpoint is of no more use.
+            # The record is the new run's by now, so the older run's checkpoint is of no use.
             self._path.unlink(missing_ok=True)
             self._is_ours = True
-        self._hear(simulation, observation)
+        self._take(simulation, observation)
         if self._is_due(observation.state):
             self._write(simulation)
 
@@ -77,11 +72,11 @@ class Checkpointer:
         except RecordError:
             if is_over(outcome):
                 raise
-            # Otherwise what stopped the run is what is to be told.
+            # Otherwise the error that stopped the run is the one to report.
 
-    def _hear(self, simulation: BuiltScene, observation: Observation) -> None:
+    def _take(self, simulation: BuiltScene, observation: Observation) -> None:
         self._state, self._is_written = observation.state, False
-        if self._recorded is None:  # the recorder has heard it before
+        if self._recorded is None:  # the recorder comes before
             self._recorded = self._record.stat()
         kept: dict[str, Array] = {}
         simulation.manager.hook.solidsph_keep(simulation=simulation, kept=kept)
@@ -89,7 +84,7 @@ class Checkpointer:
 
     @property
     def _is_recorded(self) -> bool:
-        """Whether the record is still there, and no other in its place."""
+        """True if the record is still there, and no other file in its place."""
         try:
             return self._recorded is not None and samestat(self._recorded, self._record.stat())
         except OSError:
@@ -101,16 +96,16 @@ class Checkpointer:
 
     def _write(self, simulation: BuiltScene) -> None:
         if self._state is None or simulation.scene.statics is not None:
-            return  # load steps depend on those before; an equilibrium is found anew
+            return  # load steps depend on those before; an equilibrium starts from the first
         begun = clock.perf_counter()
-        self._found = self._found or circumstances(simulation)
+        self._environment = self._environment or run_environment(simulation)
         checkpoint = Checkpoint(
             state=self._state,
             scene=scene_text(simulation),
             step_size=simulation.step_size,
             steps=simulation.steps,
             halvings=simulation.halvings,
-            circumstances=self._found,
+            environment=self._environment,
             kept=self._kept,
         )
         write_checkpoint(self._path, checkpoint)

@@ -1,7 +1,7 @@
-"""What a record holds and where: the names that its writer and its reader share.
+"""Layout of a record: what it holds and where, by names that its writer and its reader share.
 
 A record is one HDF5 file. `/VTKHDF` is an UnstructuredGrid of one vertex a particle, with time,
-that ParaView opens as it is; `/solidsph`, which VTK ignores, holds all else. VTK knows three
+that ParaView opens as it is; `/solidsph`, which VTK ignores, holds everything else. VTK knows three
 dimensions only, so a vector is padded with zeros to 3 components and a tensor to 9.
 
 | where | rows | what |
@@ -11,7 +11,7 @@ dimensions only, so a vector is padded with zeros to 3 components and a tensor t
 | `/VTKHDF/Steps` | 1 every step | times, and the first row of each step in the above |
 | `/VTKHDF/Steps`, attribute `NSteps` | | how many steps are complete: written last |
 | `/solidsph/step`, `/solidsph/history` | 1 every step | step numbers; named columns |
-| `/solidsph/digests` | 1 every step | digest of all that the step holds |
+| `/solidsph/digests` | 1 every step | digest of everything in the step |
 | the rest of `/solidsph` | | scene, plugins, versions, bodies, tags, faces, outcome; a digest |
 """
 
@@ -23,8 +23,9 @@ import attrs
 import numpy as np
 
 from solidsph.maths.arrays import Array
+from solidsph.registry.registry import Entry
 
-FORMAT = 2  # a reader refuses a higher number than its own
+FORMAT = 2  # a reader refuses any other
 VTKHDF_VERSION = (2, 0)  # the first with time; higher ones add nothing that is used here
 RECORD_SUFFIXES = (".h5", ".vtkhdf")  # `.vtkhdf` is what VTK and PyVista know it by
 RUNNING = "running"  # the outcome until the writer is closed
@@ -48,7 +49,7 @@ class Field:
 
 @attrs.frozen
 class PluginUsed:
-    """Where one part of a run came from."""
+    """Origin of one part of a run."""
 
     group: str  # "solidsph.kernels"
     name: str  # "cubic-spline"
@@ -56,9 +57,26 @@ class PluginUsed:
     version: str
     target: str  # "package.module:Class"
 
+    @classmethod
+    def of(cls, entry: Entry) -> PluginUsed:
+        """Convert an entry of the registry."""
+        return cls(entry.kind, entry.name, entry.distribution, entry.version, entry.target)
+
+
+PARTICLE_ARRAYS = {
+    "reference_position": "positions",
+    "volume": "volumes",
+    "cell": "cells",
+    "spacing": "spacings",
+    "area_vector": "area_vectors",
+    "ghost": "ghosts",
+    "image": "images",
+}
+"""Arrays of reference data: name in a record -> attribute of `Particles`."""
+
 
 def static_fields(dimension: int) -> tuple[Field, ...]:
-    """The reference data of the particles, by the name and shape that they have in a record."""
+    """Names, shapes and units of the particles' reference data in a record."""
     d = dimension
     return (
         Field("reference_position", (d,), "m"),
@@ -83,7 +101,7 @@ def field_name(quantity: str) -> str:
 
 
 def padded(values: Array, components: tuple[int, ...]) -> Array:
-    """Rows as VTK wants them: (n,) stays, (n, d) becomes (n, 3), (n, d, d) becomes (n, 9)."""
+    """Pad rows for VTK: (n,) stays, (n, d) becomes (n, 3), (n, d, d) becomes (n, 9)."""
     if not components or components == (3,):
         return values
     cubic = np.zeros((len(values), *(3 for _ in components)))
@@ -98,7 +116,7 @@ def unpadded(rows: Array, components: tuple[int, ...]) -> Array:
 
 
 def reason(error: BaseException) -> str:
-    """What an error of HDF5 or of the system says, in one line and without internals."""
+    """Message of an error of HDF5 or of the system, in one line and without internals."""
     text = " ".join(str(error).split())
     system = re.search("error message = '([^']*)'", text)
     return system[1] if system else re.sub(r"^\[Errno \d+\] ", "", text)

@@ -16,16 +16,9 @@ _STRESS = "cauchy_stress"
 
 
 def draw(record: Record, folder: Path, stem: str, field: str = _STRESS) -> Sequence[Path]:
-    """Write the pictures of a record into `folder`; returns their paths.
+    """Draw a record, coloured by a field, into files in `folder` that begin with `stem`.
 
-    Args:
-        record: what to draw.
-        folder: where to; made if it is missing.
-        stem: beginning of the file names.
-        field: what the particles are coloured by.
-
-    Raises:
-        RecordError: the record has no such field.
+    Returns their paths; RecordError if the record has no such field.
     """
     record.field(field)
     folder.mkdir(parents=True, exist_ok=True)
@@ -45,17 +38,15 @@ def largest_principal(stress: Array) -> Array:
     return np.asarray(np.linalg.eigvalsh(stress)[:, -1], dtype=np.float64)
 
 
-def _shown(values: Array) -> Array:
-    """One number a particle, (n,): a scalar, a vector's length, a tensor's largest principal."""
-    if values.ndim == 1:
-        return values
-    if values.ndim == 2:
-        return np.asarray(np.linalg.norm(values, axis=1), dtype=np.float64)
-    return largest_principal(values)
+def _magnitudes(values: Array) -> Array:
+    """Scalars, lengths of vectors, or largest principal values of tensors, (n,)."""
+    if values.ndim == 3:
+        return largest_principal(values)
+    return values if values.ndim == 1 else np.asarray(np.linalg.norm(values, axis=1))
 
 
 def _label(record: Record, field: str) -> str:
-    """What the colours mean."""
+    """Label of the colours."""
     words = field.replace("_", " ").replace("cauchy", "Cauchy")
     return f"{words} [{record.units[field]}]"
 
@@ -68,14 +59,12 @@ def _draw_histories(record: Record, field: str, path: Path) -> None:
     figure = Figure(figsize=(10.0, 4.5), layout="constrained")
     left, right = figure.subplots(1, 2)
     left.plot(record.times, record.positions[:][:, order, 0] - X, color="0.4", linewidth=0.6)
-    left.set_xlabel("time [s]")
-    left.set_ylabel("displacement [m]")
+    left.set(xlabel="time [s]", ylabel="displacement [m]")
     left.set_title(f"{len(order)} particles", fontsize=10)
-    # On a line vectors and tensors have one component, sign and all.
+    # In one dimension vectors and tensors have one component, drawn with its sign.
     values = record.field(field)[:].reshape(record.count, -1)[:, order]
     mesh = right.pcolormesh(X, record.times, values, cmap="cividis", shading="nearest")
-    right.set_xlabel("X [m]")
-    right.set_ylabel("time [s]")
+    right.set(xlabel="X [m]", ylabel="time [s]")
     figure.colorbar(mesh, ax=right, label=_label(record, field))
     figure.savefig(path, dpi=150)
 
@@ -89,17 +78,15 @@ def _draw_bodies(record: Record, field: str, path: Path) -> None:
     figure = Figure(figsize=(11.0, height), layout="constrained")
     solid = {"projection": "3d"} if record.dimension == 3 else {}
     axes = figure.subplots(1, 2, subplot_kw=solid)
-    values = [_shown(record.field(field)[k][real]) for k in (0, -1)]
+    values = [_magnitudes(record.field(field)[k][real]) for k in (0, -1)]
     low, high = min(v.min() for v in values), max(v.max() for v in values)
-    # Marker size that about fills a spacing, in points, on an axis some 300 points wide.
+    # Size of a marker that about fills a spacing, on an axis some 300 points wide.
     size = max(1.0, (280.0 * float(particles.spacings[0]) / extent) ** 2)
     for axis, k, colours in zip(axes, (0, -1), values, strict=True):
         x = record.positions[k][real]
         dots = axis.scatter(*x.T, c=colours, s=size, cmap="cividis", vmin=low, vmax=high)
         axis.set_title(f"t = {record.times[k]:.4g} s", fontsize=10)
-        axis.set_xlabel("x [m]")
-        axis.set_ylabel("y [m]")
-        axis.set_aspect("equal")
+        axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     kind = ("", "length of ", "largest principal ")[len(record.field(field).shape) - 2]
     figure.colorbar(dots, ax=axes, shrink=0.8, label=kind + _label(record, field))
     figure.savefig(path, dpi=150)
@@ -118,7 +105,6 @@ def _draw_energies(times: Array, history: Mapping[str, Array], path: Path) -> No
             color=str(0.7 * index / max(1, len(energies))),
             label=name.removesuffix(" [J]"),
         )
-    axis.set_xlabel("time [s]")
-    axis.set_ylabel("energy [J]")
+    axis.set(xlabel="time [s]", ylabel="energy [J]")
     axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
     figure.savefig(path, dpi=150)

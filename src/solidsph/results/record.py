@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
-from types import MappingProxyType, TracebackType
-from typing import Any, TypeVar, overload
+from types import MappingProxyType
+from typing import Any, TypeVar
 
-import attrs
 import h5py
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +17,12 @@ from numpy.typing import NDArray
 from solidsph.errors import RecordError
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import Face, Particles
-from solidsph.results.conformity import Tree, check_first, check_rest, check_values
-from solidsph.results.digest import Reference, step_digest
+from solidsph.results.contents import Output, Reference
+from solidsph.results.hdf5_source import SIGNATURE, HDF5Source, is_unclosed
 from solidsph.results.layout import (
     FORMAT,
     HDF5_ERRORS,
+    PARTICLE_ARRAYS,
     Field,
     PluginUsed,
     reason,
@@ -30,59 +30,14 @@ from solidsph.results.layout import (
     tag_name,
     unpadded,
 )
-from solidsph.results.unclosed import SIGNATURE, Source, is_unclosed
+from solidsph.results.layout_checks import Tree, check_first, check_rest, check_values
+from solidsph.results.time_series import TimeSeries
 
 T = TypeVar("T")
 
-# A block of the file may be met half written while the run goes on, or the file be just replaced.
+# While the run goes on, a block of the file may be read half written, or the file be replaced.
 _ATTEMPTS = 4
 _PAUSE = 0.02  # s
-
-
-@attrs.frozen(eq=False)
-class TimeSeries:
-    """One array over the steps of a record; only what is asked for is read, anew each time.
-
-    `series[i]` is (n, *components), from the end for negative i, and a slice (k, n, *components);
-    `len`, `for` and `np.asarray` work too.
-
-    Raises:
-        IndexError: there is no such step.
-        RecordError: the file is damaged or closed.
-    """
-
-    shape: tuple[int, ...]  # (steps, n, *components)
-    unit: str
-    _read: Callable[[int, int], Array]  # first and stop -> the steps between
-
-    def __len__(self) -> int:
-        return self.shape[0]
-
-    @overload
-    def __getitem__(self, index: int) -> Array: ...
-    @overload
-    def __getitem__(self, index: slice) -> Array: ...
-    def __getitem__(self, index: int | slice) -> Array:
-        if isinstance(index, slice):
-            chosen = range(len(self))[index]
-            if chosen.step == 1:
-                return self._read(chosen.start, max(chosen.start, chosen.stop))
-            series = np.empty((len(chosen), *self.shape[1:]))
-            for place, step in enumerate(chosen):
-                series[place] = self[step]
-            return series
-        try:
-            step = range(len(self))[index]
-        except IndexError:
-            raise IndexError(f"no step {index} in a record of {len(self)} steps") from None
-        first: Array = self._read(step, step + 1)[0]
-        return first
-
-    def __iter__(self) -> Iterator[Array]:
-        return (self[step] for step in range(len(self)))
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
-        return np.asarray(self[:], dtype=dtype)
 
 
 class NotARecordError(RecordError):
@@ -90,10 +45,10 @@ class NotARecordError(RecordError):
 
 
 class Record:
-    """One run, read from its file. Small things are read at once, arrays over time when asked for.
+    """One run, read from its file. Small data are read at once, arrays over time when asked for.
 
-    It shows the steps that were complete when it was opened; of a run that goes on, open the
-    record again to see more. Use it as a context manager, or `close` it.
+    It shows the steps that were complete when it was opened; while a run goes on, open its record
+    again to see more. Use it as a context manager, or `close` it.
 
     Attributes:
         path: the file.
@@ -112,7 +67,6 @@ class Record:
         notes: what happened to the run: that it was extended, or rolled back.
         folder: where relative paths in the scene begin.
         outcome: "finished", "diverged: ...", "stopped: ..."; "running" if it runs or was killed.
-
         is_closed_by_writer: False while the run goes on, and for ever if it was killed.
 
     Raises:
@@ -122,18 +76,18 @@ class Record:
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
         self._file: Any = None
-        self._source: Source | None = None
+        self._source: HDF5Source | None = None
         self._is_complete = False
-        self._patiently(self._open)
+        self._with_retries(self._open)
         self._is_complete = True
 
     def _open(self) -> None:
         self.close()
         self.is_closed_by_writer = not is_unclosed(_head(self.path))
         try:
-            # Not by its name: HDF5 opens no file twice in one process that is not opened alike, so
-            # that this one and a user's own `h5py.File` would keep each other out.
-            self._source = Source(self.path)
+            # Not by its name: HDF5 does not open a file twice in one process in different ways, so
+            # this reader and a user's own `h5py.File` would keep each other out.
+            self._source = HDF5Source(self.path)
             self._file = h5py.File(self._source, "r")
             self._read_all()
         except BaseException:
@@ -143,15 +97,11 @@ class Record:
     def _read_all(self) -> None:
         run = _run(self._file, self.path)
         written = int(run.attrs["format"])
-        if written > FORMAT:
+        if written != FORMAT:  # older formats were never published, so none is translated
+            remedy = "update solidsph" if written > FORMAT else "run its scene again"
             raise RecordError(
-                f"the record {self.path} has format {written}, this solidsph reads up to {FORMAT}; "
-                "update solidsph"
-            )
-        if written < FORMAT:  # none was ever given out, so there is nothing to translate from
-            raise RecordError(
-                f"the record {self.path} has the older format {written}, this solidsph reads "
-                f"{FORMAT}; run its scene again"
+                f"the record {self.path} has format {written}, this solidsph reads {FORMAT}; "
+                f"{remedy}"
             )
         tree = Tree(self._file)
         check_first(tree)
@@ -185,10 +135,12 @@ class Record:
         units = table.attrs["units"] if table is not None else ()
         self.history_units = {name: unit.decode() for name, unit in zip(names, units, strict=True)}
         check_values(self.particles, self.times, self.steps)
-        if self._reference().digest().hex() != _word(run, "digest"):
+        if self.reference.digest().hex() != _word(run, "digest"):
             raise ValueError("the particles or the scene in it are not those that were written")
 
-    def _reference(self) -> Reference:
+    @property
+    def reference(self) -> Reference:
+        """Data that all steps share, as `RecordWriter` takes them."""
         return Reference(
             particles=self.particles,
             scene=self.scene,
@@ -202,26 +154,27 @@ class Record:
             notes=self.notes,
         )
 
-    def check_step(self, place: int) -> None:
-        """That a step is what was written, to the last bit.
-
-        Raises:
-            RecordError: it is not; the file was damaged.
-        """
-        found = step_digest(
-            float(self.times[place]),
-            int(self.steps[place]),
-            self.positions[place],
-            (self._fields[name][place] for name in self.field_names),
-            (values[place] for values in self.history.values()),
+    def output(self, place: int) -> Output:
+        """All of one step, as `RecordWriter` takes it."""
+        return Output(
+            time=float(self.times[place]),
+            step=int(self.steps[place]),
+            positions=self.positions[place],
+            fields={name: series[place] for name, series in self._fields.items()},
+            history={name: float(values[place]) for name, values in self.history.items()},
         )
+
+    def checked_output(self, place: int) -> Output:
+        """All of one step; RecordError unless it is what was written, to the last bit."""
+        output = self.output(place)
         digests = self._file["solidsph/digests"]
-        written: NDArray[np.uint8] = self._patiently(lambda: digests[place])
-        if found != written.tobytes():
+        written: NDArray[np.uint8] = self._with_retries(lambda: digests[place])
+        if output.digest() != written.tobytes():
             raise RecordError(
-                f"the record {self.path} is damaged: its output at t = {self.times[place]:.9g} s "
+                f"the record {self.path} is damaged: its output at t = {output.time:.9g} s "
                 "is not what was written; run its scene again, into another record"
             )
+        return output
 
     def field(self, name: str) -> TimeSeries:
         """The named field over time: (steps, n, *components), lazily.
@@ -242,7 +195,7 @@ class Record:
         return len(self.times)
 
     def close(self) -> None:
-        """Releases the file. What was read stays; nothing more can be read."""
+        """Release the file. Data that were read stay; nothing more can be read."""
         file, self._file = self._file, None
         source, self._source = self._source, None
         if file is not None:
@@ -253,27 +206,18 @@ class Record:
     def __enter__(self) -> Record:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def _particles(self, run: Any, data: Any) -> Particles:
-        values = {
-            field.name: unpadded(data[field.name][()], field.components)
+        arrays: dict[str, Any] = {
+            PARTICLE_ARRAYS[field.name]: unpadded(data[field.name][()], field.components)
             for field in static_fields(self.dimension)
+            if field.name in PARTICLE_ARRAYS
         }
+        arrays["ghosts"] = arrays["ghosts"].astype(np.bool_)
         return Particles(
-            positions=values["reference_position"],
-            volumes=values["volume"],
-            cells=values["cell"],
-            spacings=values["spacing"],
-            area_vectors=values["area_vector"],
-            ghosts=values["ghost"].astype(np.bool_),
-            images=values["image"],
+            **arrays,
             tags={tag: data[tag_name(tag)][()].astype(np.bool_) for tag in _lines(run, "tags")},
             bodies={
                 name: slice(int(start), int(stop))
@@ -281,11 +225,13 @@ class Record:
                     _lines(run, "bodies"), run["body_ranges"][()], strict=True
                 )
             },
-            faces=dict(_face(group) for group in _numbered(run.get("faces"))),
+            faces=dict(
+                _face(run[f"faces/{number}"]) for number in range(len(run.get("faces", ())))
+            ),
         )
 
     def _readable(self, count: int, datasets: list[Any]) -> int:
-        """How many of `count` steps can be read: of a file that lost its end, those before."""
+        """Number of the `count` steps that can be read; a file may have lost its end."""
         n = self.particles.count
         for dataset in datasets:
             _check_rows(dataset, count * n)
@@ -305,13 +251,13 @@ class Record:
         n = self.particles.count
 
         def read(first: int, stop: int) -> Array:
-            rows: Array = self._patiently(lambda: dataset[first * n : stop * n])
+            rows: Array = self._with_retries(lambda: dataset[first * n : stop * n])
             return unpadded(rows, components).reshape(stop - first, n, *components)
 
         return TimeSeries((count, n, *components), _word(dataset, "units"), read)
 
-    def _patiently(self, read: Callable[[], T]) -> T:
-        """What `read` returns, if need be at a later attempt."""
+    def _with_retries(self, read: Callable[[], T]) -> T:
+        """Call `read`, again if it fails while the run goes on."""
         for _ in range(_ATTEMPTS):
             try:
                 return read()
@@ -344,7 +290,7 @@ def _head(path: Path) -> bytes:
 
 
 def _run(file: Any, path: Path) -> Any:
-    """The group of what VTK does not see."""
+    """The group that VTK ignores."""
     link = file.get("solidsph", getlink=True)
     run = file["solidsph"] if isinstance(link, h5py.HardLink) else None
     if run is None or "format" not in run.attrs:
@@ -353,13 +299,9 @@ def _run(file: Any, path: Path) -> Any:
 
 
 def check_is_record(path: Path) -> None:
-    """That the file is a record, damaged or not; little of it is read.
-
-    Raises:
-        NotARecordError: it is something else.
-    """
+    """Raise NotARecordError unless a file is a record, damaged or not; little of it is read."""
     _head(path)
-    with suppress(*HDF5_ERRORS), Source(path) as opened, h5py.File(opened, "r") as file:
+    with suppress(*HDF5_ERRORS), HDF5Source(path) as opened, h5py.File(opened, "r") as file:
         _run(file, path)
 
 
@@ -372,7 +314,7 @@ def _may_change(path: Path) -> bool:
 
 def _check_rows(dataset: Any, rows: int) -> None:
     if dataset.shape[0] < rows:
-        # Damage, or something read just before the run went on: then a new attempt helps.
+        # Damage, or the run went on since the last read: then a new attempt helps.
         raise OSError(f"{dataset.name} has {dataset.shape[0]} rows instead of {rows}")
 
 
@@ -387,10 +329,6 @@ def _lines(group: Any, name: str) -> tuple[str, ...]:
 
 def _word(item: Any, name: str) -> str:
     return bytes(item.attrs[name]).decode()
-
-
-def _numbered(group: Any) -> list[Any]:
-    return [] if group is None else [group[str(number)] for number in range(len(group))]
 
 
 def _face(group: Any) -> tuple[str, Face]:

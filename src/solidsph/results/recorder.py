@@ -4,30 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solidsph.errors import RecordError, SceneError
 from solidsph.interfaces.terms import Observation
-from solidsph.results.left import check_no_other_file
+from solidsph.maths.arrays import Array
+from solidsph.results.contents import Output, Reference
+from solidsph.results.earlier_run import check_no_other_file
+from solidsph.results.layout import PluginUsed
+from solidsph.results.output_fields import fields, history, split_unit
 from solidsph.results.record import Record
-from solidsph.results.record_writer import EarlierStep, Field, PluginUsed, RecordWriter
-from solidsph.results.shown import OWN, history, parted
-from solidsph.results.shown import fields as shown_fields
+from solidsph.results.record_writer import RecordWriter
+from solidsph.run.built_scene import BuiltScene
 from solidsph.run.energy import KINETIC, STRAIN, kinetic_energy, strain_energy
 from solidsph.run.hooks import implementation
 from solidsph.run.restart_point import RestartPoint
-
-if TYPE_CHECKING:
-    from solidsph.maths.arrays import Array
-    from solidsph.run.built_scene import BuiltScene
-
+from solidsph.system.files import working_folder
 
 COMPOSED = "# this scene was composed in Python"
-"""How the text of a scene begins that has no file form."""
+"""Beginning of the text of a scene that has no file form."""
 
-# What comes out the same again if a run repeats an output that its record holds.
+# What must come out the same if a run repeats an output that its record holds.
 _REPEATED = ("velocity", "cauchy_stress")
 
 
@@ -37,6 +35,7 @@ class Recorder:
     def __init__(self, path: Path, since: RestartPoint | None = None) -> None:
         self._path = path
         self._since = since
+        self._kept_until = -np.inf if since is None else since.until  # of an earlier record [s]
         self._writer: RecordWriter | None = None
         self._folder: str | None = None  # where an earlier run's relative paths begin
         self._initial_energy = 0.0
@@ -44,15 +43,13 @@ class Recorder:
         self.final: dict[str, float] = {}  # columns of the history at the last output so far
 
     @implementation
-    def solidsph_setup(self, simulation: BuiltScene) -> None:
-        # What is there stays until there is something to take its place.
+    def solidsph_setup(self) -> None:
+        # An earlier record stays until there is something to take its place.
         if self._since is None:
             check_no_other_file(self._path)
 
     @implementation
-    def solidsph_resume(
-        self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
-    ) -> None:
+    def solidsph_resume(self, simulation: BuiltScene, observation: Observation) -> None:
         self._writer = self._open(simulation, observation)
         self.final.update(self._history(simulation, observation))
 
@@ -61,25 +58,22 @@ class Recorder:
         if self._writer is None:
             self._writer = self._open(simulation, observation)
         state = observation.state
-        fields = _fields(observation) | {
-            name: values for name, _, values in shown_fields(observation, simulation.terms)
-        }
+        values = {field.name: array for field, array in fields(observation, simulation.terms)}
         columns = self._history(simulation, observation)
         self.final.update(columns)
         if state.time <= self._writer.last_time:
-            self._check_repeated(observation, fields)
+            self._check_repeated(observation, values)
             return
-        self._writer.append(state.time, state.step, state.positions, fields, columns)
+        self._writer.append(Output(state.time, state.step, state.positions, values, columns))
 
     @implementation
-    def solidsph_finish(self, simulation: BuiltScene, outcome: str) -> None:
+    def solidsph_finish(self, outcome: str) -> None:
         if self._recorded is not None:
             self._recorded.close()
         if self._writer is not None:
             self._writer.close(outcome)
 
     def _open(self, simulation: BuiltScene, observation: Observation) -> RecordWriter:
-        d = simulation.particles.dimension
         earlier = self._earlier()
         if earlier is None:
             self._initial_energy = kinetic_energy(observation) + strain_energy(observation)
@@ -87,38 +81,20 @@ class Recorder:
             first = (earlier.history[name][0] for name in (KINETIC, STRAIN))
             self._initial_energy = float(sum(first))
         columns = self._history(simulation, observation)
-        writer = RecordWriter(
-            self._path,
-            simulation.particles,
+        reference = Reference(
+            particles=simulation.particles,
             scene=scene_text(simulation),
-            plugins=[
-                PluginUsed(e.kind, e.name, e.distribution, e.version, e.target)
-                for e in simulation.parts
-            ],
-            fields=[
-                *(
-                    Field(name, components, unit)
-                    for (name, unit), components in zip(
-                        OWN.items(), ((d,), (d, d), ()), strict=True
-                    )
-                ),
-                *(
-                    Field(name, values.shape[1:], unit)
-                    for name, unit, values in shown_fields(observation, simulation.terms)
-                ),
-            ],
-            columns={name: parted(name)[1] for name in columns},
-            earlier=() if earlier is None else _steps(earlier, self._kept_until),
+            plugins=[PluginUsed.of(entry) for entry in simulation.parts],
+            fields=[field for field, _ in fields(observation, simulation.terms)],
+            columns={name: split_unit(name)[1] for name in columns},
             notes=() if self._since is None else self._since.notes,
-            folder=self._folder,
+            folder=str(working_folder()) if self._folder is None else self._folder,
         )
+        outputs = () if earlier is None else _outputs(earlier, self._kept_until)
+        writer = RecordWriter(self._path, reference, earlier=outputs)
         if earlier is not None and observation.state.time <= writer.last_time:
             self._recorded = Record(self._path)
         return writer
-
-    @property
-    def _kept_until(self) -> float:
-        return -np.inf if self._since is None else self._since.until
 
     def _earlier(self) -> Record | None:
         """The record of the earlier run, if it holds a step that stays."""
@@ -131,47 +107,35 @@ class Recorder:
             return None
         return record
 
-    def _check_repeated(self, observation: Observation, fields: Mapping[str, Array]) -> None:
-        """That an output which the record holds has come out the same again."""
+    def _check_repeated(self, observation: Observation, values: Mapping[str, Array]) -> None:
+        """Check that an output which the record holds has come out the same again."""
         if self._recorded is None or self._since is None or not self._since.repeats:
             return
         state, recorded = observation.state, self._recorded
         place = int(np.searchsorted(recorded.times, state.time))
-        same = place < recorded.count and recorded.times[place] == state.time
-        if same:
-            values = {"": state.positions, **{name: fields[name] for name in _REPEATED}}
-            same = all(
-                np.array_equal(
-                    recorded.field(name)[place] if name else recorded.positions[place],
-                    value,
-                    equal_nan=True,
-                )
-                for name, value in values.items()
-            )
-        if not same:
+        is_same = place < recorded.count and recorded.times[place] == state.time
+        if is_same:
+            pairs = [(recorded.positions[place], state.positions)]
+            pairs += [(recorded.field(name)[place], values[name]) for name in _REPEATED]
+            is_same = all(np.array_equal(*pair, equal_nan=True) for pair in pairs)
+        if not is_same:
             raise RecordError(
                 f"the run does not repeat its record {self._path} at t = {state.time:.9g} s: "
-                "something that decides its bits is not as it was; what is recorded stays. To go "
-                "on all the same, force it; to be sure, run the scene anew into another record"
+                "something that its last digits depend on has changed; the record stays as it is. "
+                "To go on all the same, force it; to be sure, run the scene again into another "
+                "record"
             )
 
     def _history(self, simulation: BuiltScene, observation: Observation) -> dict[str, float]:
         return history(observation, self._initial_energy, simulation.terms)
 
 
-def _steps(record: Record, until: float) -> Iterator[EarlierStep]:
-    """The steps of a record up to a time; the record is closed then."""
+def _outputs(record: Record, until: float) -> Iterator[Output]:
+    """The outputs of a record up to a time [s], after which the record is closed."""
     with record:
         for place, time in enumerate(record.times):
             if time <= until:
-                record.check_step(place)
-                yield EarlierStep(
-                    time=float(time),
-                    step=int(record.steps[place]),
-                    positions=record.positions[place],
-                    fields={name: record.field(name)[place] for name in record.field_names},
-                    history={name: float(one[place]) for name, one in record.history.items()},
-                )
+                yield record.checked_output(place)
 
 
 def scene_text(simulation: BuiltScene) -> str:
@@ -181,18 +145,3 @@ def scene_text(simulation: BuiltScene) -> str:
     except SceneError as cause:
         # A scene of Python objects runs all the same; its record says why it cannot be rerun.
         return f"{COMPOSED} and has no file form: {cause}\n"
-
-
-def stress(observation: Observation) -> Array:
-    """Cauchy stress P F^T / J of every particle, (n, d, d) [Pa]."""
-    F, P = observation.deformation_gradients, observation.stresses
-    sigma: Array = np.einsum("pik,pjk->pij", P, F) / observation.volume_ratios[:, None, None]
-    return sigma
-
-
-def _fields(observation: Observation) -> dict[str, Array]:
-    return {
-        "velocity": observation.state.velocities,
-        "cauchy_stress": stress(observation),
-        "volume_ratio": observation.volume_ratios,
-    }

@@ -1,4 +1,4 @@
-"""Recording: who writes the record of a run, and its checkpoint."""
+"""The observers that record a run, and the lock that they hold."""
 
 from __future__ import annotations
 
@@ -14,12 +14,8 @@ from solidsph.run.restart_point import RestartPoint
 
 @contextmanager
 def recording(record: Path, since: RestartPoint | None) -> Iterator[tuple[Checkpointer, Recorder]]:
-    """Listeners of a run that write `record`; within it, no other run does.
-
-    Raises:
-        RecordError: another run writes the record.
-    """
-    # From the first state on, a run has no use for a checkpoint of another.
-    goes_on = since is not None and since.state is not None
+    """Observers of a run that write `record`; RecordError if another run writes it."""
+    # A run from the first state has no use for an earlier checkpoint.
+    is_resumed = since is not None and since.state is not None
     with sole_writer(record):
-        yield Checkpointer(record, is_resumed=goes_on), Recorder(record, since)
+        yield Checkpointer(record, is_resumed=is_resumed), Recorder(record, since)

@@ -1,7 +1,7 @@
-"""One writer at a time: a record, or the records of a case, belong to one run while it lasts.
+"""One writer at a time: a record, or the folder of a case, is locked by the run that writes it.
 
-The lock is the operating system's, on a small file beside the record that says who holds it. It is
-gone with the process, however that ends; a file that is left behind then locks nothing.
+The lock is the operating system's, on a small file beside the record that names its holder. It ends
+with the process, however that ends; a file that is left behind then locks nothing.
 """
 
 from __future__ import annotations
@@ -15,35 +15,29 @@ from functools import cache
 from pathlib import Path
 
 from solidsph.errors import RecordError
+from solidsph.results.record_file import explained
 
 try:
     import fcntl
-except ImportError:  # not a system with these locks: there, nobody is kept out
+except ImportError:  # a system without these locks
     fcntl = None  # type: ignore[assignment]
 
-_LONGEST = 300  # bytes of what a holder says of itself
+_LONGEST = 300  # bytes that are read of a lock file
 _held: dict[int, int] = {}  # open lock file -> the process that locked it
 
 
 @contextmanager
 def sole_writer(path: Path) -> Iterator[None]:
-    """Within it, no other run, of this process or another, writes `path`.
+    """Keep all other runs, of this process and of others, from writing `path`.
 
     Raises:
-        RecordError: another one does; it names that one. Or the folder cannot be written.
+        RecordError: another run writes it; the message names its process. Or the folder cannot be
+            written.
     """
     lock = _lock_of(path)
-    _check_lock(lock)
-    try:
+    with explained(f"cannot create {path}", "choose a path in a folder that you may write to"):
         lock.parent.mkdir(parents=True, exist_ok=True)
-        handle = _locked(lock)
-    except BlockingIOError:
-        raise RecordError(_refusal(path, lock)) from None
-    except OSError as cause:
-        raise RecordError(
-            f"cannot create {path}: {cause.strerror or cause}; choose a path in a folder that you "
-            "may write to"
-        ) from None
+        handle = _locked(lock, path)
     try:
         yield
     finally:
@@ -51,59 +45,37 @@ def sole_writer(path: Path) -> Iterator[None]:
 
 
 def check_no_writer(path: Path) -> None:
-    """That no run is writing `path` now.
-
-    Raises:
-        RecordError: one is; it names that one.
-    """
+    """Raise RecordError if a run is writing `path` now; the message names its process."""
     lock = _lock_of(path)
-    _check_lock(lock)
     if fcntl is None or not lock.exists():
         return
     with suppress(FileNotFoundError, PermissionError), lock.open("rb") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise RecordError(_refusal(path, lock)) from None
-        except OSError:  # a file system without locks
-            return
+        _lock(file.fileno(), fcntl.LOCK_SH, lock, path)
 
 
 def _lock_of(path: Path) -> Path:
+    """The lock file of `path`: no link, which could lead to a file of the user's, and no pipe,
+    which would keep `open` waiting."""
     real = Path(os.path.realpath(path))
-    return real.with_name(f".{real.name}.lock")
-
-
-def _check_lock(lock: Path) -> None:
-    """That nothing else has its name: a link would lead to a file that is somebody's own, and a
-    pipe would keep `open` waiting."""
+    lock = real.with_name(f".{real.name}.lock")
     if lock.is_symlink() or (lock.exists() and not lock.is_file()):
         raise RecordError(
-            f"{lock} is not a regular file, and has the name of the one by which a run keeps "
-            "others from its record; move it away, or choose another place for the record"
+            f"{lock} is not a regular file, but has the name of a record's lock; move it away, "
+            "or choose another place for the record"
         )
+    return lock
 
 
-def _locked(lock: Path) -> int:
-    """The lock file, open and locked.
-
-    Raises:
-        BlockingIOError: somebody else has locked it.
-    """
+def _locked(lock: Path, path: Path) -> int:
+    """Open, lock and fill the lock file; returns its handle."""
     while True:
         handle = os.open(lock, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
         try:
             if fcntl is not None:
-                try:
-                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except BlockingIOError:
-                    raise
-                except OSError:  # a file system without locks
-                    pass
+                _lock(handle, fcntl.LOCK_EX, lock, path)
             # Its last holder may have removed it after it was opened here.
-            there = os.fstat(handle)
             with suppress(FileNotFoundError):
-                if os.path.samestat(there, lock.stat()):
+                if os.path.samestat(os.fstat(handle), lock.stat()):
                     break
         except BaseException:
             os.close(handle)
@@ -117,9 +89,27 @@ def _locked(lock: Path) -> int:
     return handle
 
 
+def _lock(handle: int, kind: int, lock: Path, path: Path) -> None:
+    """Lock an open file, if the file system has locks; RecordError if another run has done so."""
+    try:
+        fcntl.flock(handle, kind | fcntl.LOCK_NB)
+    except BlockingIOError:
+        try:
+            with lock.open("rb") as file:
+                holder = file.read(_LONGEST).decode(errors="replace").strip()
+        except OSError:
+            holder = ""
+        raise RecordError(
+            f"{path} is being written by another run ({holder or 'another process'}); wait until "
+            "it has ended, or record into another file"
+        ) from None
+    except OSError:  # a file system without locks
+        return
+
+
 def _release(handle: int, lock: Path) -> None:
     if _held.pop(handle, None) != os.getpid():
-        return  # the fork of the process that holds it
+        return  # a fork of the process that holds it
     with suppress(OSError):
         lock.unlink()
     os.close(handle)
@@ -127,7 +117,7 @@ def _release(handle: int, lock: Path) -> None:
 
 @cache
 def _forget_in_forks() -> None:
-    """A fork must not keep a lock when the process that took it has ended."""
+    """Close the locks in forks: one must not keep a lock whose own process has ended."""
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(after_in_child=_forget)
 
@@ -136,15 +126,3 @@ def _forget() -> None:
     for handle in _held:
         os.close(handle)
     _held.clear()
-
-
-def _refusal(path: Path, lock: Path) -> str:
-    try:
-        with lock.open("rb") as file:
-            holder = file.read(_LONGEST).decode(errors="replace").strip()
-    except OSError:
-        holder = ""
-    return (
-        f"{path} is being written by another run ({holder or 'another process'}); wait until it "
-        "has ended, or record into another file"
-    )

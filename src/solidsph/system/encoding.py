@@ -1,4 +1,4 @@
-"""Text as editors and spreadsheets write it."""
+"""Decodes text as editors and spreadsheets write it."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import codecs
 
 
 def decoded(data: bytes) -> str:
-    """Text in UTF-8, with or without the byte order mark that some programs put first.
-
-    Line ends of any system become "\\n".
+    """Decode UTF-8, with or without a byte order mark; line ends of any system become "\\n".
 
     Raises:
         ValueError: it is in another encoding, or no text.

@@ -1,4 +1,4 @@
-"""Files that a user names: regular ones of bounded size, found from the folder of the run."""
+"""Files that a user names: regular, of bounded size, with paths relative to the run's folder."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ _FOLDER: ContextVar[Path | None] = ContextVar("folder of relative paths", defaul
 
 
 def located(path: Path | str) -> Path:
-    """Where the file is: a relative path begins in the folder of the run.
+    """Resolve a path: a relative one begins in the folder of the run.
 
-    That is the working folder, and of a run that is gone on with the one that it was begun in.
+    That is the working folder; of a resumed run, the one in which it was begun.
     """
     folder = _FOLDER.get()
     return Path(path) if folder is None else folder / path
 
 
 def working_folder() -> Path:
-    """Where relative paths begin."""
+    """Folder in which relative paths begin."""
     return _FOLDER.get() or Path.cwd()
 
 
 @contextmanager
 def relative_to(folder: Path | None) -> Iterator[None]:
-    """Within it, relative paths begin in `folder`; in the working folder if that is None."""
+    """Let relative paths begin in `folder`, within the block; None is the working folder."""
     token = _FOLDER.set(folder)
     try:
         yield
@@ -37,30 +37,26 @@ def relative_to(folder: Path | None) -> Iterator[None]:
 
 
 def content(path: Path, most: int) -> bytes:
-    """All bytes of a regular file.
+    """Read all bytes of a regular file, or of one behind a link.
 
-    A pipe or a device could have no end, and a file may grow while it is read; neither is read
-    beyond `most`.
-
-    Args:
-        path: of the file, or of a link to it.
-        most: how many bytes it may have.
+    Pipes and devices are refused, since they could have no end.
 
     Raises:
-        OSError: it cannot be read, is no regular file, has more bytes, or is being changed.
+        OSError: it cannot be read, is no regular file, has more than `most` bytes, or is being
+            changed.
     """
     # A pipe without a writer would otherwise keep `open` waiting.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    found = os.fstat(handle)
-    if not stat.S_ISREG(found.st_mode):
+    before = os.fstat(handle)
+    if not stat.S_ISREG(before.st_mode):
         os.close(handle)
-        raise OSError(f"it is {_kind(found.st_mode)}, not a regular file")
+        raise OSError(f"it is {_kind(before.st_mode)}, not a regular file")
     with os.fdopen(handle, "rb") as file:
-        if found.st_size > most:
-            raise OSError(f"it has {found.st_size:,} bytes, at most {most:,} are read")
-        data = file.read(found.st_size)
+        if before.st_size > most:
+            raise OSError(f"it has {before.st_size:,} bytes, at most {most:,} are read")
+        data = file.read(before.st_size)
         after = os.fstat(handle)
-    if len(data) != found.st_size or after.st_size != found.st_size:
+    if not len(data) == before.st_size == after.st_size:
         raise OSError("it changed while it was read; wait until it is complete")
     return data
 

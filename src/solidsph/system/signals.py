@@ -1,4 +1,4 @@
-"""A block of code that an interruption waits for: files are written whole."""
+"""Blocks of code that signals do not interrupt, so that files are written whole."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """SIGINT and SIGTERM, where Python handles them, are heard after the block and not within."""
+    """Defer SIGINT and SIGTERM, where Python handles them, to the end of the block."""
     if threading.current_thread() is not threading.main_thread():
-        yield  # which no signal interrupts
+        yield  # signals interrupt the main thread only
         return
-    came: list[int] = []
-    before = {number: signal.getsignal(number) for number in _SIGNALS}
-    handled = {number: handler for number, handler in before.items() if callable(handler)}
+    deferred: list[int] = []
+    handlers = {number: signal.getsignal(number) for number in _SIGNALS}
+    handlers = {number: handler for number, handler in handlers.items() if callable(handler)}
     try:
-        for number in handled:
-            signal.signal(number, lambda received, frame: came.append(received))
+        for number in handlers:
+            signal.signal(number, lambda number, frame: deferred.append(number))
         yield
     finally:
-        for number, handler in handled.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
-    for received in came:
+    for received in deferred:
         signal.raise_signal(received)

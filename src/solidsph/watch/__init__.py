@@ -1,4 +1,4 @@
-"""Watching a run: symptoms of one that goes wrong, what to leave behind, and going back."""
+"""Watches a run for symptoms of failure, and rolls it back."""
 
 from solidsph.watch.roll_back import run_watched
 from solidsph.watch.symptom import Finding, Grade, Symptom

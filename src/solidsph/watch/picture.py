@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,16 +11,14 @@ from matplotlib.figure import Figure
 from solidsph.errors import BuildError, DivergedError
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.particles import State
+from solidsph.run.built_scene import BuiltScene
 
-if TYPE_CHECKING:
-    from solidsph.run.built_scene import BuiltScene
-
-# What surrounds the particle: those that were so near in the reference configuration [spacings].
+# Radius of the surroundings of the particle, in the reference configuration [spacings].
 _AROUND = 5.0
 
 
 def draw_failure(simulation: BuiltScene, state: State, error: DivergedError, path: Path) -> None:
-    """The body, and beside it what surrounds the particle, coloured by J."""
+    """Draw the body, and beside it the surroundings of the particle, coloured by J."""
     particles = simulation.particles
     J = _volume_ratios(simulation, state)
     place = particles.positions[error.particle]

@@ -25,12 +25,12 @@ def run_watched(
     roll_backs: int = 0,
     symptoms: Sequence[Symptom] = SYMPTOMS,
     observers: Sequence[object] = (),
-    told: Callable[[float, Finding], None] = lambda time, finding: None,
+    on_finding: Callable[[float, Finding], None] = lambda time, finding: None,
 ) -> Result:
     """Run under a watchdog; on a failure go back to the last sound output and halve the step.
 
-    What the record holds of later outputs is taken out of it, and a note says so. A failure leaves
-    a picture beside the record, and, if there is no going back any more, a checkpoint.
+    Later outputs are removed from the record, and a note says so. A failure leaves a picture
+    beside the record, and the last one a checkpoint.
 
     Args:
         simulation: what to run.
@@ -38,45 +38,44 @@ def run_watched(
         roll_backs: how often to go back at most.
         symptoms: what to look for.
         observers: as in `Simulation.run`.
-        told: called with the time [s] of every finding, and the finding.
+        on_finding: called with the time [s] of every finding, and the finding.
 
     Raises:
         DivergedError: it failed once more than that; with the particle, the cause and a remedy.
         UnsoundError: its energies did not add up once more than that.
     """
     path = Path(record)
+    picture = path.with_name(f"{path.stem}-watchdog.png")
     since: RestartPoint | None = None
     notes: list[str] = []
     while True:
-        picture = path.with_name(f"{path.stem}-watchdog.png")
-        watchdog = Watchdog(symptoms, picture=picture, told=told)
+        watchdog = Watchdog(symptoms, picture=picture, on_finding=on_finding)
         try:
             return simulation.run(record=path, observers=[watchdog, *observers], since=since)
-        except (DivergedError, UnsoundError) as failed:
+        except (DivergedError, UnsoundError) as error:
             if len(notes) >= roll_backs:
                 raise
             simulation = simulation.halved()
-            good = watchdog.good
-            back = 0.0 if good is None else good.state.time
+            sound = watchdog.last_sound
             notes.append(
-                f"rolled back from t = {failed.time:.9g} s to t = {back:.9g} s, step halved to "
-                f"{simulation.step_size:.9g} s: {_told(failed)}"
+                f"rolled back from t = {error.time:.9g} s to "
+                f"t = {0.0 if sound is None else sound.state.time:.9g} s, step halved to "
+                f"{simulation.step_size:.9g} s: {_reason(error)}"
             )
-            if good is None:
-                since = RestartPoint(until=-inf, notes=tuple(notes))
-            else:
-                state = restarted(simulation, good.state)
-                since = RestartPoint(state, good.kept, until=back, notes=tuple(notes))
+            since = RestartPoint(until=-inf, notes=tuple(notes))
+            if sound is not None:
+                state = restarted(simulation, sound.state)
+                since = attrs.evolve(since, state=state, kept=sound.kept, until=sound.state.time)
 
 
-def _told(failed: DivergedError | UnsoundError) -> str:
-    if isinstance(failed, UnsoundError):
-        return f"the energies did not add up, by {failed.part:.3g} of what was in play"
-    return f"{failed.cause} at particle {failed.particle}"
+def _reason(error: DivergedError | UnsoundError) -> str:
+    if isinstance(error, UnsoundError):
+        return f"the energies did not add up, by {error.part:.3g} of the energy in play"
+    return f"{error.cause} at particle {error.particle}"
 
 
 def restarted(simulation: BuiltScene, state: State) -> State:
-    """An output of the same scene with twice the step, made ready to go on with this one."""
+    """An output of the same scene with twice the step, as a start for this one."""
     dynamics = simulation.dynamics
     moved = attrs.evolve(
         state,

@@ -1,43 +1,40 @@
-"""Watchdog: an observer that looks for symptoms, stops a run that is lost, and says why."""
+"""Watchdog: an observer that looks for symptoms, stops a run that has failed, and says why."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import attrs
 
 from solidsph.errors import DivergedError, RecordError
 from solidsph.interfaces.terms import Observation
+from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 from solidsph.run.accounts import Accounts
+from solidsph.run.built_scene import BuiltScene
 from solidsph.run.hooks import implementation
-from solidsph.watch.crowding import CollapsingNeighbours
-from solidsph.watch.hourglass import StoredBesides
-from solidsph.watch.soundness import allowed, part_of_play
-from solidsph.watch.speed import FasterThanSound
+from solidsph.watch.collapsing_neighbours import CollapsingNeighbours
+from solidsph.watch.faster_than_sound import FasterThanSound
+from solidsph.watch.hourglass_energy import HourglassEnergy
+from solidsph.watch.soundness import residual_share, tolerance
 from solidsph.watch.symptom import Finding, Grade, Symptom
-from solidsph.watch.volume import VanishingVolume
-
-if TYPE_CHECKING:
-    from solidsph.maths.arrays import Array
-    from solidsph.run.built_scene import BuiltScene
+from solidsph.watch.vanishing_volume import VanishingVolume
 
 SYMPTOMS: Sequence[Symptom] = (
     VanishingVolume(),
     FasterThanSound(),
     CollapsingNeighbours(),
-    StoredBesides(),
+    HourglassEnergy(),
 )
-"""What is looked for unless something else is asked for."""
+"""Symptoms that are looked for by default."""
 
 _ACCOUNTS = "watchdog accounts"
 
 
 @attrs.frozen(eq=False)
-class Good:
-    """An output at which nothing was wrong, and what listeners keep of it."""
+class SoundOutput:
+    """An output at which nothing was wrong, and the arrays that observers keep of it."""
 
     state: State
     kept: Mapping[str, Array]
@@ -47,17 +44,17 @@ class Watchdog:
     """Looks at every output of a run; a failure stops it with the particle, cause and remedy.
 
     A recorded run that is stopped leaves its last sound output as a checkpoint, and a picture of
-    what surrounds the particle, at `picture`.
+    the particle's surroundings, at `picture`.
 
     Attributes:
         findings: time [s] and finding, of every output that had one.
-        good: the last output without any finding and whose energies add up; or if there is none,
-            without a failure.
+        last_sound: the last output without a finding and with energies that add up; or if there is
+            none, without a failure.
 
     Args:
         symptoms: what to look for.
         picture: the file to draw a failure to, if one is wanted.
-        told: called with the time [s] of every finding, and the finding.
+        on_finding: called with the time [s] of every finding, and the finding.
     """
 
     def __init__(
@@ -65,48 +62,47 @@ class Watchdog:
         symptoms: Sequence[Symptom] = SYMPTOMS,
         *,
         picture: Path | None = None,
-        told: Callable[[float, Finding], None] = lambda time, finding: None,
+        on_finding: Callable[[float, Finding], None] = lambda time, finding: None,
     ) -> None:
         self.findings: list[tuple[float, Finding]] = []
-        self.good: Good | None = None
+        self.last_sound: SoundOutput | None = None
         self._symptoms = tuple(symptoms)
         self._picture = picture
-        self._told = told
+        self._on_finding = on_finding
         self._accounts = Accounts()
         self._looked: dict[Symptom, int] = {}  # the step of the last look
-        self._is_clean = False  # whether nothing at all was wrong with `good`
+        self._is_clean = False  # whether nothing at all was wrong with `last_sound`
 
-    @implementation(tryfirst=True)  # what it cannot use is told before the record is taken over
-    def solidsph_resume(
-        self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
-    ) -> None:
+    @implementation(tryfirst=True)  # an unusable checkpoint is reported before the record changes
+    def solidsph_resume(self, observation: Observation, kept: Mapping[str, Array]) -> None:
         if _ACCOUNTS in kept:
             self._accounts = Accounts.taken(kept[_ACCOUNTS])
-        else:  # nobody watched until here
+        else:  # the earlier run had no watchdog
             self._accounts.add(observation)
-        self.good, self._is_clean = Good(observation.state, kept), True
+        self.last_sound, self._is_clean = SoundOutput(observation.state, kept), True
 
     @implementation
     def solidsph_step_end(self, simulation: BuiltScene, observation: Observation) -> None:
         self._accounts.add(observation)
-        looks = (
-            one.look(simulation, observation, self._accounts)
-            for one in self._symptoms
-            if self._is_due(one, simulation, observation.state.step)
-        )
-        found = [one for one in looks if one is not None]
         state = observation.state
-        self.findings += [(state.time, one) for one in found]
-        for one in found:
-            self._told(state.time, one)
-        for one in found:
-            if one.grade is Grade.FAILURE:
-                raise self._failed(simulation, observation, one)
-        is_clean = not found and part_of_play(simulation, self._accounts) <= allowed(simulation)
+        looks = (
+            symptom.look(simulation, observation, self._accounts)
+            for symptom in self._symptoms
+            if self._is_due(symptom, simulation, state.step)
+        )
+        findings = [finding for finding in looks if finding is not None]
+        self.findings += [(state.time, finding) for finding in findings]
+        for finding in findings:
+            self._on_finding(state.time, finding)
+        for finding in findings:
+            if finding.grade is Grade.FAILURE:
+                raise self._failed(simulation, observation, finding)
+        adds_up = residual_share(simulation, self._accounts) <= tolerance(simulation)
+        is_clean = adds_up and not findings
         if is_clean or not self._is_clean:
             kept: dict[str, Array] = {}
             simulation.manager.hook.solidsph_keep(simulation=simulation, kept=kept)
-            self.good, self._is_clean = Good(state, kept), is_clean
+            self.last_sound, self._is_clean = SoundOutput(state, kept), is_clean
 
     def _is_due(self, symptom: Symptom, simulation: BuiltScene, step: int) -> bool:
         due = step - self._looked.get(symptom, 0) >= symptom.steps_between
@@ -116,12 +112,12 @@ class Watchdog:
         return False
 
     @implementation
-    def solidsph_keep(self, simulation: BuiltScene, kept: dict[str, Array]) -> None:
+    def solidsph_keep(self, kept: dict[str, Array]) -> None:
         kept[_ACCOUNTS] = self._accounts.kept()
 
     @implementation
     def solidsph_failure(self, simulation: BuiltScene, state: State, error: DivergedError) -> None:
-        # The run has found out for itself; what it does not know is what came before.
+        # The run has failed by itself; what it does not know is what came before.
         if self.findings:
             time, before = self.findings[-1]
             error.remedy = before.remedy
@@ -129,18 +125,17 @@ class Watchdog:
         self._draw(simulation, state, error)
 
     def _failed(
-        self, simulation: BuiltScene, observation: Observation, found: Finding
+        self, simulation: BuiltScene, observation: Observation, finding: Finding
     ) -> DivergedError:
-        state = observation.state
         error = DivergedError(
-            step=state.step,
-            time=state.time,
-            particle=found.particle,
-            volume_ratio=float(observation.volume_ratios[found.particle]),
-            cause=found.cause,
-            remedy=found.remedy,
+            step=observation.state.step,
+            time=observation.state.time,
+            particle=finding.particle,
+            volume_ratio=float(observation.volume_ratios[finding.particle]),
+            cause=finding.cause,
+            remedy=finding.remedy,
         )
-        self._draw(simulation, state, error)
+        self._draw(simulation, observation.state, error)
         return error
 
     def _draw(self, simulation: BuiltScene, state: State, error: DivergedError) -> None:
@@ -151,4 +146,4 @@ class Watchdog:
         try:
             draw_failure(simulation, state, error, self._picture)
         except (OSError, RecordError):
-            return  # a picture that cannot be written must not hide what it would have shown
+            return  # a picture that cannot be written must not hide the error that it shows

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from solidsph import BuildError, Record, SceneError, Simulation
-from solidsph.advice import advised
+from solidsph.advice import advise
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.statics import equilibrium
 from tests.helpers.scenes import box
@@ -207,7 +207,7 @@ def test_a_body_that_falls_on_a_wall_is_held(gap: dict[str, float], heard: bool)
         .duration(2.0)
         .build()
     )
-    assert ("unheld" in {one.name for one in advised(simulation)}) == heard
+    assert ("unheld" in {one.name for one in advise(simulation)}) == heard
 
 
 def test_a_disc_touches_at_its_lowest_point() -> None:

@@ -1,9 +1,9 @@
 """Reads an HDF5 file, also one that its writer has not closed: it still runs or was killed.
 
-HDF5 marks such a file in its first bytes, and then either refuses it or, when asked to read along
-(SWMR), waits without end wherever the file is damaged. What the writer has flushed is sound all
-the same. So the file is shown to HDF5 with the mark taken off and no end, and a read past the
-true end is an error instead of zeros.
+HDF5 marks such a file in its first bytes, and then refuses it or, in its mode for readers (SWMR),
+waits for ever wherever the file is damaged. What the writer has flushed is sound all the same. So
+HDF5 is shown the file without the mark and without an end, and a read past the true end is an error
+instead of zeros.
 
 The first bytes of the superblock, version 3: signature (8), version (1), sizes of addresses and
 lengths (2), marks (1), base and extension address (16), end of file (8), root address (8),
@@ -27,12 +27,12 @@ _WORD = 0xFFFFFFFF
 
 
 def is_unclosed(head: bytes | bytearray) -> bool:
-    """Whether a file that begins with these bytes is marked as open for writing."""
+    """True if a file that begins with these bytes is marked as open for writing."""
     return len(head) >= _SIZE and head.startswith(SIGNATURE + b"\x03\x08\x08") and head[11] != 0
 
 
-class Source(io.RawIOBase):
-    """The file at `path`, to be read by `h5py.File(Source(path), "r")`; it changes nothing.
+class HDF5Source(io.RawIOBase):
+    """The file at `path`, to be read by `h5py.File(HDF5Source(path), "r")`; it changes nothing.
 
     Raises:
         OSError: the file cannot be opened, or ends before what is asked for.
@@ -56,9 +56,6 @@ class Source(io.RawIOBase):
 
     def seekable(self) -> bool:
         return True
-
-    def tell(self) -> int:
-        return self._position
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
         origin = {io.SEEK_SET: 0, io.SEEK_CUR: self._position, io.SEEK_END: self._end}[whence]
@@ -88,22 +85,22 @@ class Source(io.RawIOBase):
 
 
 def _lookup3(data: bytes) -> int:
-    """Jenkins' hash `hashlittle` of `data`, which must not be empty, with the seed 0."""
+    """Jenkins' hash `hashlittle` of `data`, which must not be empty, with seed 0."""
     a = b = c = (0xDEADBEEF + len(data)) & _WORD
     while len(data) > 12:
         x, y, z = _words(data[:12])
         data = data[12:]
         a, b, c = (a + x) & _WORD, (b + y) & _WORD, (c + z) & _WORD
-        for turn in (4, 6, 8, 16, 19, 4):
-            a = ((a - c) & _WORD) ^ _turned(c, turn)
+        for bits in (4, 6, 8, 16, 19, 4):
+            a = ((a - c) & _WORD) ^ _rotated(c, bits)
             c = (c + b) & _WORD
             a, b, c = b, c, a
     x, y, z = _words(data.ljust(12, b"\0"))
     a, b, c = (a + x) & _WORD, (b + y) & _WORD, (c + z) & _WORD
-    for turn in (14, 11, 25, 16, 4, 14, 24):
-        c = ((c ^ b) - _turned(b, turn)) & _WORD
+    for bits in (14, 11, 25, 16, 4, 14, 24):
+        c = ((c ^ b) - _rotated(b, bits)) & _WORD
         a, b, c = b, c, a
-    # Seven turns of the names leave the last result, c, under b.
+    # After seven rotations of the names the last result, c, is called b.
     return b
 
 
@@ -112,5 +109,5 @@ def _words(block: bytes) -> tuple[int, int, int]:
     return x, y, z
 
 
-def _turned(word: int, bits: int) -> int:
+def _rotated(word: int, bits: int) -> int:
     return ((word << bits) | (word >> (32 - bits))) & _WORD

@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import attrs
 import numpy as np
 
 from solidsph.interfaces.terms import Observation
 from solidsph.run.accounts import Accounts
+from solidsph.run.built_scene import BuiltScene
 from solidsph.watch.symptom import Finding, Grade, Symptom
-
-if TYPE_CHECKING:
-    from solidsph.run.built_scene import BuiltScene
 
 
 @final
 @attrs.frozen
 class VanishingVolume(Symptom):
-    """J of a particle is near zero, below it, or no number."""
+    """The volume ratio J of a particle is near zero, negative or NaN."""
 
     warning: float = 0.2  # J below which there is a warning [-]
 
     def look(
         self, simulation: BuiltScene, observation: Observation, accounts: Accounts
     ) -> Finding | None:
-        if observation.volume_ratios.min() >= self.warning:  # which no NaN is; of ghosts J = 1
+        if observation.volume_ratios.min() >= self.warning:  # False if one is NaN
             return None
         J = np.where(observation.particles.ghosts, 1.0, observation.volume_ratios)
         worst = int(np.argmin(np.where(np.isfinite(J), J, -np.inf)))
