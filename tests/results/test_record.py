@@ -18,7 +18,7 @@ import attrs
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from solidsph.errors import DivergedError, RecordError
@@ -28,6 +28,7 @@ from solidsph.results.record import Record, TimeSeries
 from solidsph.results.record_writer import RecordWriter
 from solidsph.results.repair import repaired
 from solidsph.results.unclosed import _lookup3
+from tests.helpers.examples import examples
 from tests.helpers.waiting import wait_for
 
 PLUGINS = (
@@ -159,7 +160,7 @@ def assert_holds(record: Record, content: list[Step]) -> None:
 # What went in comes out
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(
     count=st.integers(0, 9),
     dimension=st.integers(1, 3),
