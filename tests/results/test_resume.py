@@ -38,6 +38,7 @@ from solidsph.results.checkpoint import checkpoint_path, read_checkpoint, write_
 from solidsph.resumption import pending
 from solidsph.run.hooks import implementation
 from solidsph.scene.scene_builder import SceneBuilder
+from tests.commands.test_cli import solidsph
 from tests.helpers.resuming import NEVER, OFTEN, Stop, assert_same_record, content
 from tests.helpers.scenes import REFERENCE_ONLY, SCENE_TOML, box, with_effect
 from tests.helpers.waiting import HANG
@@ -189,16 +190,17 @@ def test_every_boundary(tmp_path: Path, stops: Sequence[tuple[int, bool]], bound
 
 @pytest.mark.usefixtures("often")
 @at_outputs
+@pytest.mark.parametrize("d", [1, pytest.param(2, marks=pytest.mark.validation)])
 @pytest.mark.parametrize("form", registry.names("formulations"))
 @pytest.mark.parametrize(
     "engine", ["compiled", pytest.param("compiled-float32", marks=pytest.mark.validation)]
 )
 def test_every_engine(
-    tmp_path: Path, stops: Sequence[tuple[int, bool]], engine: str, form: str
+    tmp_path: Path, stops: Sequence[tuple[int, bool]], engine: str, form: str, d: int
 ) -> None:
     """The compiled loop too, whose forces of ghosts are found anew from a state."""
     ghosts = {**GHOSTS, "ghost_faces": ["left"]}
-    builder = box(2, 8, discretisation=ghosts).formulation(form).boundary("symmetry", axis="x")
+    builder = box(d, 8, discretisation=ghosts).formulation(form).boundary("symmetry", axis="x")
     assert_goes_on(
         moving(builder.effect("mass-damping", rate=20.0).engine(engine)), tmp_path, stops
     )
@@ -801,7 +803,14 @@ except RecordError as error:
 """
 
 
-@pytest.mark.parametrize(("limit", "share"), [(900_000, NEVER), (900_000, OFTEN), (200_000, NEVER)])
+@pytest.mark.parametrize(
+    ("limit", "share"),
+    [
+        pytest.param(900_000, NEVER, marks=pytest.mark.validation),
+        (900_000, OFTEN),
+        (200_000, NEVER),
+    ],
+)
 def test_what_a_full_disk_stops_goes_on(tmp_path: Path, limit: int, share: float) -> None:
     """Amid the outputs, with and without a checkpoint; and before the first of them."""
     from tests.helpers.resuming import killed_scene
@@ -939,21 +948,19 @@ def test_a_command_that_is_stopped_can_be_resumed(tmp_path: Path, number: signal
     assert run["outcome"] == "finished"
     Simulation.builder(Scene.read(scene)).build().run(record=tmp_path / "whole.h5")
     assert_same_record(tmp_path / "whole.h5", folder / "record.h5")
-    with command("resume", str(folder)) as process:
-        text, errors = process.communicate(timeout=HANG)
-    assert process.returncode == 0
-    assert "is finished; --until T extends it" in text
+    again = solidsph("resume", str(folder), cwd=tmp_path)
+    assert again.returncode == 0
+    assert "is finished; --until T extends it" in again.stdout
 
 
 @pytest.mark.parametrize("target", ["missing.h5", "empty", "scene.toml"])
 def test_what_cannot_be_resumed_is_one_message(tmp_path: Path, target: str) -> None:
     (tmp_path / "empty").mkdir()
     scene_file(tmp_path)
-    with command("resume", target, cwd=tmp_path) as process:
-        text, errors = process.communicate(timeout=HANG)
-    assert (process.returncode, text) == (2, "")
-    assert errors.startswith("error: ")
-    assert len(errors.splitlines()) == 1
+    done = solidsph("resume", target, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("error: ")
+    assert len(done.stderr.splitlines()) == 1
 
 
 def killing(folder: Path, count: int, seed: int) -> None:
@@ -975,7 +982,7 @@ def killing(folder: Path, count: int, seed: int) -> None:
 
 
 def test_killed_at_random_moments(tmp_path: Path) -> None:
-    killing(tmp_path, 8, seed=1)
+    killing(tmp_path, 4, seed=1)
 
 
 @pytest.mark.validation

@@ -30,11 +30,14 @@ def has(name: str, parameter: str) -> bool:
 @pytest.mark.parametrize(
     ("name", "poissons_ratio"),
     [
-        # Laws that flow are led along paths, which takes up to 20 s.
+        # Laws that flow are led along paths, which takes up to 20 s: at every change, for the
+        # simplest of them alone.
         pytest.param(
             name,
             ratio,
-            marks=pytest.mark.validation if has(name, "yield_stress") and ratio < 0.4 else (),
+            marks=pytest.mark.validation
+            if has(name, "yield_stress") and (name, ratio) != ("j2-plasticity", 0.49)
+            else (),
         )
         for name in registry.names("materials")
         if has(name, "poissons_ratio")
