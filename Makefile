@@ -9,8 +9,9 @@ EXAMPLE := plugins/examples/solidsph-wendland
 BROWSER := /usr/bin/chromium /usr/bin/chromedriver
 WITHOUT := $(filter-out $(wildcard $(BROWSER)),$(BROWSER))
 
-# Two processes, each with whole files: the loops that the tests of a file share compile once.
-TWO := -n 2 --dist loadfile
+# Two processes, each with whole files: the loops that the tests of a file share compile once. The
+# order of the files is that of tests/conftest.py.
+TWO := -n 2 --dist loadfile --no-loadscope-reorder
 
 # Some hundred processes import the package: each would compile its modules anew.
 unexport PYTHONDONTWRITEBYTECODE

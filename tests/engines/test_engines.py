@@ -235,13 +235,15 @@ def test_single_precision_is_precision_of_strain(d: int, arrangement: dict[str, 
 
 @pytest.mark.parametrize("divergence", registry.names("divergences"))
 @on_every_arrangement
+@pytest.mark.parametrize("d", [1, pytest.param(2, marks=pytest.mark.validation)])
 def test_compiled_by_several_threads(
-    arrangement: dict[str, Any], divergence: str, monkeypatch: pytest.MonkeyPatch
+    d: int, arrangement: dict[str, Any], divergence: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same forces as the reference's, and the same bits at every call."""
     monkeypatch.setattr(shares, "WORTH_A_THREAD", 1)
     formulation = {"type": "total-lagrangian", "divergence": divergence}
-    simulation = block(2, arrangement, lengths=[4.0, 6.0], formulation=formulation).build()
+    lengths = [400.0] if d == 1 else [4.0, 6.0]
+    simulation = block(d, arrangement, lengths=lengths, formulation=formulation).build()
     reference = prepared(MatrixEngine(), simulation)
     forces = compiled(simulation)
     assert forces.parts[0].gradient_shares.threaded
