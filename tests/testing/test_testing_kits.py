@@ -143,17 +143,6 @@ def test_example_parts_say_which_value_is_not_known(monkeypatch: pytest.MonkeyPa
         example_part("shapes", "box")
 
 
-@pytest.mark.parametrize(
-    ("kind", "name"),
-    # Materials are put to their checks one by one, in tests/plugins/materials/test_materials.py.
-    [(kind, name) for kind in kits() if kind != "materials" for name in registry.names(kind)],
-    ids=lambda value: value,
-)
-def test_every_installed_part_conforms(kind: str, name: str) -> None:
-    results = conformance(kind, example_part(kind, name))
-    assert [result for result in results if not result.passed] == []
-
-
 def test_every_kind_of_part_but_a_case_has_a_kit() -> None:
     assert set(kits()) == set(registry.INTERFACES) - {"cases"}
 
