@@ -9,8 +9,12 @@ EXAMPLE := plugins/examples/solidsph-wendland
 BROWSER := /usr/bin/chromium /usr/bin/chromedriver
 WITHOUT := $(filter-out $(wildcard $(BROWSER)),$(BROWSER))
 
-# Two processes, each with whole files: the loops that the tests of a file share compile once.
-TWO := -n 2 --dist loadfile
+# Two processes, each with whole files: the loops that the tests of a file share compile once. The
+# order of the files is that of tests/conftest.py.
+TWO := -n 2 --dist loadfile --no-loadscope-reorder
+
+# Some hundred processes import the package: each would compile its modules anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test validate gallery frontiers bench bench-page lint format clean
 
@@ -21,8 +25,8 @@ test: $(STAMP) lint  ## lint, types and every test but the slow physics
 	$(if $(WITHOUT),@echo "no $(WITHOUT): tests in a browser are left out; apt-get install chromium chromium-driver")
 	$(BIN)/pytest $(TWO) -m "not validation$(if $(WITHOUT), and not browser)"
 
-validate: $(STAMP)  ## the slow physics
-	$(BIN)/pytest $(TWO) -m validation -rP
+validate: $(STAMP)  ## the slow physics, every combination, and many more examples of properties
+	$(BIN)/pytest $(TWO) -m "validation or examples" --hypothesis-profile thorough -rP
 
 bench: $(STAMP)  ## against a plain C loop, whole steps, memory, throughput along every axis, the updated form
 	$(BIN)/python benchmarks/bench.py
@@ -40,7 +44,7 @@ frontiers: $(STAMP)  ## error against time of the documented cases, written to t
 lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
+	MYPY_NUM_WORKERS=2 $(BIN)/mypy
 
 format: $(STAMP)
 	$(BIN)/ruff check --fix .

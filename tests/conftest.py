@@ -12,23 +12,45 @@ from importlib.metadata import EntryPoints, entry_points
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, is_hypothesis_test, settings
 
 from solidsph.costs import calibration
 from solidsph.costs.coefficients import REFERENCE
 from solidsph.registry import registry
+from tests.helpers.examples import QUICK, THOROUGH
 
 # Machines that run the tests are shared: a slow moment is not a failure. Examples stay random, so
 # that every run looks elsewhere; what fails is printed in a form that repeats it.
-settings.register_profile(
-    "shared", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
-)
-settings.load_profile("shared")
+for profile, share in (("quick", QUICK), ("thorough", THOROUGH)):
+    settings.register_profile(
+        profile,
+        deadline=None,
+        suppress_health_check=[HealthCheck.too_slow],
+        print_blob=True,
+        max_examples=share,
+    )
+settings.load_profile("quick")
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Mark what Hypothesis gives examples to: `make validate` tries more of them."""
+    if is_hypothesis_test(getattr(item, "obj", None)):
+        item.add_marker(pytest.mark.examples)
+
 
 # A shell has what it starts in the background ignore interrupts, and so what the tests start, which
 # are to be interrupted.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+# Rooms whose files take longest.
+LONG = ("engines", "results", "studies", "testing", "cases")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest files first, so that neither of two processes ends long after the other."""
+    items.sort(key=lambda item: item.path.parent.name not in LONG)
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,6 @@ from typing import Any
 import attrs
 import numpy as np
 import pytest
-from tests.helpers.scenes import SOFT, box
 
 from solidsph import Effect
 from solidsph.errors import BuildError, PartWarning, PluginError
@@ -19,6 +18,7 @@ from solidsph.interfaces.terms import EnergyTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph_builtin.materials.neo_hookean import NeoHookean
+from tests.helpers.scenes import SOFT, box
 
 K = 1e3  # [N/m]
 

@@ -12,7 +12,6 @@ from typing import Any
 import attrs
 import numpy as np
 import pytest
-from tests.helpers.scenes import SOFT
 
 from solidsph import Simulation
 from solidsph.assembly.visibility import hidden_pairs
@@ -25,6 +24,7 @@ from solidsph.model.particles import Particles
 from solidsph.registry.construct import construct
 from solidsph.run.energy import KINETIC
 from solidsph.scene.scene_builder import SceneBuilder
+from tests.helpers.scenes import SOFT
 
 H = 0.1  # spacing
 ON_BOUNDARY = {"type": "lattice", "on_boundary": True}

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import product
 from typing import Any, ClassVar
 
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
@@ -32,17 +31,21 @@ from solidsph.model.neighbours import Pairs, neighbour_pairs
 from solidsph.registry import registry
 from solidsph.testing import example_part
 from tests.engines.test_engines import (
+    ARRANGEMENTS,
     JITTERED,
     LATTICE,
+    arrangement_name,
     assert_same,
     block,
     compiled,
     in_every_dimension,
-    on_every_arrangement,
+    mostly_in_2d,
     parts_of,
     prepared,
     random_displacements,
 )
+from tests.helpers.examples import examples
+from tests.helpers.pairwise import pairwise
 from tests.helpers.scenes import REFERENCE_ONLY, SOFT
 
 UPDATED = "updated-lagrangian"
@@ -79,7 +82,7 @@ def assert_same_pairs(ours: Pairs, theirs: Pairs) -> None:
 on_a_grid = st.integers(-6, 6).map(lambda k: 0.25 * k)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(data=st.data(), d=st.sampled_from([1, 2, 3]), n=st.integers(1, 30))
 def test_pairs_are_those_of_the_tree(data: st.DataObject, d: int, n: int) -> None:
     coordinates = data.draw(st.sampled_from([on_a_grid, st.floats(-3.0, 3.0)]))
@@ -125,12 +128,14 @@ def test_a_particle_that_is_nowhere_has_no_neighbours(value: float) -> None:
     assert np.array_equal(pairs.columns[others], real[expected.columns])
 
 
+GRADIENTS = [name for name in registry.names("gradients") if name not in REFERENCE_ONLY]
+
+
 @pytest.mark.parametrize(
-    "gradient", [name for name in registry.names("gradients") if name not in REFERENCE_ONLY]
+    ("d", "arrangement", "divergence", "gradient"),
+    pairwise((1, 2, 3), ARRANGEMENTS, registry.names("divergences"), GRADIENTS),
+    ids=arrangement_name,
 )
-@pytest.mark.parametrize("divergence", registry.names("divergences"))
-@on_every_arrangement
-@in_every_dimension
 def test_agrees_for_every_operator(
     d: int, arrangement: dict[str, Any], divergence: str, gradient: str
 ) -> None:
@@ -141,12 +146,6 @@ def test_agrees_for_every_operator(
     assert isinstance(moving(forces).sums, PointwiseSums if pointwise else WeightedSums)
     for seed in range(3):
         assert_same(forces, reference, random_displacements(simulation, seed))
-
-
-# A law takes seconds to compile, in every dimension anew: here in one, in all by `make validate`.
-mostly_in_2d = pytest.mark.parametrize(
-    "d", [pytest.param(d, marks=() if d == 2 else pytest.mark.validation) for d in (1, 2, 3)]
-)
 
 
 @pytest.mark.parametrize("material", registry.names("materials"))
@@ -248,14 +247,17 @@ def test_agrees_for_any_divergence_with_a_formula_or_without(gradient: str) -> N
         )
 
 
+OPERATORS = ["standard", "corrected", "quadratic"]
+
+
 @pytest.mark.parametrize(
-    ("kind", "divergence"),
+    ("kind", "divergence", "gradient"),
     [
-        *product(("ghosts", "symmetry"), registry.names("divergences")),
-        ("approximate-neumann", "plain"),  # the builder refuses it with any other
+        *pairwise(("ghosts", "symmetry"), registry.names("divergences"), OPERATORS),
+        # The builder refuses it with any other divergence.
+        *(("approximate-neumann", "plain", gradient) for gradient in OPERATORS),
     ],
 )
-@pytest.mark.parametrize("gradient", ["standard", "corrected", "quadratic"])
 def test_agrees_with_ghosts_and_imposed_stress(gradient: str, kind: str, divergence: str) -> None:
     builder = block(
         2,

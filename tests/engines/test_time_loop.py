@@ -97,9 +97,13 @@ def test_every_integrator_and_condition_of_a_bar(integrator: str) -> None:
         .boundary("traction", where="right", traction={"x": "1e3*min(t/1e-3, 1)"})
         .effect("body-force", acceleration={"x": "X + 50*t"})
         .effect("mass-damping", rate=200.0)
-        .effect("hourglass-control")
         .integrator(integrator)
     )
+
+
+@pytest.mark.validation  # in the plane by `test_every_effect`
+def test_hourglass_control_of_a_bar() -> None:
+    assert_agree(box(1, 24).boundary("clamp", where="left").effect("hourglass-control"))
 
 
 # Of no declared kind: who is near whom is asked anew at every step.
@@ -108,7 +112,16 @@ BY_STEP = {
 }
 
 
-@pytest.mark.parametrize("effect", sorted(set(registry.names("effects")) - BY_STEP))
+@pytest.mark.parametrize(
+    "effect",
+    [
+        # The bar above has these two.
+        pytest.param(
+            name, marks=pytest.mark.validation if name in ("body-force", "mass-damping") else ()
+        )
+        for name in sorted(set(registry.names("effects")) - BY_STEP)
+    ],
+)
 def test_every_effect(effect: str) -> None:
     assert_agree(with_effect(effect, 2, 7))
 
@@ -127,7 +140,13 @@ def test_others_go_step_by_step_with_compiled_forces(effect: str) -> None:
     assert by_engine[0].work[effect] != 0.0 or effect == "bond-failure"
 
 
-@pytest.mark.parametrize("divergence", registry.names("divergences"))
+@pytest.mark.parametrize(
+    "divergence",
+    [
+        pytest.param(name, marks=() if name == "variational" else pytest.mark.validation)
+        for name in registry.names("divergences")
+    ],
+)
 def test_ghosts_of_a_symmetric_body(divergence: str) -> None:
     """Their motion, their forces handed on, and their stress where it acts."""
     ghosts = {

@@ -6,12 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from solidsph.maths import tensors
 from solidsph.maths.arrays import Array, Scalar, Tensor
 from solidsph.testing.strategies import deformation_gradients, dimensions
+from tests.helpers.examples import examples
 
 # A handful of products and sums of numbers of order 1.
 ROUNDING = 1e-13
@@ -58,7 +59,7 @@ def at_point(result: Tensor | Scalar, point: int) -> Array:
 
 @pytest.mark.parametrize("word", UNARY)
 @given(data=st.data(), dimension=dimensions())
-@settings(max_examples=30)
+@examples(30)
 def test_words_of_one_tensor(word: str, data: st.DataObject, dimension: int) -> None:
     ours, theirs = UNARY[word]
     A, B = (data.draw(deformation_gradients(dimension)) for _ in range(2))
@@ -70,7 +71,7 @@ def test_words_of_one_tensor(word: str, data: st.DataObject, dimension: int) -> 
 
 @pytest.mark.parametrize("word", BINARY)
 @given(data=st.data(), dimension=dimensions())
-@settings(max_examples=30)
+@examples(30)
 def test_words_of_two_tensors(word: str, data: st.DataObject, dimension: int) -> None:
     ours, theirs = BINARY[word]
     A, B = (data.draw(deformation_gradients(dimension)) for _ in range(2))
@@ -82,7 +83,7 @@ def test_words_of_two_tensors(word: str, data: st.DataObject, dimension: int) ->
 
 
 @given(data=st.data(), dimension=dimensions())
-@settings(max_examples=50)
+@examples(50)
 def test_push_forward(data: st.DataObject, dimension: int) -> None:
     F = data.draw(deformation_gradients(dimension))
     S = symmetric(data.draw(deformation_gradients(dimension)))

@@ -19,7 +19,7 @@ from solidsph.engines.compiled import shares
 from tests.helpers.scenes import box
 shares.WORTH_A_THREAD = 1
 def built():
-    return box(2, 6).initial(velocity={{"x": "X"}}).engine("compiled").outputs(1).build()
+    return box(1, 12).initial(velocity={{"x": "X"}}).engine("compiled").outputs(1).build()
 def told(simulation=None):
     try:
         (simulation or built()).run()

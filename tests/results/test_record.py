@@ -18,7 +18,7 @@ import attrs
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from solidsph.errors import DivergedError, RecordError
@@ -30,6 +30,7 @@ from solidsph.results.record import Record
 from solidsph.results.record_writer import RecordWriter
 from solidsph.results.repair import repaired
 from solidsph.results.time_series import TimeSeries
+from tests.helpers.examples import examples
 from tests.helpers.waiting import wait_for
 
 PLUGINS = (
@@ -148,7 +149,7 @@ def assert_holds(record: Record, content: list[Output]) -> None:
 # What went in comes out
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(
     count=st.integers(0, 9),
     dimension=st.integers(1, 3),

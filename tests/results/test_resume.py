@@ -13,7 +13,9 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import attrs
 import numpy as np
@@ -36,6 +38,7 @@ from solidsph.results.checkpoint import checkpoint_path, read_checkpoint, write_
 from solidsph.resumption import pending
 from solidsph.run.hooks import implementation
 from solidsph.scene.scene_builder import SceneBuilder
+from tests.commands.test_cli import solidsph
 from tests.helpers.resuming import NEVER, OFTEN, Stop, assert_same_record, content
 from tests.helpers.scenes import REFERENCE_ONLY, SCENE_TOML, box, with_effect
 from tests.helpers.waiting import HANG
@@ -103,8 +106,26 @@ def moving(builder: SceneBuilder) -> SceneBuilder:
     return builder.initial(velocity={"x": "3*sin(2*X)"}).outputs(OUTPUTS)
 
 
-def assert_goes_on(builder: SceneBuilder, folder: Path, *, simulation: bool = True) -> None:
-    """Stopped at each output, with and without the checkpoint of that output."""
+# Outputs at which a run is stopped, and whether the checkpoint of that output is kept.
+BRIEFLY = ((2, True), (3, False))
+EVERYWHERE = ((1, False), (2, True), (3, True), (3, False), (4, True))
+at_outputs = pytest.mark.parametrize(
+    "stops",
+    [
+        pytest.param(BRIEFLY, id="briefly"),
+        pytest.param(EVERYWHERE, id="everywhere", marks=pytest.mark.validation),
+    ],
+)
+
+
+def assert_goes_on(
+    builder: SceneBuilder,
+    folder: Path,
+    stops: Sequence[tuple[int, bool]] = EVERYWHERE,
+    *,
+    simulation: bool = True,
+) -> None:
+    """Stopped at each of these outputs, with and without the checkpoint of that output."""
     whole, path = folder / "whole.h5", folder / "stopped.h5"
     made = builder.build()
     made.run(record=whole)
@@ -112,42 +133,48 @@ def assert_goes_on(builder: SceneBuilder, folder: Path, *, simulation: bool = Tr
         assert record.count == OUTPUTS + 1
         # Something happens, or the same bits would say nothing.
         assert len(np.unique(record.history["kinetic energy [J]"])) == OUTPUTS + 1
-    for output in range(1, OUTPUTS + 1):
-        for kept in (True, False) if output == OUTPUTS - 1 else (output % 2 == 0,):
-            with pytest.raises(KeyboardInterrupt):
-                made.run(record=path, observers=[Stop(output)])
-            with Record(path) as record:
-                assert record.outcome == "interrupted"
-                assert record.count == output
-            # What stops the run at an output keeps its state from being a checkpoint.
-            assert checkpoint_path(path).exists() == (output > 1)
-            if not kept:
-                checkpoint_path(path).unlink(missing_ok=True)
-            resume(path, simulation=made if simulation else None)
-            assert_same_record(whole, path)
+    for output, kept in stops:
+        with pytest.raises(KeyboardInterrupt):
+            made.run(record=path, observers=[Stop(output)])
+        with Record(path) as record:
+            assert record.outcome == "interrupted"
+            assert record.count == output
+        # What stops the run at an output keeps its state from being a checkpoint.
+        assert checkpoint_path(path).exists() == (output > 1)
+        if not kept:
+            checkpoint_path(path).unlink(missing_ok=True)
+        resume(path, simulation=made if simulation else None)
+        assert_same_record(whole, path)
 
 
 @pytest.mark.usefixtures("often")
+@at_outputs
 @pytest.mark.parametrize("formulation", registry.names("formulations"))
 @pytest.mark.parametrize("gradient", registry.names("gradients"))
-def test_every_formulation(tmp_path: Path, formulation: str, gradient: str) -> None:
+def test_every_formulation(
+    tmp_path: Path, stops: Sequence[tuple[int, bool]], formulation: str, gradient: str
+) -> None:
     if formulation != "total-lagrangian" and gradient in REFERENCE_ONLY:
         pytest.skip("the gradient is refused in this form")
     builder = box(2).formulation(formulation, gradient=gradient).energy_tolerance("off")
-    assert_goes_on(moving(builder), tmp_path)
+    assert_goes_on(moving(builder), tmp_path, stops)
 
 
 @pytest.mark.usefixtures("often")
+@at_outputs
 @pytest.mark.parametrize("integrator", registry.names("integrators"))
-def test_every_integrator(tmp_path: Path, integrator: str) -> None:
+def test_every_integrator(
+    tmp_path: Path, stops: Sequence[tuple[int, bool]], integrator: str
+) -> None:
     builder = box(2).boundary("clamp", where="left").integrator(integrator)
-    assert_goes_on(moving(builder), tmp_path)
+    assert_goes_on(moving(builder), tmp_path, stops)
 
 
 @pytest.mark.usefixtures("often")
+@at_outputs
 @pytest.mark.parametrize("effect", registry.names("effects"))
-def test_every_effect(tmp_path: Path, effect: str) -> None:
-    assert_goes_on(moving(with_effect(effect, 2)), tmp_path)
+def test_every_effect(tmp_path: Path, stops: Sequence[tuple[int, bool]], effect: str) -> None:
+    assert_goes_on(moving(with_effect(effect, 2)), tmp_path, stops)
 
 
 def test_every_boundary_has_a_scene() -> None:
@@ -155,21 +182,28 @@ def test_every_boundary_has_a_scene() -> None:
 
 
 @pytest.mark.usefixtures("often")
+@at_outputs
 @pytest.mark.parametrize("boundary", BOUNDARIES)
-def test_every_boundary(tmp_path: Path, boundary: str) -> None:
-    assert_goes_on(moving(BOUNDARIES[boundary]()), tmp_path)
+def test_every_boundary(tmp_path: Path, stops: Sequence[tuple[int, bool]], boundary: str) -> None:
+    assert_goes_on(moving(BOUNDARIES[boundary]()), tmp_path, stops)
 
 
 @pytest.mark.usefixtures("often")
+@at_outputs
+@pytest.mark.parametrize("d", [1, pytest.param(2, marks=pytest.mark.validation)])
 @pytest.mark.parametrize("form", registry.names("formulations"))
 @pytest.mark.parametrize(
     "engine", ["compiled", pytest.param("compiled-float32", marks=pytest.mark.validation)]
 )
-def test_every_engine(tmp_path: Path, engine: str, form: str) -> None:
+def test_every_engine(
+    tmp_path: Path, stops: Sequence[tuple[int, bool]], engine: str, form: str, d: int
+) -> None:
     """The compiled loop too, whose forces of ghosts are found anew from a state."""
     ghosts = {**GHOSTS, "ghost_faces": ["left"]}
-    builder = box(2, 8, discretisation=ghosts).formulation(form).boundary("symmetry", axis="x")
-    assert_goes_on(moving(builder.effect("mass-damping", rate=20.0).engine(engine)), tmp_path)
+    builder = box(d, 8, discretisation=ghosts).formulation(form).boundary("symmetry", axis="x")
+    assert_goes_on(
+        moving(builder.effect("mass-damping", rate=20.0).engine(engine)), tmp_path, stops
+    )
 
 
 @pytest.mark.usefixtures("often")
@@ -274,10 +308,25 @@ def test_a_finished_run_says_so(tmp_path: Path) -> None:
 
 
 def stopped(path: Path, builder: SceneBuilder | None = None) -> Simulation:
-    simulation = (builder or moving(box(1))).build()
+    """A run that was stopped at its third output, with its record and its checkpoint."""
+    if builder is None:
+        simulation, record, checkpoint = _stopped_bar()
+        path.write_bytes(record)
+        checkpoint_path(path).write_bytes(checkpoint)
+        return simulation
+    simulation = builder.build()
     with pytest.raises(KeyboardInterrupt):
         simulation.run(record=path, observers=[Stop(3)])
     return simulation
+
+
+@cache
+def _stopped_bar() -> tuple[Simulation, bytes, bytes]:
+    """Run once: many tests start from what it leaves."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "run.h5"
+        simulation = stopped(path, moving(box(1)))
+        return simulation, path.read_bytes(), checkpoint_path(path).read_bytes()
 
 
 def assert_refused(path: Path, message: str, unchanged: bool = True, **others: object) -> None:
@@ -754,7 +803,14 @@ except RecordError as error:
 """
 
 
-@pytest.mark.parametrize(("limit", "share"), [(900_000, NEVER), (900_000, OFTEN), (200_000, NEVER)])
+@pytest.mark.parametrize(
+    ("limit", "share"),
+    [
+        pytest.param(900_000, NEVER, marks=pytest.mark.validation),
+        (900_000, OFTEN),
+        (200_000, NEVER),
+    ],
+)
 def test_what_a_full_disk_stops_goes_on(tmp_path: Path, limit: int, share: float) -> None:
     """Amid the outputs, with and without a checkpoint; and before the first of them."""
     from tests.helpers.resuming import killed_scene
@@ -892,21 +948,19 @@ def test_a_command_that_is_stopped_can_be_resumed(tmp_path: Path, number: signal
     assert run["outcome"] == "finished"
     Simulation.builder(Scene.read(scene)).build().run(record=tmp_path / "whole.h5")
     assert_same_record(tmp_path / "whole.h5", folder / "record.h5")
-    with command("resume", str(folder)) as process:
-        text, errors = process.communicate(timeout=HANG)
-    assert process.returncode == 0
-    assert "is finished; --until T extends it" in text
+    again = solidsph("resume", str(folder), cwd=tmp_path)
+    assert again.returncode == 0
+    assert "is finished; --until T extends it" in again.stdout
 
 
 @pytest.mark.parametrize("target", ["missing.h5", "empty", "scene.toml"])
 def test_what_cannot_be_resumed_is_one_message(tmp_path: Path, target: str) -> None:
     (tmp_path / "empty").mkdir()
     scene_file(tmp_path)
-    with command("resume", target, cwd=tmp_path) as process:
-        text, errors = process.communicate(timeout=HANG)
-    assert (process.returncode, text) == (2, "")
-    assert errors.startswith("error: ")
-    assert len(errors.splitlines()) == 1
+    done = solidsph("resume", target, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("error: ")
+    assert len(done.stderr.splitlines()) == 1
 
 
 def killing(folder: Path, count: int, seed: int) -> None:
@@ -928,7 +982,7 @@ def killing(folder: Path, count: int, seed: int) -> None:
 
 
 def test_killed_at_random_moments(tmp_path: Path) -> None:
-    killing(tmp_path, 8, seed=1)
+    killing(tmp_path, 4, seed=1)
 
 
 @pytest.mark.validation

@@ -10,13 +10,14 @@ from typing import Any, ClassVar
 
 import attrs
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from solidsph import SceneError
 from solidsph.studies.case import Case, Measurement
 from solidsph.studies.point import Point
 from solidsph.studies.search import Accuracy, Goal, Within, search
+from tests.helpers.examples import examples
 
 SCHEMES = ("a", "b", "c", "d", "e")
 LEVELS = (4, 6, 8, 12, 16, 24)
@@ -83,7 +84,7 @@ def least(goal: Goal, points: Sequence[Point]) -> float:
     return min((goal.loss(p.error, p.time) for p in points if goal.met(p)), default=inf)
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(law=laws, error=st.floats(0.01, 0.1))
 def test_the_cheapest_for_an_accuracy_is_found_by_few_runs(law: Law, error: float) -> None:
     goal = Accuracy(error)
@@ -100,7 +101,7 @@ def test_the_cheapest_for_an_accuracy_is_found_by_few_runs(law: Law, error: floa
         assert law(found.point.settings) == found.point
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(law=laws, time=st.floats(1.0, 60.0))
 def test_the_nearest_for_a_time_is_found(law: Law, time: float) -> None:
     goal = Within(time)

@@ -464,7 +464,14 @@ def journal_keys(content: bytes) -> Sequence[str]:
     return [json.loads(line)["key"] for line in content.split(b"\n")[:-1]]
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "how",
+    [
+        signal.SIGKILL,
+        signal.SIGINT,
+        pytest.param(signal.SIGTERM, marks=pytest.mark.validation),  # taken as an interrupt
+    ],
+)
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="looks at processes in /proc")
 def test_no_process_outlives_its_sweep(tmp_path: Path, how: signal.Signals) -> None:
     with parent(tmp_path, "sleep", "hold") as process:

@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from solidsph import BuildError, Record, Scene, SceneError, Simulation
@@ -20,6 +20,7 @@ from solidsph.testing import checks, conformance, example_part
 from solidsph_builtin.effects import _search
 from solidsph_builtin.effects._meeting import Meeting
 from solidsph_builtin.effects.contact import Contact
+from tests.helpers.examples import examples
 from tests.helpers.scenes import SOFT, box, touching
 from tests.house.test_docs import blocks
 
@@ -102,7 +103,7 @@ def test_momenta_stay_and_the_ledger_closes(d: int, friction: float, tmp_path: P
         assert np.abs(lost).max() <= 3e-3 * start
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(
     d=st.sampled_from([1, 2, 3]),
     gap=st.floats(-1.5, 0.2),

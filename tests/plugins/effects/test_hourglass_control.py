@@ -9,7 +9,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from solidsph import BuildError, Record, Simulation
@@ -21,6 +21,7 @@ from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.statics import equilibrium
 from solidsph_builtin.effects.hourglass_control import HourglassControl, penalised
 from tests.cases.test_beam import beam
+from tests.helpers.examples import examples
 from tests.helpers.scenes import box
 
 JITTERED = {"type": "jittered-lattice", "amplitude": 0.2, "seed": 4}
@@ -226,7 +227,7 @@ def test_sweeps_products_and_the_matrix_are_the_same(d: int, gradient: str) -> N
     assert np.abs(total).max() < 1e-14 * np.abs(expected).sum()
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(
     d=st.integers(1, 3),
     cells=st.integers(5, 8),

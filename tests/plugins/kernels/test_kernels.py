@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from solidsph.interfaces.smoothing_kernel import smoothing_kernel
@@ -12,6 +12,7 @@ from solidsph.promises.kernel import MASS_TOLERANCE, smoothed_mass
 from solidsph.registry import registry
 from solidsph.testing import Check, checks, example_part
 from solidsph.testing.strategies import dimensions, support_radii
+from tests.helpers.examples import examples
 
 every_kernel = pytest.mark.parametrize("name", registry.names("kernels"))
 
@@ -25,7 +26,7 @@ def test_conformance(name: str, check: Check) -> None:
 
 @every_kernel
 @given(dimension=dimensions(), support_radius=support_radii())
-@settings(max_examples=50)
+@examples(50)
 def test_declared_mass_whatever_the_support_radius(
     name: str, dimension: int, support_radius: float
 ) -> None:
@@ -36,7 +37,7 @@ def test_declared_mass_whatever_the_support_radius(
 
 @every_kernel
 @given(dimension=dimensions(), direction=st.integers(0, 2**32 - 1), q=st.floats(0.05, 0.95))
-@settings(max_examples=50)
+@examples(50)
 def test_gradient_is_the_derivative_by_the_first_position(
     name: str, dimension: int, direction: int, q: float
 ) -> None:

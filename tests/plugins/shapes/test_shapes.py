@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from solidsph.errors import SceneError
@@ -25,6 +25,7 @@ from solidsph_builtin.shapes.disc import Disc
 from solidsph_builtin.shapes.interval import Interval
 from solidsph_builtin.shapes.polygon import Polygon
 from solidsph_builtin.shapes.union import Union
+from tests.helpers.examples import examples
 
 ARROW = [(0.0, 0.0), (2.0, -1.0), (1.2, 0.0), (2.0, 1.0)]
 
@@ -229,7 +230,7 @@ def member(shape: Shape, points: Array) -> Mask:
     raise TypeError(shape)
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(COMPOSITES)
 def test_sign_of_the_distance_is_membership(shape: Shape) -> None:
     points = points_around(shape)
@@ -257,7 +258,7 @@ def test_distance_is_that_to_the_nearest_sample(shape: Shape, volume: float, are
     assert (np.abs(shape.signed_distance(points)) <= gaps + 1e-12).all()
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(COMPOSITES)
 def test_distance_never_exceeds_the_way_to_a_point_on_the_other_side(shape: Shape) -> None:
     # Discretisations rely on it: a cell nearer to its centre than that is whole or empty.
@@ -269,7 +270,7 @@ def test_distance_never_exceeds_the_way_to_a_point_on_the_other_side(shape: Shap
     assert (sums <= gaps + 1e-12).all()
 
 
-@settings(max_examples=50)
+@examples(50)
 @given(st.tuples(size, size), st.tuples(coordinate, coordinate))
 def test_a_rectangle_is_the_same_as_box_and_as_polygon(
     lengths: tuple[float, float], origin: tuple[float, float]
@@ -284,7 +285,7 @@ def test_a_rectangle_is_the_same_as_box_and_as_polygon(
     assert polygon.volume() == pytest.approx(box.volume(), rel=1e-9)
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(COMPOSITES)
 def test_bounds_hold_the_shape(shape: Shape) -> None:
     lower, upper = shape.bounds()
