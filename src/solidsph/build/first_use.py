@@ -16,7 +16,7 @@ from solidsph.registry.origin import described
 from solidsph.errors import BuildError, PartWarning
 from solidsph.interfaces.terms import Load, EnergyTerm
 from solidsph.model.particles import read_only
-from solidsph.promises.kits import KITS
+from solidsph.conformance.kits import KITS
 from solidsph.registry.registry import entry_of, singular
 from solidsph.run.built_scene import BuiltScene
 

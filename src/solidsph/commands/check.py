@@ -22,7 +22,7 @@ from solidsph.errors import SceneError
 from solidsph.registry import registry
 
 if TYPE_CHECKING:
-    from solidsph.promises.check import CheckResult
+    from solidsph.conformance.check import CheckResult
 
 
 @click.command()

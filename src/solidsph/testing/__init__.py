@@ -3,8 +3,8 @@
 `solidsph.testing.strategies` is imported by itself: it needs Hypothesis, nothing here does.
 """
 
-from solidsph.promises.check import Check, CheckResult
-from solidsph.promises.kernel import MASS_TOLERANCE, smoothed_mass
+from solidsph.conformance.check import Check, CheckResult
+from solidsph.conformance.kernel import MASS_TOLERANCE, smoothed_mass
 from solidsph.testing.examples import example_part
 from solidsph.testing.kits import checks, conformance, kits
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
+from solidsph.conformance.samples import ANGLES, DIMENSIONS, deformation_gradient, rotation
 from solidsph.maths.arrays import Array
-from solidsph.promises.samples import ANGLES, DIMENSIONS, deformation_gradient, rotation
 
 
 def dimensions() -> st.SearchStrategy[int]:

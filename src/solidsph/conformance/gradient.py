@@ -1,4 +1,4 @@
-"""What every gradient must keep, on scattered particles with free surfaces all round."""
+"""Checks of a gradient, on scattered particles with free surfaces all round."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from itertools import product
 import attrs
 import numpy as np
 
+from solidsph.conformance.check import Kit, Verdict, at_most, more_than, worst
+from solidsph.conformance.samples import scattered, seeded
 from solidsph.interfaces.gradient import Gradient
 from solidsph.interfaces.smoothing_kernel import smoothing_kernel
 from solidsph.maths.arrays import Array
 from solidsph.model.neighbours import Pairs, neighbour_pairs
-from solidsph.promises.check import Check, Verdict, at_most, check, more_than, worst
-from solidsph.promises.samples import scattered, seeded
 from solidsph.registry.construct import construct
 
 _CELLS = {1: (20,), 2: (9, 8), 3: (6, 5, 5)}
@@ -29,10 +29,12 @@ _EXACT = 1e-12
 # size of the body, or of its square; far above rounding.
 _INEXACT = 1e-6
 
+KIT = Kit()
+
 
 @attrs.frozen(eq=False)
 class _Weighted:
-    """An arrangement with the gradient's weights on it."""
+    """Particles with the weights of the gradient."""
 
     positions: Array  # (n, d), 0 in the middle, in units of the longest side
     pairs: Pairs
@@ -49,20 +51,26 @@ class _Weighted:
         return float(max(errors))
 
 
-def _arrangements(gradient: Gradient, size: float = 1.0) -> Iterator[_Weighted]:
-    """In 1, 2 and 3D, with every length multiplied by `size`."""
+def _bodies(size: float = 1.0) -> Iterator[tuple[Array, Pairs, Array, Array]]:
+    """Positions (n, d), pairs, kernel gradients (m, d) and volumes (n,) in 1, 2 and 3D, with every
+    length multiplied by `size`."""
     for d, rng in seeded():
         X = size * scattered(rng, _CELLS[d], _SPACING)
         radius = _COVER * _SPACING * size
         pairs = neighbour_pairs(X, radius)
         volumes = (_SPACING * size) ** d * rng.uniform(0.9, 1.1, len(X))
         W = smoothing_kernel(construct("kernels", _KERNEL), d, radius)
-        weights = gradient.weights(pairs, W.gradient(pairs.offsets, pairs.distances), volumes)
-        unit = max(_CELLS[d]) * _SPACING * size
+        yield X, pairs, W.gradient(pairs.offsets, pairs.distances), volumes
+
+
+def _weighted(gradient: Gradient, size: float = 1.0) -> Iterator[_Weighted]:
+    for X, pairs, slopes, volumes in _bodies(size):
+        unit = max(_CELLS[X.shape[1]]) * _SPACING * size
+        weights = gradient.weights(pairs, slopes, volumes)
         yield _Weighted((X - X.mean(axis=0)) / unit, pairs, weights * unit)
 
 
-@check
+@KIT.check
 def exact_degree(gradient: Gradient) -> Verdict:
     """Polynomials up to the declared degree have exact gradients, at free surfaces too."""
     declared = gradient.exact_degree
@@ -70,69 +78,51 @@ def exact_degree(gradient: Gradient) -> Verdict:
         return Verdict(declared == -1, f"declares {declared}: not even a constant")
     return worst(
         [
-            at_most(max(one.worst_error(k) for k in range(declared + 1)), _EXACT)
-            for one in _arrangements(gradient)
+            at_most(max(body.worst_error(k) for k in range(declared + 1)), _EXACT)
+            for body in _weighted(gradient)
         ]
     )
 
 
-@check
+@KIT.check
 def no_higher_degree(gradient: Gradient) -> Verdict:
-    """One degree higher they are not: the declaration is not too modest."""
+    """Polynomials of the next degree do not: the declared degree is not too low."""
     return worst(
         [
-            more_than(one.worst_error(gradient.exact_degree + 1), _INEXACT)
-            for one in _arrangements(gradient)
+            more_than(body.worst_error(gradient.exact_degree + 1), _INEXACT)
+            for body in _weighted(gradient)
         ]
     )
 
 
-@check
-def inverse_length(gradient: Gradient) -> Verdict:
+@KIT.errors(_EXACT)
+def inverse_length(gradient: Gradient) -> Iterator[float]:
     """Weights scale as 1 / length: twice as large a body has half the gradient."""
     # Weights come in units of 1 / size, so they must be the same; 2 is exact in binary.
-    errors = [
-        float(np.abs(small.weights - large.weights).max() / np.abs(small.weights).max())
-        for small, large in zip(_arrangements(gradient), _arrangements(gradient, 2.0), strict=True)
-    ]
-    return at_most(max(errors), _EXACT)
+    for small, large in zip(_weighted(gradient), _weighted(gradient, 2.0), strict=True):
+        yield float(np.abs(small.weights - large.weights).max() / np.abs(small.weights).max())
 
 
-@check
-def shape(gradient: Gradient) -> Verdict:
+@KIT.problems("(m, d), finite")
+def shape(gradient: Gradient) -> Iterator[str]:
     """There is one finite weight vector for every pair."""
-    for one in _arrangements(gradient):
-        expected = one.pairs.offsets.shape
-        if one.weights.shape != expected or not np.all(np.isfinite(one.weights)):
-            return Verdict(False, f"weights {one.weights.shape}, pairs {expected}, or not finite")
-    return Verdict(True, "(m, d), finite")
+    for body in _weighted(gradient):
+        expected = body.pairs.offsets.shape
+        if body.weights.shape != expected or not np.all(np.isfinite(body.weights)):
+            yield f"weights {body.weights.shape}, pairs {expected}, or not finite"
 
 
-@check
-def leaves_its_input(gradient: Gradient) -> Verdict:
-    """Kernel gradients and volumes are left as they were, and the same ones give the same weights
-    again."""
-    for d, rng in seeded():
-        X = scattered(rng, _CELLS[d], _SPACING)
-        pairs = neighbour_pairs(X, _COVER * _SPACING)
-        W = smoothing_kernel(construct("kernels", _KERNEL), d, _COVER * _SPACING)
-        slopes, volumes = W.gradient(pairs.offsets, pairs.distances), np.full(len(X), _SPACING**d)
+@KIT.problems("untouched")
+def leaves_its_input(gradient: Gradient) -> Iterator[str]:
+    """Kernel gradients and volumes are not changed in place, and give the same weights again."""
+    for X, pairs, slopes, volumes in _bodies():
+        d = X.shape[1]
         before = slopes.copy(), volumes.copy()
         first = gradient.weights(pairs, slopes, volumes)
         if not (np.array_equal(before[0], slopes) and np.array_equal(before[1], volumes)):
-            return Verdict(False, f"{d}D: they were changed in place")
+            yield f"{d}D: they were changed in place"
         if not np.array_equal(first, gradient.weights(pairs, slopes, volumes)):
-            return Verdict(False, f"{d}D: the same question got another answer")
-    return Verdict(True, "untouched")
-
-
-CHECKS: tuple[Check, ...] = (
-    exact_degree,
-    no_higher_degree,
-    inverse_length,
-    shape,
-    leaves_its_input,
-)
+            yield f"{d}D: the same input gave other weights"
 
 
 def _powers(dimension: int, degree: int) -> list[tuple[int, ...]]:

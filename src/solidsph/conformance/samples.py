@@ -1,15 +1,17 @@
-"""Rotations and deformation gradients from plain numbers, and arrangements without symmetry."""
+"""Samples for checks: random deformations, particles without symmetry, differences."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import wraps
 from math import cos, sin
 from typing import Any, TypeVar
 
 import numpy as np
 
-from solidsph.maths.arrays import Array
+from solidsph.errors import SceneError, SolidsphError
+from solidsph.interfaces.material import Material
+from solidsph.maths.arrays import Array, Tensor
 
 Made = TypeVar("Made")
 
@@ -38,7 +40,7 @@ def deformation_gradient(stretches: Sequence[float], left: Array, right: Array) 
 
 
 def random_rotation(rng: np.random.Generator, dimension: int) -> Array:
-    """A rotation (d, d) with each angle up to half a turn either way."""
+    """Rotation (d, d) with each angle up to half a turn either way."""
     return rotation(dimension, rng.uniform(-np.pi, np.pi, ANGLES[dimension]).tolist())
 
 
@@ -57,6 +59,18 @@ def random_deformation_gradients(rng: np.random.Generator, dimension: int, count
     )
 
 
+def in_space(F: Array) -> Array:
+    """F (d, d, n) as (3, 3, n), with the missing stretches 1."""
+    whole = np.repeat(np.eye(3)[:, :, None], F.shape[2], axis=2)
+    whole[: len(F), : len(F)] = F
+    return whole
+
+
+def as_tuples(A: Array) -> Tensor:
+    """A matrix (d, d) as nested tuples of numbers."""
+    return tuple(tuple(float(a) for a in row) for row in A)
+
+
 def scattered(rng: np.random.Generator, cells: Sequence[int], spacing: float) -> Array:
     """A lattice over a box, each particle moved by up to a fifth of a spacing, (n, d) [m]."""
     axes = [np.arange(count) + 0.5 for count in cells]
@@ -71,14 +85,52 @@ def central_difference(f: Callable[[Array], Array], at: Array, along: Array, ste
     return np.asarray(sum(change) / (60.0 * step))
 
 
+def stiffness(material: Material) -> float:
+    """lambda + 2 mu, the scale of stresses [Pa]."""
+    lam, mu = material.lame_parameters
+    return lam + 2.0 * mu
+
+
+def relative_error(material: Material, difference: Any) -> float:
+    """The largest of differences of stresses or energy densities, over the stiffness [-]."""
+    return float(np.abs(difference).max()) / stiffness(material)
+
+
 def seeded() -> Iterator[tuple[int, np.random.Generator]]:
     """Each dimension with random numbers of its own, the same in every run."""
     for dimension in DIMENSIONS:
         yield dimension, np.random.default_rng(dimension)
 
 
-def made_once(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
-    """`make`, which remembers what it made of the last part: checks of a part come one by one."""
+def accepted(
+    what: str,
+    attempts: Iterable[tuple[str, Callable[[], Made]]],
+    refusal: tuple[type[SolidsphError], ...] = (SceneError,),
+) -> list[Made]:
+    """Results of those attempts, each given with its name, that a part does not refuse.
+
+    Args:
+        what: what is attempted, for the message.
+        attempts: functions that make a sample.
+        refusal: errors that refuse one.
+
+    Raises:
+        SceneError: every attempt is refused.
+    """
+    made: list[Made] = []
+    refusals: list[str] = []
+    for name, make in attempts:
+        try:
+            made.append(make())
+        except refusal as cause:
+            refusals.append(f"{name}: {cause}")
+    if not made:
+        raise SceneError(f"every {what} is refused; the first, {refusals[0]}")
+    return made
+
+
+def kept_for_last(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
+    """`make` with its last result kept: a part's checks run one after the other."""
     kept: list[tuple[object, Made]] = []
 
     @wraps(make)
