@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -39,6 +39,8 @@ class ApproximateNeumann(BoundaryHandler):
     where: Where  # a face such as "left", or a condition on the surface
     traction: Mapping[str, Component]  # such as {x = 0, y = "-1e5"} [Pa]
     ghosts: Where = "ghosts"  # those whose stress may change with it
+
+    example: ClassVar[Mapping[str, Any]] = {"where": "left", "traction": {"x": "1e3*sin(300*t)"}}
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         particles = model.particles

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import final
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, final
 
 import attrs
 
@@ -24,6 +24,8 @@ class Clamp(BoundaryHandler):
 
     where: Where
     axes: Sequence[str] | None = None  # such as ["x", "y"]
+
+    example: ClassVar[Mapping[str, Any]] = {"where": "left"}
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         names = COMPONENTS[: model.particles.dimension]

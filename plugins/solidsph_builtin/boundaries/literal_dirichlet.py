@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -37,6 +37,11 @@ class LiteralDirichlet(BoundaryHandler):
     displacement: Mapping[str, Component]  # such as {x = "0.1*Y"} [m]
     ghosts: Where = "ghosts"  # those that may change with them
     extension: Mapping[str, Component] | None = None  # ghosts' values, if known; else reflected
+
+    example: ClassVar[Mapping[str, Any]] = {
+        "where": "left",
+        "displacement": {"x": "0.002*sin(300*t)"},
+    }
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         return [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import Any, ClassVar, final
 
 import attrs
 
@@ -26,6 +26,11 @@ class PrescribedMotion(BoundaryHandler):
 
     where: Where
     displacement: Mapping[str, Component]  # such as {x = "0.1*t", y = 0} [m]
+
+    example: ClassVar[Mapping[str, Any]] = {
+        "where": "left",
+        "displacement": {"x": "0.002*sin(300*t)"},
+    }
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         field = VectorField.of(self.displacement, "prescribed-motion: displacement", end=model.end)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -36,6 +36,8 @@ class Pressure(BoundaryHandler):
 
     where: Where  # a face such as "inner", or a condition on the surface
     pressure: Component  # p such as "5e6*min(t/1e-3, 1)", positive when it pushes [Pa]
+
+    example: ClassVar[Mapping[str, Any]] = {"where": "left", "pressure": "1e3*sin(300*t)"}
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         particles = model.particles

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -38,6 +38,8 @@ class Symmetry(BoundaryHandler):
 
     axis: str
     at: float = number(default=0.0)  # [m]
+
+    example: ClassVar[Mapping[str, Any]] = {"axis": "x"}
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         particles = model.particles

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -36,6 +36,8 @@ class Traction(BoundaryHandler):
 
     where: Where  # a face such as "right", or a condition on the surface
     traction: Mapping[str, Component]  # such as {x = "5e6*min(t/1e-3, 1)"} [Pa]
+
+    example: ClassVar[Mapping[str, Any]] = {"where": "left", "traction": {"x": "1e3*sin(300*t)"}}
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         particles = model.particles

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import final
+from collections.abc import Mapping
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -30,6 +31,8 @@ class FittedMoments(Discretisation):
     """
 
     of: Discretisation = attrs.field(metadata={"part": "discretisations"})
+
+    example: ClassVar[Mapping[str, Any]] = {"of": "lattice"}
 
     def particles(self, shape: Shape, spacing: float) -> Particles:
         """As in the interface.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import final
+from collections.abc import Mapping
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -34,6 +35,8 @@ class Jittered(Discretisation):
     of: Discretisation = attrs.field(metadata={"part": "discretisations"})
     amplitude: float = attrs.field(converter=as_number)  # in spacings, 0 <= amplitude < 1/2 [-]
     seed: int  # of the random numbers: the same seed gives the same particles
+
+    example: ClassVar[Mapping[str, Any]] = {"of": "lattice", "amplitude": 0.2, "seed": 1}
 
     def __attrs_post_init__(self) -> None:
         check_noise(self, self.amplitude, self.seed)

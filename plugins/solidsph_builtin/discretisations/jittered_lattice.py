@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -34,6 +35,8 @@ class JitteredLattice(Discretisation):
     seed: int  # of the random numbers: the same seed gives the same particles
     ghosts: int = 0  # layers
     ghost_faces: Sequence[str] | None = None  # where there are ghosts; behind every face if None
+
+    example: ClassVar[Mapping[str, Any]] = {"amplitude": 0.2, "seed": 1}
 
     def __attrs_post_init__(self) -> None:
         check_noise(self, self.amplitude, self.seed)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -40,6 +40,13 @@ class Mapped(Discretisation):
     of: Discretisation = attrs.field(metadata={"part": "discretisations"})
     before: Shape = attrs.field(metadata={"part": "shapes"})
     to: Mapping[str, Component]  # {x = "X + 0.1*Y**2"} [m]
+
+    # The rectangle of the conformance kit, mapped to itself.
+    example: ClassVar[Mapping[str, Any]] = {
+        "of": "lattice",
+        "before": {"type": "box", "lengths": [1.2, 0.8]},
+        "to": {"x": "X + 0.05*sin(2*pi*X/1.2)"},
+    }
 
     def particles(self, shape: Shape, spacing: float) -> Particles:
         """As in the interface.

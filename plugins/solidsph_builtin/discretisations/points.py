@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from reprlib import repr as short
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -66,6 +67,11 @@ class Points(Discretisation):
     positions: Array | None = attrs.field(default=None, converter=_as_array)  # (n, d) [m]
     file: str | Path | None = None
     volumes: Array | None = attrs.field(default=None, converter=_as_array)  # (n,) [m^d]
+
+    # Points in the rectangle of the conformance kit.
+    example: ClassVar[Mapping[str, Any]] = {
+        "positions": [[0.05 + 0.1 * i, 0.05 + 0.1 * j] for i in range(12) for j in range(8)]
+    }
 
     def __attrs_post_init__(self) -> None:
         if (self.positions is None) == (self.file is None):

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from solidsph.errors import SceneError
 from solidsph.registry.parameters import check_positive
+
+RUBBER: Mapping[str, float] = {"youngs_modulus": 1e6, "poissons_ratio": 0.3, "density": 1000.0}
+"""A soft solid: example values [Pa], [-], [kg/m^3]."""
 
 
 def checked_lame(

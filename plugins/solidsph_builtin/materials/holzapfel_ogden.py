@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, final
 
 import attrs
@@ -81,6 +82,23 @@ class HolzapfelOgden(Material):
     density: float = number()  # rho_0 [kg/m^3]
     fibre: tuple[float, ...] = direction((1.0, 0.0, 0.0))
     sheet: tuple[float, ...] = direction((0.0, 1.0, 0.0))
+
+    # Fibres of the stiffness of rubber: real ones stiffen so fast that at the 40 % of strain of the
+    # conformance kit their stress would be a million times its scale.
+    example: ClassVar[Mapping[str, Any]] = {
+        "matrix_stiffness": 3e5,
+        "matrix_exponent": 0.5,
+        "fibre_stiffness": 2e5,
+        "fibre_exponent": 0.6,
+        "sheet_stiffness": 1e5,
+        "sheet_exponent": 0.4,
+        "coupling_stiffness": 0.5e5,
+        "coupling_exponent": 0.3,
+        "bulk_modulus": 1e6 / 1.2,
+        "density": 1000.0,
+        "fibre": [0.8, 0.6, 0.0],
+        "sheet": [-0.36, 0.48, 0.8],
+    }
 
     isotropic: ClassVar[bool] = False
     smooth: ClassVar[bool] = False

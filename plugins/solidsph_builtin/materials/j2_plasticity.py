@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -24,7 +24,7 @@ from solidsph_builtin.materials._flow import (
     strain_of_flow,
 )
 from solidsph_builtin.materials._isochoric import energy_of, stress_of, tangent_of
-from solidsph_builtin.materials._lame import checked_lame
+from solidsph_builtin.materials._lame import RUBBER, checked_lame
 from solidsph_builtin.materials._symmetric import component_count, components, names
 from solidsph_builtin.materials._wide import narrowed, widened, widened_change
 
@@ -59,6 +59,15 @@ class J2Plasticity(HistoryMaterial):
     hardening: float = number(default=0.0)  # slope over the plastic strain [Pa]
     saturation_stress: float = number(default=0.0)  # [Pa]; 0: there is none, the yield stress stays
     saturation_exponent: float = number(default=1.0)  # [-]
+
+    # The conformance kit strains by ten times the strain of first yield and more.
+    example: ClassVar[Mapping[str, Any]] = {
+        **RUBBER,
+        "yield_stress": 1e4,
+        "hardening": 2e4,
+        "saturation_stress": 1.5e4,
+        "saturation_exponent": 20.0,
+    }
 
     shown: ClassVar[Sequence[str]] = (PLASTIC_STRAIN,)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -24,7 +24,7 @@ from solidsph_builtin.materials._flow import (
     strain_of_flow,
 )
 from solidsph_builtin.materials._isochoric import energy_of, stress_of, tangent_of
-from solidsph_builtin.materials._lame import checked_lame
+from solidsph_builtin.materials._lame import RUBBER, checked_lame
 from solidsph_builtin.materials._symmetric import component_count, components, names
 from solidsph_builtin.materials._wide import narrowed, widened, widened_change
 from solidsph_builtin.materials.j2_plasticity import PLASTIC_STRAIN
@@ -68,6 +68,17 @@ class JohnsonCook(HistoryMaterial):
     reference_temperature: float = number(default=293.0)  # [K]
     temperature: float = number(default=293.0)  # at the start [K]
     heat_share: float = number(default=0.9)  # of the plastic work [-]
+
+    example: ClassVar[Mapping[str, Any]] = {
+        **RUBBER,
+        "yield_stress": 1e4,
+        "hardening_modulus": 2e4,
+        "hardening_exponent": 0.3,
+        "rate_coefficient": 0.02,
+        "softening_exponent": 1.1,
+        "melting_temperature": 500.0,
+        "specific_heat": 0.1,  # so that such a soft solid warms at all
+    }
 
     shown: ClassVar[Sequence[str]] = (PLASTIC_STRAIN, TEMPERATURE)
     rate_dependent: ClassVar[bool] = True

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, final
+from collections.abc import Mapping
+from typing import Any, ClassVar, final
 
 import attrs
 
@@ -10,7 +11,7 @@ from solidsph.interfaces.material import Material
 from solidsph.maths.arrays import Scalar, Tensor
 from solidsph.maths.tensors import add, contraction, identity, scale, small_strain, trace, transpose
 from solidsph.registry.parameters import number
-from solidsph_builtin.materials._lame import checked_lame
+from solidsph_builtin.materials._lame import RUBBER, checked_lame
 
 
 @final
@@ -24,6 +25,8 @@ class LinearElastic(Material):
     youngs_modulus: float = number()  # E [Pa]
     poissons_ratio: float = number()  # nu [-]
     density: float = number()  # rho_0 [kg/m^3]
+
+    example: ClassVar[Mapping[str, Any]] = RUBBER
 
     objective: ClassVar[bool] = False
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import final
+from collections.abc import Mapping
+from typing import Any, ClassVar, final
 
 import attrs
 
@@ -19,7 +20,7 @@ from solidsph.maths.tensors import (
     transpose,
 )
 from solidsph.registry.parameters import number
-from solidsph_builtin.materials._lame import checked_lame
+from solidsph_builtin.materials._lame import RUBBER, checked_lame
 
 
 @final
@@ -34,6 +35,8 @@ class SaintVenantKirchhoff(Material):
     youngs_modulus: float = number()  # E [Pa]
     poissons_ratio: float = number()  # nu [-]
     density: float = number()  # rho_0 [kg/m^3]
+
+    example: ClassVar[Mapping[str, Any]] = RUBBER
 
     def __attrs_post_init__(self) -> None:
         checked_lame(

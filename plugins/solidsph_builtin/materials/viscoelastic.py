@@ -22,7 +22,7 @@ from solidsph.maths.tensors import (
     transpose,
 )
 from solidsph.registry.parameters import number
-from solidsph_builtin.materials._lame import checked_lame
+from solidsph_builtin.materials._lame import RUBBER, checked_lame
 from solidsph_builtin.materials._symmetric import (
     component_count,
     components,
@@ -77,6 +77,11 @@ class Viscoelastic(HistoryMaterial):
     youngs_modulus: float = number()  # of a sudden load, E [Pa]
     poissons_ratio: float = number()  # of a sudden load, nu [-]
     density: float = number()  # rho_0 [kg/m^3]
+
+    example: ClassVar[Mapping[str, Any]] = {
+        **RUBBER,
+        "prony": [{"share": 0.4, "time": 1e-2}, {"share": 0.2, "time": 1.0}],  # [-], [s]
+    }
 
     rate_dependent: ClassVar[bool] = True
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from reprlib import repr as short
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -36,6 +38,8 @@ class Annulus(Shape):
     centre: tuple[float, ...] = attrs.field(  # [m]
         default=(0.0, 0.0), converter=as_numbers, validator=check_coordinates(2)
     )
+
+    example: ClassVar[Mapping[str, Any]] = {"inner_radius": 0.2, "outer_radius": 0.5}
 
     def __attrs_post_init__(self) -> None:
         if self.inner_radius >= self.outer_radius:

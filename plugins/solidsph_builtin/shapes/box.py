@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Mapping
 from reprlib import repr as short
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -42,6 +43,8 @@ class Box(Shape):
         converter=as_numbers,
         validator=check_coordinates(1, 2, 3),
     )
+
+    example: ClassVar[Mapping[str, Any]] = {"lengths": [1.2, 0.8]}
 
     def __attrs_post_init__(self) -> None:
         if len(self.origin) != len(self.lengths):

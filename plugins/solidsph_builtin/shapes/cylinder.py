@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from reprlib import repr as short
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -43,6 +44,8 @@ class Cylinder(Shape):
         default=(0.0, 0.0, 0.0), converter=as_numbers, validator=check_coordinates(3)
     )
     axis: str = attrs.field(default="z", validator=_axis)  # from the base to the end
+
+    example: ClassVar[Mapping[str, Any]] = {"radius": 0.5, "length": 1.3}
 
     @property
     def dimension(self) -> int:

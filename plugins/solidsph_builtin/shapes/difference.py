@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from reprlib import repr as short
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -34,6 +35,11 @@ class Difference(Shape):
     minus: tuple[Shape, ...] = attrs.field(
         converter=as_parts, validator=check_parts, metadata={"part": "shapes"}
     )
+
+    example: ClassVar[Mapping[str, Any]] = {
+        "of": {"type": "box", "lengths": [1.2, 0.8]},
+        "minus": {"type": "disc", "radius": 0.22, "centre": [0.6, 0.4]},
+    }
 
     def __attrs_post_init__(self) -> None:
         dimension = self.minus[0].dimension

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -25,6 +27,8 @@ class Disc(Shape):
     centre: tuple[float, ...] = attrs.field(  # [m]
         default=(0.0, 0.0), converter=as_numbers, validator=check_coordinates(2)
     )
+
+    example: ClassVar[Mapping[str, Any]] = {"radius": 0.5}
 
     @property
     def dimension(self) -> int:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
 import attrs
 import numpy as np
 
@@ -22,6 +25,8 @@ class Interval(Shape):
     origin: float = attrs.field(  # left end [m]
         default=0.0, converter=as_number, validator=check_coordinate
     )
+
+    example: ClassVar[Mapping[str, Any]] = {"length": 1.3}
 
     @property
     def dimension(self) -> int:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from reprlib import repr as short
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -46,6 +47,10 @@ class Polygon(Shape):
     vertices: tuple[tuple[float, ...], ...] = attrs.field(  # [m]
         converter=_as_ring, validator=_check_vertices
     )
+
+    example: ClassVar[Mapping[str, Any]] = {
+        "vertices": [[0.0, 0.0], [1.2, 0.0], [0.5, 0.3], [0.0, 0.9]]
+    }
 
     def __attrs_post_init__(self) -> None:
         starts, ends = self._edges()

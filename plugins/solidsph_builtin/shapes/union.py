@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -32,6 +33,13 @@ class Union(Shape):
     of: tuple[Shape, ...] = attrs.field(
         converter=as_parts, validator=check_parts, metadata={"part": "shapes"}
     )
+
+    example: ClassVar[Mapping[str, Any]] = {
+        "of": [
+            {"type": "box", "lengths": [1.2, 0.8]},
+            {"type": "disc", "radius": 0.3, "centre": [1.2, 0.8]},
+        ]
+    }
 
     @property
     def dimension(self) -> int:
