@@ -1,4 +1,4 @@
-"""Particles held where they are in the reference configuration."""
+"""Particles held at their reference positions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from solidsph_builtin.boundaries._reports import COMPONENTS
 @final
 @attrs.frozen
 class Clamp(BoundaryHandler):
-    """u = 0 on the chosen particles, along the chosen axes (all by default)."""
+    """u = 0 on the particles at `where`, along `axes` (all by default)."""
 
     where: Where
     axes: Sequence[str] | None = None  # such as ["x", "y"]

@@ -26,17 +26,17 @@ from solidsph_builtin.boundaries._dirichlet import (
 @final
 @attrs.frozen
 class FullDirichlet(BoundaryHandler):
-    """Solves W_BG,BG u_new = u_BG - W_BG,I u_I, so that the approximation equals the given value at
+    """Solve W_BG,BG u_new = u_BG - W_BG,I u_I, so that the approximation equals the given value at
     the boundary and its smooth extension at the ghosts.
 
-    Ismail & Reddy, eq. 11, with the contribution of the interior that the printed matrix leaves
-    out. Exact, but badly conditioned: for comparison with `exact-dirichlet`.
+    Ismail & Reddy, eq. 11, with the contribution of the interior, which the printed matrix
+    omits. Exact, but badly conditioned: for comparison with `exact-dirichlet`.
     """
 
     where: Where  # boundary particles
     displacement: Mapping[str, Component]  # such as {x = "0.1*Y"} [m]
     ghosts: Where = "ghosts"  # those that may change with them
-    extension: Mapping[str, Component] | None = None  # ghosts' values, if known; else reflected
+    extension: Mapping[str, Component] | None = None  # at ghosts; reflected if None
 
     example: ClassVar[Mapping[str, Any]] = {
         "where": "left",
@@ -44,18 +44,7 @@ class FullDirichlet(BoundaryHandler):
     }
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
-        return [
-            smoothed_value(
-                model,
-                label,
-                where=self.where,
-                ghosts=self.ghosts,
-                displacement=self.displacement,
-                extension=self.extension,
-                handler="full-dirichlet",
-                solve=_FullSolve.of,
-            )
-        ]
+        return [smoothed_value(self, "full-dirichlet", _FullSolve.of, model, label)]
 
 
 @final

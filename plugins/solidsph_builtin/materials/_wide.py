@@ -1,4 +1,4 @@
-"""One, two and three dimensions as three: the missing stretches are 1."""
+"""Tensors of one and two dimensions as (3, 3): the missing stretches are 1."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def widened(F: Tensor) -> Tensor:
 
 
 def widened_change(dF: Tensor) -> Tensor:
-    """The same of a change of F, in which the missing stretches do not change."""
+    """The change (3, 3) of such a deformation gradient; the missing stretches do not change."""
     if len(dF) == 1:
         return ((dF[0][0], 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     if len(dF) == 2:
@@ -32,7 +32,7 @@ def widened_change(dF: Tensor) -> Tensor:
 
 
 def narrowed(A: Tensor, like: Tensor) -> Tensor:
-    """What of a tensor (3, 3) lies in the dimensions of `like`."""
+    """The components of a tensor (3, 3) in the dimensions of `like`."""
     if len(like) == 1:
         return ((A[0][0],),)
     if len(like) == 2:

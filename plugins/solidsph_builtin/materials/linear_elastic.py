@@ -11,7 +11,7 @@ from solidsph.interfaces.material import Material
 from solidsph.maths.arrays import Scalar, Tensor
 from solidsph.maths.tensors import add, contraction, identity, scale, small_strain, trace, transpose
 from solidsph.registry.parameters import number
-from solidsph_builtin.materials._lame import RUBBER, checked_lame
+from solidsph_builtin.materials._lame import RUBBER, check_elastic, lame
 
 
 @final
@@ -31,13 +31,11 @@ class LinearElastic(Material):
     objective: ClassVar[bool] = False
 
     def __attrs_post_init__(self) -> None:
-        checked_lame("linear-elastic", self.youngs_modulus, self.poissons_ratio, self.density)
+        check_elastic("linear-elastic", self)
 
     @property
     def lame_parameters(self) -> tuple[float, float]:
-        return checked_lame(
-            "linear-elastic", self.youngs_modulus, self.poissons_ratio, self.density
-        )
+        return lame(self)
 
     @property
     def params(self) -> tuple[float, ...]:

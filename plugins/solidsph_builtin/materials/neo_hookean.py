@@ -20,7 +20,7 @@ from solidsph.maths.tensors import (
     transpose,
 )
 from solidsph.registry.parameters import number
-from solidsph_builtin.materials._lame import RUBBER, checked_lame
+from solidsph_builtin.materials._lame import RUBBER, check_elastic, lame
 
 
 @final
@@ -38,11 +38,11 @@ class NeoHookean(Material):
     example: ClassVar[Mapping[str, Any]] = RUBBER
 
     def __attrs_post_init__(self) -> None:
-        checked_lame("neo-hookean", self.youngs_modulus, self.poissons_ratio, self.density)
+        check_elastic("neo-hookean", self)
 
     @property
     def lame_parameters(self) -> tuple[float, float]:
-        return checked_lame("neo-hookean", self.youngs_modulus, self.poissons_ratio, self.density)
+        return lame(self)
 
     @property
     def params(self) -> tuple[float, ...]:

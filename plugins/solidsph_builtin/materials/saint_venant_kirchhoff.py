@@ -20,7 +20,7 @@ from solidsph.maths.tensors import (
     transpose,
 )
 from solidsph.registry.parameters import number
-from solidsph_builtin.materials._lame import RUBBER, checked_lame
+from solidsph_builtin.materials._lame import RUBBER, check_elastic, lame
 
 
 @final
@@ -39,15 +39,11 @@ class SaintVenantKirchhoff(Material):
     example: ClassVar[Mapping[str, Any]] = RUBBER
 
     def __attrs_post_init__(self) -> None:
-        checked_lame(
-            "saint-venant-kirchhoff", self.youngs_modulus, self.poissons_ratio, self.density
-        )
+        check_elastic("saint-venant-kirchhoff", self)
 
     @property
     def lame_parameters(self) -> tuple[float, float]:
-        return checked_lame(
-            "saint-venant-kirchhoff", self.youngs_modulus, self.poissons_ratio, self.density
-        )
+        return lame(self)
 
     @property
     def params(self) -> tuple[float, ...]:

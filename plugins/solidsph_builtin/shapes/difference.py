@@ -28,7 +28,7 @@ class Difference(Shape):
     box leaves left and hole-left.
 
     Raises:
-        SceneError: one is not a shape, nothing is removed, or the dimensions differ.
+        SceneError: a value is not a shape, nothing is removed, or the dimensions differ.
     """
 
     of: Shape = attrs.field(validator=_check_shape, metadata={"part": "shapes"})
@@ -49,7 +49,6 @@ class Difference(Shape):
 
     @property
     def dimension(self) -> int:
-        """That of the shapes."""
         return self.of.dimension
 
     def bounds(self) -> tuple[Array, Array]:
@@ -57,14 +56,14 @@ class Difference(Shape):
         return self.of.bounds()
 
     def signed_distance(self, points: Array) -> Array:
-        """As in the interface; outside, no more than the distance."""
+        """The distance; outside, a lower bound of it."""
         distance = self.of.signed_distance(points)
         for part in self.minus:
             distance = np.maximum(distance, -part.signed_distance(points))
         return distance
 
     def surface(self, spacing: float) -> Surface:
-        """As in the interface, closed but for a sample wherever two boundaries cross."""
+        """Samples of a surface that is closed up to a sample where two boundaries cross."""
         outer = self.of.surface(spacing)
         taken = frozenset(outer.faces)
         surfaces = [outer, *(_inverted(part.surface(spacing), taken) for part in self.minus)]
