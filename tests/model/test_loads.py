@@ -160,7 +160,7 @@ def test_pressure_and_the_smoothed_traction_keep_to_the_face_too() -> None:
         .boundary("approximate-neumann", where="top and X > 0.35", traction={"y": 1.0}, label="n")
         .build()
     )
-    (own,) = (c for c in smoothed.conditions if c.label == "n")
+    (own,) = (c for c in smoothed.terms if c.label == "n")
     report = own.report(smoothed.dynamics.observe(smoothed.initial))
     # The same seven particles as above; at the corner the normal is that of the top alone.
     assert report["n asked resultant y [N]"] == pytest.approx(0.65, rel=1e-12)

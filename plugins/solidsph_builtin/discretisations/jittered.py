@@ -1,4 +1,4 @@
-"""Jittered: the particles of another discretisation, those inside the body a little off."""
+"""Jittered: another discretisation with random displacements inside the body."""
 
 from __future__ import annotations
 
@@ -20,13 +20,12 @@ from solidsph_builtin.shapes._checks import as_number
 @final
 @attrs.frozen
 class Jittered(Discretisation):
-    """The particles that `of` gives, each that owns no surface moved by a random displacement.
+    """The particles of `of`, with random displacements of those that own no surface.
 
-    So an arrangement without rows, that follows the boundary all the same: about
-    `conforming-lattice` for one. Along each axis the displacement is uniform in
-    [-amplitude, amplitude] spacings. One that would leave the shape is halved until it does not.
-    The volume of a particle is what part of the shape is nearest to it now, scaled to the volume
-    of all before; areas and tags stay.
+    With `conforming-lattice`, for example, this arrangement has no rows and still follows the
+    boundary. Along each axis the displacement is uniform in [-amplitude, amplitude] spacings; one
+    that would leave the shape is halved until it does not. The volume of a particle is the part of
+    the shape nearest to it, scaled to the former total volume; areas and tags do not change.
 
     Raises:
         SceneError: a parameter is of the wrong kind or out of range.
@@ -42,7 +41,7 @@ class Jittered(Discretisation):
         check_noise(self, self.amplitude, self.seed)
 
     def particles(self, shape: Shape, spacing: float) -> Particles:
-        """As in the interface.
+        """The displaced particles.
 
         Raises:
             SceneError: `of` has ghosts, which would no longer be images of particles.
