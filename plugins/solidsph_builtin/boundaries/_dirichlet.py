@@ -1,4 +1,4 @@
-"""What the three ways to impose a smoothed boundary value have in common.
+"""A smoothed boundary value, which three handlers impose in different ways.
 
 In the paper's Dirichlet condition the *approximation* <u> = W u takes the given value at the
 boundary particles (eqs. 9 to 12). The unknowns are the values of the boundary particles and of the

@@ -22,10 +22,10 @@ from solidsph_builtin.gradients.quadratic import Quadratic, closeness
 # neighbours do not determine; no condition can be imposed on those.
 _DEPENDENT = 1e-10
 
-# How far the sums of surface particles may miss their area, beside the change of the weights that
-# would be needed: sampled areas may disagree with the volumes, and then none is exact. It must be
-# small: a multiplier that varies over n particles costs n^-6 of one that alternates, so that with
-# 1e-6 the loads on a side of 48 particles were missed by enough to spoil the second order.
+# How far the sums of surface particles may miss their area, relative to the change of the weights:
+# sampled areas may disagree with the volumes, and then no weights are exact. It must be small: a
+# multiplier that varies over n particles costs n^-6 of one that alternates, so that with 1e-6 the
+# loads on a side of 48 particles had errors large enough to spoil the second order.
 _AT_SURFACE = 1e-9
 
 # Keeps the matrix regular in spite of smooth fields, which hardly change any weight; corrected by
@@ -133,7 +133,7 @@ class _OfBody(Gradient):
 
 @attrs.frozen(eq=False)
 class _Change:
-    """How the weights of some rows change with the multipliers."""
+    """Change of the weights of some rows with the multipliers."""
 
     pairs: Pairs
     closeness: Array  # (m,) w
@@ -159,7 +159,7 @@ class _Change:
         return cls(pairs, w, np.einsum("mi,mij->mj", basis, pairs.spread(units)), volumes)
 
     def weights(self, multipliers: Array) -> Array:
-        """What the multipliers (n, d) add to the weights, (m, d)."""
+        """Change of the weights by multipliers (n, d), (m, d)."""
         pairs, w, b = self.pairs, self.closeness, self.tests
         y = multipliers[pairs.columns] - multipliers[pairs.rows]
         for _ in range(2):  # a single pass leaves rounding, which shows as stress in a rotation

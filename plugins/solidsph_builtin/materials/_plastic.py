@@ -1,4 +1,4 @@
-"""What the laws of plastic metals share: the elastic energy and its history.
+"""The elastic energy and the history that the laws of plastic metals share.
 
 psi = kappa/2 ((J^2 - 1)/2 - ln J) + mu/2 (J^(-2/3) C : C_p^-1 - 3), with det C_p = 1. The
 history is C_p^-1, the plastic strain, whatever a law adds, and the dissipated energy; the

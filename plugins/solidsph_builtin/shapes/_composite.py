@@ -1,4 +1,4 @@
-"""What shapes made of other shapes share: their parts, and what remains of the boundaries."""
+"""Helpers of shapes made of other shapes: their parts, and what remains of the boundaries."""
 
 from __future__ import annotations
 

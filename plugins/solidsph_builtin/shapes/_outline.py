@@ -32,15 +32,13 @@ class Outline:
         lengths = np.hypot(*edges.T)
         # Pieces no longer than an edge is on average: there are at most twice as many.
         counts = np.ceil(lengths / lengths.mean()).astype(np.intp)
-        owners = np.repeat(np.arange(len(starts)), counts)
-        within = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
-        along = (within + 0.5) / counts[owners]
+        owners, middles = pieces(starts, edges, counts)
         right = np.stack([edges[:, 1], -edges[:, 0]], axis=1) / lengths[:, np.newaxis]
         return cls(
             starts=starts,
             edges=edges,
             normals=right if counterclockwise else -right,
-            tree=cKDTree(starts[owners] + along[:, np.newaxis] * edges[owners]),
+            tree=cKDTree(middles),
             owners=owners,
             reach=0.5 * float((lengths / counts).max()),
         )
@@ -65,7 +63,7 @@ class Outline:
                 squares = _squared(self._offsets(points[rows, np.newaxis], edges)[0])
                 best = np.argmin(squares, axis=1)
                 nearest = np.take_along_axis(squares, best[:, np.newaxis], axis=1)[:, 0]
-                # No piece beyond those asked for can be nearer.
+                # No piece beyond those found can be nearer.
                 near = gaps[:, -1] - self.reach > np.sqrt(nearest)
                 near |= count == len(self.owners)
                 yield rows[near], edges[near, best[near]]
@@ -91,6 +89,14 @@ class Outline:
         outside = np.sum(gaps * normals, axis=1) >= 0.0
         distance = np.sqrt(_squared(gaps))
         return np.where(outside, distance, -distance)
+
+
+def pieces(starts: Array, edges: Array, counts: Indices) -> tuple[Indices, Array]:
+    """Edge (p,) and middle (p, 2) of each piece of edges in `counts` (m,) equal pieces."""
+    owners = np.repeat(np.arange(len(starts)), counts)
+    within = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
+    along = (within + 0.5) / counts[owners]
+    return owners, starts[owners] + along[:, np.newaxis] * edges[owners]
 
 
 def first_crossing(starts: Array, ends: Array) -> tuple[int, int] | None:

@@ -75,8 +75,5 @@ class Difference(Shape):
 
 def _inverted(surface: Surface, taken: frozenset[str]) -> Surface:
     """The boundary of a hole: normals point into it."""
-    return Surface(
-        points=surface.points,
-        area_vectors=-surface.area_vectors,
-        faces=tuple(f"hole-{face}" if face in taken else face for face in surface.faces),
-    )
+    faces = tuple(f"hole-{face}" if face in taken else face for face in surface.faces)
+    return attrs.evolve(surface, area_vectors=-surface.area_vectors, faces=faces)

@@ -13,7 +13,7 @@ import numpy as np
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes._checks import as_points, check_coordinates, refusal
-from solidsph_builtin.shapes._outline import Outline, first_crossing
+from solidsph_builtin.shapes._outline import Outline, first_crossing, pieces
 from solidsph_builtin.shapes._sampling import ON_LINE, samples_along
 
 
@@ -91,13 +91,11 @@ class Polygon(Shape):
         edges = ends - starts
         lengths = np.hypot(*edges.T).tolist()
         counts = np.array([samples_along(length, spacing, ON_LINE) for length in lengths])
-        owners = np.repeat(np.arange(len(edges)), counts)
-        within = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
-        along = (within + 0.5) / counts[owners]
+        owners, middles = pieces(starts, edges, counts)
         normals = np.sign(self._signed_area()) * np.stack([edges[:, 1], -edges[:, 0]], axis=1)
         names = [f"edge-{i}" for i in range(len(edges))]
         return Surface(
-            points=starts[owners] + along[:, np.newaxis] * edges[owners],
+            points=middles,
             area_vectors=(normals / counts[:, np.newaxis])[owners],
             faces=tuple(names[i] for i in owners.tolist()),
         )

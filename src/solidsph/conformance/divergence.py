@@ -8,16 +8,13 @@ import attrs
 import numpy as np
 
 from solidsph.conformance.check import Kit, Verdict, at_most, more_than
-from solidsph.conformance.samples import scattered, seeded
+from solidsph.conformance.samples import SPACING, Body, bodies, seeded, weights_problem
 from solidsph.interfaces.divergence import Divergence
 from solidsph.interfaces.gradient import Gradient
-from solidsph.interfaces.smoothing_kernel import smoothing_kernel
 from solidsph.maths.arrays import Array
-from solidsph.model.neighbours import Pairs, neighbour_pairs
+from solidsph.model.neighbours import Pairs
 from solidsph.registry.construct import construct
 
-_CELLS = {1: (20,), 2: (9, 8), 3: (6, 5, 5)}
-_SPACING = 0.05  # [m]
 _COVER = 2.5  # a particle in a corner has neighbours for a linear field
 _INSIDE = 3  # layers: as far as the cover reaches, and one more
 
@@ -42,29 +39,23 @@ class _Weighted:
     weights: Array  # (m, d)
 
     @classmethod
-    def of(cls, divergence: Divergence, X: Array, volumes: Array, support: float) -> _Weighted:
-        pairs = neighbour_pairs(X, support)
-        W = smoothing_kernel(construct("kernels", "modified-mollifier"), X.shape[1], support)
+    def of(cls, divergence: Divergence, body: Body) -> _Weighted:
         gradient: Gradient = construct("gradients", "corrected")
-        g = gradient.weights(pairs, W.gradient(pairs.offsets, pairs.distances), volumes)
-        return cls(X, pairs, volumes, g, divergence.weights(pairs, g, volumes))
+        pairs, volumes = body.pairs, body.volumes
+        g = gradient.weights(pairs, body.kernel_gradients, volumes)
+        return cls(body.positions, pairs, volumes, g, divergence.weights(pairs, g, volumes))
 
 
 def _bodies(divergence: Divergence, size: float = 1.0) -> Iterator[_Weighted]:
-    """Scattered free bodies in 1, 2 and 3D, with every length multiplied by `size`."""
-    for d, rng in seeded():
-        h = size * _SPACING
-        X = size * scattered(rng, _CELLS[d], _SPACING)
-        yield _Weighted.of(divergence, X, h**d * rng.uniform(0.9, 1.1, len(X)), _COVER * h)
+    for body in bodies(_COVER, size):
+        yield _Weighted.of(divergence, body)
 
 
 @KIT.problems("(m, d), finite")
 def shape(divergence: Divergence) -> Iterator[str]:
     """There is one finite weight vector for every pair."""
     for body in _bodies(divergence):
-        expected = body.pairs.offsets.shape
-        if body.weights.shape != expected or not np.all(np.isfinite(body.weights)):
-            yield f"weights {body.weights.shape}, pairs {expected}, or not finite"
+        yield weights_problem(body.weights, body.pairs)
 
 
 @KIT.errors(_ROUNDING)
@@ -81,15 +72,15 @@ def divergence_inside(divergence: Divergence) -> Iterator[float]:
     constant stress exerts none."""
     for d, rng in seeded():
         # The force on the particle in the middle reaches one layer less on either side.
-        axis = (np.arange(4 * _INSIDE + 1) - 2 * _INSIDE) * _SPACING
+        axis = (np.arange(4 * _INSIDE + 1) - 2 * _INSIDE) * SPACING
         X = np.stack([x.ravel() for x in np.meshgrid(*[axis] * d, indexing="ij")], axis=1)
-        volumes = np.full(len(X), _SPACING**d)
-        body = _Weighted.of(divergence, X, volumes, _COVER * _SPACING)
-        inside = np.abs(X).max(axis=1) < 0.5 * _SPACING
+        volumes = np.full(len(X), SPACING**d)
+        body = _Weighted.of(divergence, Body.of(X, volumes, _COVER * SPACING))
+        inside = np.abs(X).max(axis=1) < 0.5 * SPACING
         slope, constant = rng.normal(size=d), rng.normal()
-        T = constant + X @ slope / (len(axis) * _SPACING)
+        T = constant + X @ slope / (len(axis) * SPACING)
         terms = body.weights * T[body.pairs.columns, None]
-        expected = volumes[:, None] * slope / (len(axis) * _SPACING)
+        expected = volumes[:, None] * slope / (len(axis) * SPACING)
         error = np.abs(body.pairs.row_sums(terms) - expected)
         yield float(error[inside].max() / body.pairs.row_sums(np.abs(terms))[inside].max())
 

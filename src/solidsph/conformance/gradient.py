@@ -9,17 +9,12 @@ import attrs
 import numpy as np
 
 from solidsph.conformance.check import Kit, Verdict, at_most, more_than, worst
-from solidsph.conformance.samples import scattered, seeded
+from solidsph.conformance.samples import CELLS, SPACING, bodies, weights_problem
 from solidsph.interfaces.gradient import Gradient
-from solidsph.interfaces.smoothing_kernel import smoothing_kernel
 from solidsph.maths.arrays import Array
-from solidsph.model.neighbours import Pairs, neighbour_pairs
-from solidsph.registry.construct import construct
+from solidsph.model.neighbours import Pairs
 
-_CELLS = {1: (20,), 2: (9, 8), 3: (6, 5, 5)}
-_SPACING = 0.05  # [m]
 _COVER = 3.5  # in spacings: a particle in a corner has neighbours for second derivatives
-_KERNEL = "modified-mollifier"  # that of a scene which names none
 
 # Relative to the sum of |g_pq| |f_q|, what rounding can do to the sum, times the loss of a few
 # digits where a gradient solves a small linear system at every particle.
@@ -51,23 +46,11 @@ class _Weighted:
         return float(max(errors))
 
 
-def _bodies(size: float = 1.0) -> Iterator[tuple[Array, Pairs, Array, Array]]:
-    """Positions (n, d), pairs, kernel gradients (m, d) and volumes (n,) in 1, 2 and 3D, with every
-    length multiplied by `size`."""
-    for d, rng in seeded():
-        X = size * scattered(rng, _CELLS[d], _SPACING)
-        radius = _COVER * _SPACING * size
-        pairs = neighbour_pairs(X, radius)
-        volumes = (_SPACING * size) ** d * rng.uniform(0.9, 1.1, len(X))
-        W = smoothing_kernel(construct("kernels", _KERNEL), d, radius)
-        yield X, pairs, W.gradient(pairs.offsets, pairs.distances), volumes
-
-
 def _weighted(gradient: Gradient, size: float = 1.0) -> Iterator[_Weighted]:
-    for X, pairs, slopes, volumes in _bodies(size):
-        unit = max(_CELLS[X.shape[1]]) * _SPACING * size
-        weights = gradient.weights(pairs, slopes, volumes)
-        yield _Weighted((X - X.mean(axis=0)) / unit, pairs, weights * unit)
+    for body in bodies(_COVER, size):
+        X, unit = body.positions, max(CELLS[body.positions.shape[1]]) * SPACING * size
+        weights = gradient.weights(body.pairs, body.kernel_gradients, body.volumes)
+        yield _Weighted((X - X.mean(axis=0)) / unit, body.pairs, weights * unit)
 
 
 @KIT.check
@@ -107,22 +90,19 @@ def inverse_length(gradient: Gradient) -> Iterator[float]:
 def shape(gradient: Gradient) -> Iterator[str]:
     """There is one finite weight vector for every pair."""
     for body in _weighted(gradient):
-        expected = body.pairs.offsets.shape
-        if body.weights.shape != expected or not np.all(np.isfinite(body.weights)):
-            yield f"weights {body.weights.shape}, pairs {expected}, or not finite"
+        yield weights_problem(body.weights, body.pairs)
 
 
 @KIT.problems("untouched")
 def leaves_its_input(gradient: Gradient) -> Iterator[str]:
     """Kernel gradients and volumes are not changed in place, and give the same weights again."""
-    for X, pairs, slopes, volumes in _bodies():
-        d = X.shape[1]
-        before = slopes.copy(), volumes.copy()
-        first = gradient.weights(pairs, slopes, volumes)
-        if not (np.array_equal(before[0], slopes) and np.array_equal(before[1], volumes)):
-            yield f"{d}D: they were changed in place"
-        if not np.array_equal(first, gradient.weights(pairs, slopes, volumes)):
-            yield f"{d}D: the same input gave other weights"
+    for body in bodies(_COVER):
+        given = body.pairs, body.kernel_gradients.copy(), body.volumes.copy()
+        first = gradient.weights(*given)
+        if not all(map(np.array_equal, given[1:], (body.kernel_gradients, body.volumes))):
+            yield "they were changed in place"
+        if not np.array_equal(first, gradient.weights(*given)):
+            yield "the same input gave other weights"
 
 
 def _powers(dimension: int, degree: int) -> list[tuple[int, ...]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from math import atan2, cos, exp, hypot, log, sin, sqrt
 from typing import final
 
@@ -206,7 +207,7 @@ def bookkeeping(integrator: Integrator) -> Verdict:
     dynamics, step_size = _dynamics(), 0.01
     first = _initial()
     started = integrator.start(first, dynamics, step_size)
-    untouched = _copied(started)
+    untouched = deepcopy(started)
     after = integrator.advance(started, dynamics, step_size)
     again = integrator.advance(started, dynamics, step_size)
     problems = {
@@ -267,17 +268,6 @@ def _arrays(state: State) -> list[Array]:
         state.accelerations,
         *(array for mapping in mappings for _, array in sorted(mapping.items())),
     ]
-
-
-def _copied(state: State) -> State:
-    return attrs.evolve(
-        state,
-        positions=state.positions.copy(),
-        velocities=state.velocities.copy(),
-        accelerations=state.accelerations.copy(),
-        memory={name: array.copy() for name, array in state.memory.items()},
-        applied={name: array.copy() for name, array in state.applied.items()},
-    )
 
 
 def _same(first: State, second: State) -> bool:

@@ -7,11 +7,15 @@ from functools import wraps
 from math import cos, sin
 from typing import Any, TypeVar
 
+import attrs
 import numpy as np
 
 from solidsph.errors import SceneError, SolidsphError
 from solidsph.interfaces.material import Material
+from solidsph.interfaces.smoothing_kernel import smoothing_kernel
 from solidsph.maths.arrays import Array, Tensor
+from solidsph.model.neighbours import Pairs, neighbour_pairs
+from solidsph.registry.construct import construct
 
 Made = TypeVar("Made")
 
@@ -19,6 +23,10 @@ DIMENSIONS = (1, 2, 3)
 
 # How many angles a rotation takes in 1, 2 and 3 dimensions.
 ANGLES = {1: 0, 2: 1, 3: 3}
+
+# Of the bodies on which gradients and divergences are checked.
+CELLS = {1: (20,), 2: (9, 8), 3: (6, 5, 5)}
+SPACING = 0.05  # [m]
 
 _PLANES = ((0, 1), (1, 2), (2, 0))
 
@@ -76,6 +84,39 @@ def scattered(rng: np.random.Generator, cells: Sequence[int], spacing: float) ->
     axes = [np.arange(count) + 0.5 for count in cells]
     centres = np.stack([grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")], axis=1)
     return spacing * (centres + rng.uniform(-0.2, 0.2, centres.shape))
+
+
+@attrs.frozen(eq=False)
+class Body:
+    """Scattered particles with free surfaces, and what a gradient is given of them."""
+
+    positions: Array  # (n, d) [m]
+    pairs: Pairs
+    kernel_gradients: Array  # (m, d)
+    volumes: Array  # (n,) [m^d]
+
+    @classmethod
+    def of(cls, positions: Array, volumes: Array, radius: float) -> Body:
+        """Particles with the kernel of a scene that names none, with support `radius` [m]."""
+        pairs = neighbour_pairs(positions, radius)
+        kernel = construct("kernels", "modified-mollifier")
+        W = smoothing_kernel(kernel, positions.shape[1], radius)
+        return cls(positions, pairs, W.gradient(pairs.offsets, pairs.distances), volumes)
+
+
+def bodies(cover: float, size: float = 1.0) -> Iterator[Body]:
+    """Bodies in 1, 2 and 3D, with every length multiplied by `size`."""
+    for d, rng in seeded():
+        X, h = size * scattered(rng, CELLS[d], SPACING), size * SPACING
+        yield Body.of(X, h**d * rng.uniform(0.9, 1.1, len(X)), cover * h)
+
+
+def weights_problem(weights: Array, pairs: Pairs) -> str:
+    """What is wrong with weight vectors of pairs; "" if nothing is."""
+    expected = pairs.offsets.shape
+    if weights.shape == expected and np.all(np.isfinite(weights)):
+        return ""
+    return f"weights {weights.shape}, pairs {expected}, or not finite"
 
 
 def central_difference(f: Callable[[Array], Array], at: Array, along: Array, step: float) -> Array:

@@ -1,4 +1,4 @@
-"""Hypothesis strategies for the numbers that parts are given.
+"""Hypothesis strategies for the input of parts.
 
 They need Hypothesis, which `pip install "solidsph[testing]"` brings.
 
@@ -43,8 +43,8 @@ def deformation_gradients(
 
     Args:
         volume_ratios: least and largest J = det F [-], with 1 between them.
-        distortion: largest ratio of a principal stretch to J^(1/d), but for one of them, which is
-            what J demands [-].
+        distortion: largest ratio of a principal stretch to J^(1/d), except for the last stretch,
+            which follows from J [-].
     """
     rounding = 1e-12  # keeps a product of rounded stretches within the bounds
     least, largest = volume_ratios
