@@ -11,8 +11,8 @@ import attrs
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
+from solidsph.conformance.ellipticity import least_stiffness, losses_of_ellipticity
 from solidsph.maths.arrays import Array
-from solidsph.promises.ellipticity import least_stiffness, losses_of_ellipticity
 from solidsph.registry.parameters import check_positive, number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene

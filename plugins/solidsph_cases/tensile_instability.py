@@ -10,9 +10,9 @@ from typing import Any, ClassVar, final
 import attrs
 import numpy as np
 
+from solidsph.conformance.ellipticity import least_stiffness
 from solidsph.errors import SceneError
 from solidsph.maths.arrays import Array
-from solidsph.promises.ellipticity import least_stiffness
 from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene

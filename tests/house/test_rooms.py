@@ -26,15 +26,17 @@ MAY_IMPORT = {
     "results": "errors system maths model interfaces registry scene run",
     "watch": "errors maths model interfaces scene run statics",
     "advice": "maths model interfaces registry scene run",
-    "promises": "errors maths model interfaces registry run",
-    "assembly": "errors maths model interfaces registry engines scene run results advice promises",
+    "conformance": "errors maths model interfaces registry run",
+    "assembly": "errors maths model interfaces registry engines scene run results advice "
+    "conformance",
     "simulation": "errors interfaces scene run statics results watch assembly",
     "resumption": "errors system scene run results simulation",
     "costs": "errors interfaces registry engines scene run simulation",
-    "studies": "errors maths model interfaces registry scene run results promises simulation costs",
-    "testing": "errors maths interfaces registry run promises assembly simulation",
+    "studies": "errors maths model interfaces registry scene run results conformance simulation "
+    "costs",
+    "testing": "errors maths interfaces registry run conformance assembly simulation",
     "commands": "errors system model interfaces registry scene run statics results watch advice "
-    "promises simulation resumption costs studies testing",
+    "conformance simulation resumption costs studies testing",
     "cli": "errors commands",
 }
 """What a room may import; a file at the top is a room of its own. The faces of the package,

@@ -19,6 +19,7 @@ from solidsph.errors import BuildError, SceneError
 from solidsph.registry.construct import construct
 from solidsph.registry.problems import MOST_OF_A_KIND, Problems
 from solidsph.scene import compatibility
+from solidsph_builtin.materials.neo_hookean import NeoHookean
 from tests.helpers.scenes import SCENE_TOML, box
 
 
@@ -387,9 +388,6 @@ def test_a_warning_is_told_without_path_and_source(capsys: pytest.CaptureFixture
 
 
 def test_check_says_how_to_give_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
-    def lacking(kind: str, name: str, **given: object) -> object:
-        return construct("materials", {"type": name, "density": 1.0})
-
-    monkeypatch.setattr("solidsph.testing.example_part", lacking)
+    monkeypatch.setattr(NeoHookean, "example", {"density": 1.0})
     with pytest.raises(SceneError, match="such as --set youngs_modulus="):
         cli.cli.main(["check", "neo-hookean"], standalone_mode=False)

@@ -13,9 +13,9 @@ from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 
 from solidsph import SceneError, SolidsphError
+from solidsph.conformance.ellipticity import acoustic_tensors
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.smoothing_kernel import smoothing_kernel
-from solidsph.promises.ellipticity import acoustic_tensors
 from solidsph.registry import registry
 from solidsph.registry.construct import construct
 from solidsph.scene.scene import Scene

@@ -9,7 +9,11 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from solidsph import SolidsphError
-from solidsph.promises.ellipticity import acoustic_tensors, least_stiffness, losses_of_ellipticity
+from solidsph.conformance.ellipticity import (
+    acoustic_tensors,
+    least_stiffness,
+    losses_of_ellipticity,
+)
 from solidsph_builtin.materials.linear_elastic import LinearElastic
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Mapping
+from importlib.metadata import EntryPoint
+from typing import Any, ClassVar
 
+import attrs
 import pytest
 
-from solidsph import SceneError
+from solidsph import SceneError, cli
+from solidsph.conformance.check import Check
 from solidsph.maths.arrays import Scalar
-from solidsph.promises.check import Check
 from solidsph.registry import registry
-from solidsph.testing import checks, conformance, example_part, examples, kits
+from solidsph.testing import checks, conformance, example_part, kits
 from solidsph_builtin.materials.neo_hookean import NeoHookean
+from solidsph_builtin.shapes.box import Box
 from tests.helpers.broken_parts import (
     boundaries,
     discretisations,
     divergences,
     effects,
+    engines,
     formulations,
     gradients,
     integrators,
@@ -35,6 +41,7 @@ WRONG = {
     "discretisations": discretisations.DISCRETISATIONS,
     "divergences": divergences.DIVERGENCES,
     "effects": effects.EFFECTS,
+    "engines": engines.ENGINES,
     "formulations": formulations.FORMULATIONS,
     "gradients": gradients.GRADIENTS,
     "integrators": integrators.INTEGRATORS,
@@ -47,6 +54,7 @@ GOOD = {
     "discretisations": discretisations.GoodDiscretisation,
     "divergences": divergences.GoodDivergence,
     "effects": effects.GoodEffect,
+    "engines": engines.GoodEngine,
     "formulations": formulations.GoodFormulation,
     "gradients": gradients.GoodGradient,
     "integrators": integrators.GoodIntegrator,
@@ -127,7 +135,7 @@ def test_a_kit_takes_a_name_or_an_object_of_its_kind_only() -> None:
         conformance("cases", "tensile-instability")
 
 
-def test_example_parts_take_typical_values_where_none_are_given() -> None:
+def test_example_parts_take_the_values_of_their_example_where_none_are_given() -> None:
     typical = example_part("materials", "neo-hookean")
     other = example_part("materials", "neo-hookean", poissons_ratio=0.1)
     assert typical.density == other.density
@@ -138,9 +146,60 @@ def test_example_parts_take_typical_values_where_none_are_given() -> None:
 
 
 def test_example_parts_say_which_value_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(examples.TYPICAL, "lengths")
-    with pytest.raises(SceneError, match="missing parameter 'lengths'"):
+    monkeypatch.setattr(Box, "example", {})
+    with pytest.raises(SceneError, match=r"'lengths'; add it to `example` in .*box:Box, or give"):
         example_part("shapes", "box")
+
+
+@attrs.frozen
+class Sharp(kernels.GoodKernel):
+    """A part of a third party, with required parameters of names of its own."""
+
+    sharpness: float
+    edge: float = attrs.field(alias="rim")
+
+    example: ClassVar[Mapping[str, Any]] = {"sharpness": 70.0, "rim": 2.5}
+
+
+@attrs.frozen
+class SharpWithoutExample(kernels.GoodKernel):
+    sharpness: float
+
+
+@pytest.fixture
+def foreign_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two kernels, registered as those of another distribution are."""
+    points = [
+        EntryPoint(name, f"{__name__}:{cls.__name__}", "solidsph.kernels")
+        for name, cls in {"sharp": Sharp, "bare": SharpWithoutExample}.items()
+    ]
+    monkeypatch.setattr(
+        registry, "entry_points", lambda group: points if group == "solidsph.kernels" else []
+    )
+
+
+@pytest.mark.usefixtures("foreign_kernels")
+def test_a_third_partys_part_is_checked_with_its_own_example(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert example_part("kernels", "sharp") == Sharp(70.0, 2.5)
+    assert example_part("kernels", "sharp", rim=3.0) == Sharp(70.0, 3.0)
+    cli.cli.main(["check", "sharp", "--json"], standalone_mode=False)
+    assert json.loads(capsys.readouterr().out)["passed"]
+
+
+@pytest.mark.usefixtures("foreign_kernels")
+def test_a_third_partys_part_without_an_example_needs_its_value() -> None:
+    expected = r"'sharpness'; add it to `example` in .*:SharpWithoutExample.*--set sharpness="
+    with pytest.raises(SceneError, match=expected):
+        cli.cli.main(["check", "bare"], standalone_mode=False)
+    assert example_part("kernels", "bare", sharpness=60.0) == SharpWithoutExample(60.0)
+
+
+@pytest.mark.parametrize("kind", kits())
+def test_every_built_in_part_has_an_example_of_each_required_parameter(kind: str) -> None:
+    for name in registry.names(kind):
+        assert isinstance(example_part(kind, name), registry.interface(kind))
 
 
 def test_every_kind_of_part_but_a_case_has_a_kit() -> None:

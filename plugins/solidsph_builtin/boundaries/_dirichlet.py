@@ -1,15 +1,15 @@
-"""What the three ways to impose a smoothed boundary value exactly have in common.
+"""A smoothed boundary value, which three handlers impose in different ways.
 
-The paper's Dirichlet condition asks that the *approximation* <u> = W u takes the given value at
-the boundary particles (eqs. 9 to 12). Free to be chosen are the values that the boundary
-particles and the ghosts carry.
+In the paper's Dirichlet condition the *approximation* <u> = W u takes the given value at the
+boundary particles (eqs. 9 to 12). The unknowns are the values of the boundary particles and of the
+ghosts.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import final
+from typing import Protocol, final
 
 import attrs
 import numpy as np
@@ -27,8 +27,21 @@ from solidsph_builtin.boundaries._reports import COMPONENTS, reaction
 from solidsph_builtin.boundaries.ghost_extension import chosen_ghosts
 
 
+class Dirichlet(Protocol):
+    """A handler that imposes a smoothed boundary value."""
+
+    @property
+    def where(self) -> Where: ...  # boundary particles
+    @property
+    def displacement(self) -> Mapping[str, Component]: ...  # [m]
+    @property
+    def ghosts(self) -> Where: ...  # those that may change with them
+    @property
+    def extension(self) -> Mapping[str, Component] | None: ...  # at ghosts, if known [m]
+
+
 class Solve(ABC):
-    """Values of boundary particles and ghosts that make the approximation right."""
+    """Values of boundary particles and ghosts that satisfy the condition."""
 
     @abstractmethod
     def values(self, smooth: Array, interior: Array, target: Array) -> Array:
@@ -36,56 +49,13 @@ class Solve(ABC):
 
         Args:
             smooth: (b + g,) the targets at the boundary and their smooth extension to ghosts.
-            interior: (b + g,) what all other particles contribute to the approximation there.
-            target: (b,) what the approximation must be at the boundary.
+            interior: (b + g,) contributions of all other particles to the approximation there.
+            target: (b,) required approximation at the boundary.
         """
 
     @abstractmethod
     def transposed(self, forces: Array) -> tuple[Array, Array]:
-        """Forces (b + g,) on the values, carried back to `smooth` and to `interior`."""
-
-
-class Extension(ABC):
-    """A smooth extension of the field to the ghosts, which the solve starts from."""
-
-    @abstractmethod
-    def values(self, axis: int, time: float, derivative: int, column: Array, step: float) -> Array:
-        """Values at the ghosts (g,) from those of all particles (n,)."""
-
-    @abstractmethod
-    def transposed(self, forces: Array) -> Array | float:
-        """Forces (g,) on the ghosts, carried back to the particles that they follow, (n,)."""
-
-
-@final
-@attrs.frozen(eq=False)
-class ReflectedExtension(Extension):
-    """Point reflection of the field at the surface."""
-
-    matrix: csr_array  # (g, n)
-
-    def values(self, axis: int, time: float, derivative: int, column: Array, step: float) -> Array:
-        reflection: Array = self.matrix @ column
-        return reflection
-
-    def transposed(self, forces: Array) -> Array | float:
-        carried: Array = self.matrix.T @ forces
-        return carried
-
-
-@final
-@attrs.frozen(eq=False)
-class KnownExtension(Extension):
-    """A field that is known beyond the surface too."""
-
-    positions: Array  # (g, d)
-    field: VectorField
-
-    def values(self, axis: int, time: float, derivative: int, column: Array, step: float) -> Array:
-        return self.field.derivative(axis, self.positions, time, derivative, step)
-
-    def transposed(self, forces: Array) -> Array | float:
-        return 0.0
+        """Forces on `smooth` and on `interior`, from forces (b + g,) on the values."""
 
 
 @final
@@ -93,8 +63,7 @@ class KnownExtension(Extension):
 class SmoothedValue(GhostConstraint):
     """<u> = field(X, t) at the boundary particles.
 
-    Components that the field does not have are reflected at the ghosts, and left free at the
-    boundary.
+    Components that the field does not have are free at the boundary, and reflected at the ghosts.
     """
 
     label: str
@@ -103,8 +72,8 @@ class SmoothedValue(GhostConstraint):
     ghosts: Indices  # (g,)
     field: VectorField
     smoothing: csr_array  # (b + g, n) rows of W
-    extension: Extension  # smooth, of boundary values to ghosts
-    reflection: csr_array  # (g, n), for components that are not imposed
+    extension: VectorField | None  # of the field to the ghosts, if known; otherwise reflected
+    reflection: csr_array  # (g, n)
     solve: Solve
 
     @property
@@ -131,11 +100,21 @@ class SmoothedValue(GhostConstraint):
             )
             column = values[:, axis]
             column[self.boundary] = target
-            column[self.ghosts] = self.extension.values(axis, time, derivative, column, step)
+            column[self.ghosts] = self._extended(axis, time, derivative, column, step)
             smooth = column[self._chosen]
             column[self._chosen] = 0.0
             interior = self.smoothing @ column
             column[self._chosen] = self.solve.values(smooth, interior, target)
+
+    def _extended(
+        self, axis: int, time: float, derivative: int, column: Array, step: float
+    ) -> Array:
+        """Smooth values at the ghosts (g,), which the solve starts from."""
+        if self.extension is None:
+            reflection: Array = self.reflection @ column
+            return reflection
+        X = self.positions[self.ghosts]
+        return self.extension.derivative(axis, X, time, derivative, step)
 
     def return_forces(self, forces: Array) -> None:
         for axis in self._free_axes():
@@ -143,18 +122,19 @@ class SmoothedValue(GhostConstraint):
         boundary_count = len(self.boundary)
         for axis in self.field.components:
             column = forces[:, axis]
-            # Only what acts on ghosts goes back; boundary particles have a reaction of their own.
+            # Only forces on ghosts are returned; boundary particles have a reaction of their own.
             on_ghosts = np.zeros(len(self._chosen))
             on_ghosts[boundary_count:] = column[self.ghosts]
             smooth, interior = self.solve.transposed(on_ghosts)
             carried = self.smoothing.T @ interior
-            carried += self.extension.transposed(smooth[boundary_count:])
-            carried[self._chosen] = 0.0  # what falls on imposed values is held
+            if self.extension is None:
+                carried += self.reflection.T @ smooth[boundary_count:]
+            carried[self._chosen] = 0.0  # forces on imposed values have no effect
             column += carried
         forces[self.ghosts] = 0.0
 
     def miss(self, observation: Observation) -> float:
-        """Largest difference between the approximation at the boundary and what was asked [m]."""
+        """Largest error of the approximation at the boundary [m]."""
         state = observation.state
         u = state.positions - self.positions
         approximation = (self.smoothing @ u)[: len(self.boundary)]
@@ -172,64 +152,59 @@ class SmoothedValue(GhostConstraint):
 
 
 def smoothed_value(
+    handler: Dirichlet,
+    name: str,
+    solve: Callable[[csr_array, int], Solve],
     model: DiscreteModel,
     label: str,
-    *,
-    where: Where,
-    ghosts: Where,
-    displacement: Mapping[str, Component],
-    extension: Mapping[str, Component] | None,
-    handler: str,
-    solve: Callable[[csr_array, int], Solve],
 ) -> SmoothedValue:
-    """Bind one of the handlers; `solve` is given the rows and columns of W of boundary and ghosts.
+    """Bind a handler, which is called `name` in messages.
+
+    `solve` is given the rows and columns of W of boundary particles and ghosts, and the number of
+    boundary particles.
 
     Raises:
         SceneError: nothing matches, or the equations of this solve have no unique solution.
     """
-    field = VectorField.of(displacement, f"{handler}: displacement", end=model.end)
-    field.check_dimension(model.particles.dimension, handler)
-    boundary = model.select(where)
+    field = VectorField.of(handler.displacement, f"{name}: displacement", end=model.end)
+    field.check_dimension(model.particles.dimension, name)
+    boundary = model.select(handler.where)
     if model.particles.ghosts[boundary].any():
-        raise SceneError(f"{handler}: where = {where!r} matches ghosts; name them under `ghosts`")
-    own_ghosts = chosen_ghosts(model, ghosts, handler)
-    chosen = np.concatenate([boundary, own_ghosts])
+        raise SceneError(
+            f"{name}: where = {handler.where!r} matches ghosts; name them under `ghosts`"
+        )
+    ghosts = chosen_ghosts(model, handler.ghosts, name)
+    chosen = np.concatenate([boundary, ghosts])
     smoothing = csr_array(model.smoothing_matrix()[chosen])
     return SmoothedValue(
         label=label,
         positions=model.particles.positions,
         boundary=boundary,
-        ghosts=own_ghosts,
+        ghosts=ghosts,
         field=field,
         smoothing=smoothing,
-        extension=_extension(model, own_ghosts, extension, field, handler),
-        reflection=reflected(model.particles, own_ghosts),
+        extension=_extension(handler, name, field, model.end),
+        reflection=reflected(model.particles, ghosts),
         solve=solve(csr_array(smoothing[:, chosen]), len(boundary)),
     )
 
 
-def _extension(
-    model: DiscreteModel,
-    ghosts: Indices,
-    known: Mapping[str, Component] | None,
-    field: VectorField,
-    handler: str,
-) -> Extension:
-    if known is None:
-        return ReflectedExtension(reflected(model.particles, ghosts))
-    beyond = VectorField.of(known, f"{handler}: extension", end=model.end)
-    missing = set(field.components) - set(beyond.components)
+def _extension(handler: Dirichlet, name: str, field: VectorField, end: float) -> VectorField | None:
+    if handler.extension is None:
+        return None
+    extension = VectorField.of(handler.extension, f"{name}: extension", end=end)
+    missing = set(field.components) - set(extension.components)
     if missing:
         raise SceneError(
-            f"{handler}: extension lacks component {COMPONENTS[min(missing)]!r}; give every "
+            f"{name}: extension lacks component {COMPONENTS[min(missing)]!r}; give every "
             "component that displacement has"
         )
-    return KnownExtension(model.particles.positions[ghosts], beyond)
+    return extension
 
 
 def solved_transposed(factors: SuperLU, right: Array) -> Array:
     """The solution x of A^T x = right, from the factors of A."""
-    # The stubs of SciPy do not know of `trans`.
+    # SciPy's type stubs lack `trans`.
     solution: Array = factors.solve(right, trans="T")  # type: ignore[call-overload]
     return solution
 

@@ -1,4 +1,4 @@
-"""Values at the mirror images of ghosts, as linear combinations of the particles' own values."""
+"""Interpolation: values at given points as linear combinations of those of the particles."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _FIT_NEIGHBOURS = {1: 3, 2: 9, 3: 20}
 def interpolation(particles: Particles, points: Array) -> csr_array:
     """Matrix (k, n) that gives values at `points` (k, d) from those of the real particles.
 
-    A particle's own value where a point is a particle; elsewhere the weighted least squares fit
-    of a linear field through the nearest particles, which continues a linear field exactly.
+    At a particle the value of that particle; elsewhere the weighted least squares fit of a linear
+    field through the nearest particles, which is exact for a linear field.
     """
     real = np.flatnonzero(~particles.ghosts)
     d = particles.dimension
     tree = cKDTree(particles.positions[real])
     count = min(_FIT_NEIGHBOURS[d], len(real))
-    # A list of ranks, not a count: the answer then has a column for each even if there is one.
+    # A list of ranks, not a count: the result then has a column for each rank, even for one.
     answer = tree.query(points, k=[*range(1, count + 1)])
     distances, nearest = np.asarray(answer[0]), np.asarray(answer[1])
     rows: list[Indices] = []
@@ -52,16 +52,17 @@ def _linear_fit(offsets: Array) -> Array:
     """Weights (m,) of the value at the origin of a linear field known at `offsets` (m, d)."""
     closeness = np.exp(-0.5 * np.sum(offsets**2, axis=1))
     basis = np.column_stack([np.ones(len(offsets)), offsets])
-    # The value at the origin is the first coefficient; the pseudo-inverse also serves bodies one
+    # The value at the origin is the first coefficient. The pseudo-inverse also works for bodies one
     # particle thick, whose neighbours leave a slope undetermined.
     fitted: Array = np.linalg.pinv(closeness[:, None] * basis, rcond=1e-8)[0] * closeness
     return fitted
 
 
 def reflected(particles: Particles, ghosts: Indices) -> csr_array:
-    """Matrix (k, n) of the point reflection at the surface: value there twice, less the image's.
+    """Matrix (k, n) of the point reflection at the surface: twice the value there minus that at
+    the image.
 
-    It continues a field smoothly: value and slope agree on both sides of the surface.
+    It extends a field smoothly: value and slope agree on both sides of the surface.
     """
     images = particles.images[ghosts]
     surface = 0.5 * (particles.positions[ghosts] + images)

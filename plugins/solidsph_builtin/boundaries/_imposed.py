@@ -1,4 +1,4 @@
-"""A motion imposed on chosen particles, component by component."""
+"""A motion imposed on selected particles, component by component."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class ImposedMotion(ScheduledConstraint):
     indices: Indices  # (k,)
     positions: Array  # (n, d) reference positions of all particles
     field: VectorField
-    stressed_face: Face | None  # of these particles, where the reaction must be read off the stress
+    stressed_face: Face | None  # their face, if the reaction is that of the stress
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -44,8 +44,8 @@ class ImposedMotion(ScheduledConstraint):
             self.field.derivative_schedule(axis, X, times, derivative, step)
             for axis in self.field.components
         ]
-        rows = max(len(one) for one in columns)
-        return np.hstack([np.broadcast_to(one, (rows, len(X))) for one in columns])
+        rows = max(map(len, columns))
+        return np.hstack([np.broadcast_to(column, (rows, len(X))) for column in columns])
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         if self.stressed_face is not None:
@@ -60,7 +60,7 @@ def imposed_motion(
     field: VectorField,
     where: Where | None = None,
 ) -> ImposedMotion:
-    """Impose `field` on the particles `indices` of a model, which are those at `where`."""
+    """Impose `field` on the particles `indices` of a model, those at `where` if given."""
     particles = model.particles
     by_stress = any(
         body.formulation.divergence.uses_ghost_stress and body.particles.ghosts.any()
@@ -76,7 +76,7 @@ def imposed_motion(
 
 
 def _surface(model: DiscreteModel, indices: Indices, where: Where | None) -> Face:
-    """The surface at `where`, or all that the particles `indices` own."""
+    """The surface at `where`, or all of it that the particles `indices` own."""
     if where is None:
         return Face(indices, model.particles.area_vectors[indices])
     pieces = model.pieces()

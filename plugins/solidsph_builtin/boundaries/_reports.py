@@ -1,4 +1,4 @@
-"""What boundary conditions report: total forces and moments, component by component."""
+"""Reports of boundary conditions: total forces and moments, component by component."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ COMPONENTS = ("x", "y", "z")
 
 
 def stress_reaction(observation: Observation, label: str, face: Face) -> dict[str, float]:
-    """Resultant through `face` by the stress of its particles.
+    """Resultant of the stress of a face's particles through the face.
 
-    Where ghosts carry the stress on beyond a held surface, as in the paper's form, no force is
-    missing at its particles, and what holds them shows in the stress alone.
+    If ghosts continue the stress beyond a held surface, as in the paper's form, the forces on its
+    particles are balanced, and the reaction shows in the stress alone.
     """
     through = np.einsum("pij,pj->pi", observation.stresses[face.particles], face.area_vectors)
     return resultant(
@@ -27,7 +27,7 @@ def stress_reaction(observation: Observation, label: str, face: Face) -> dict[st
 
 
 def reaction(observation: Observation, label: str) -> dict[str, float]:
-    """Resultant of what the account `label` exerts on the body."""
+    """Resultant of the forces of the account `label` on the body."""
     state = observation.state
     return resultant(
         f"{label} reaction", f"{label} reaction moment", state.positions, state.applied[label]
@@ -35,15 +35,15 @@ def reaction(observation: Observation, label: str) -> dict[str, float]:
 
 
 def asked_resultant(label: str, positions: Array, forces: Array) -> dict[str, float]:
-    """Resultant of a load, beside the traction that it asks for."""
+    """Resultant of a load as given."""
     return resultant(f"{label} asked resultant", f"{label} asked moment", positions, forces)
 
 
 def resultant(force: str, moment: str, positions: Array, forces: Array) -> dict[str, float]:
     """Total of `forces` (k, d) [N], and their moment about the origin x = y = z = 0 [N m].
 
-    The moment is that of the forces where they act now, at `positions` (k, d) [m]. About a point c
-    it is less by c x R, with R the total force. In two dimensions there is the one about z, in one
+    The moment is that of the forces at their current `positions` (k, d) [m]. About a point c it is
+    less by c x R, with R the total force. In two dimensions it has a component about z only, in one
     dimension none.
     """
     d = forces.shape[1]

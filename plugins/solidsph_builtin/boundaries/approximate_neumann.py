@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -27,11 +27,11 @@ from solidsph_builtin.boundaries.ghost_extension import chosen_ghosts
 class ApproximateNeumann(BoundaryHandler):
     """<P> N = traction at the boundary particles, by the smallest change of the stress there.
 
-    The gradient itself cannot be set, because dW/dr = 0 at r = 0; so a second approximation, of
-    the stress computed from it, is made to satisfy the condition (Ismail & Reddy, section 2.3).
-    Exact in one dimension. In more, the stress near an edge has one normal a particle where the
-    surface has two, and only the component along the normal is set: it is approximate. Ghosts
-    must move by another handler, such as `ghost-extension`.
+    The gradient itself cannot be imposed, because dW/dr = 0 at r = 0. So the condition holds for a
+    second approximation, of the stress computed from it (Ismail & Reddy, section 2.3). It is exact
+    in one dimension. In more it is approximate: near an edge a particle has one normal where the
+    surface has two, and only the component along the normal is imposed. Ghosts must be moved by
+    another handler, such as `ghost-extension`.
     """
 
     loads_surface: ClassVar[bool] = True
@@ -39,6 +39,8 @@ class ApproximateNeumann(BoundaryHandler):
     where: Where  # a face such as "left", or a condition on the surface
     traction: Mapping[str, Component]  # such as {x = 0, y = "-1e5"} [Pa]
     ghosts: Where = "ghosts"  # those whose stress may change with it
+
+    example: ClassVar[Mapping[str, Any]] = {"where": "left", "traction": {"x": "1e3*sin(300*t)"}}
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         particles = model.particles
@@ -93,7 +95,7 @@ class SmoothedTraction(StressTerm):
                 component[self.ghosts] = self.images @ component
         for axis in self.field.components:
             target = self.field.values(axis, self.positions[self.boundary], time)
-            for _ in range(2):  # the second pass wins back the digits that A A^T costs
+            for _ in range(2):  # the second pass recovers the digits that A A^T costs
                 missing = target - self._traction(stress, axis)
                 change = self.normal_equations.solve(missing)
                 for k, component in enumerate(stress[axis]):
@@ -112,17 +114,13 @@ class SmoothedTraction(StressTerm):
         self.impose_stress(time, stress)
         X = self.positions[self.boundary]
         columns: dict[str, float] = {}
-        for axis, unset in zip(self.field.components, before, strict=True):
-            name = COMPONENTS[axis]
-            columns[f"{self.label} asked {name} [Pa]"] = float(
-                np.mean(self.field.values(axis, X, time))
-            )
-            columns[f"{self.label} achieved {name} [Pa]"] = float(
-                np.mean(self._traction(stress, axis))
-            )
-            columns[f"{self.label} unset {name} [Pa]"] = float(np.mean(unset))
         asked = np.zeros(X.shape)
-        for axis in self.field.components:
-            asked[:, axis] = self.field.values(axis, X, time) * self.areas
+        for axis, unset in zip(self.field.components, before, strict=True):
+            traction = self.field.values(axis, X, time)
+            asked[:, axis] = traction * self.areas
+            achieved = self._traction(stress, axis)
+            means = {"asked": traction, "achieved": achieved, "unset": unset}
+            for name, values in means.items():
+                columns[f"{self.label} {name} {COMPONENTS[axis]} [Pa]"] = float(np.mean(values))
         positions = observation.state.positions[self.boundary]
         return columns | asked_resultant(self.label, positions, asked)

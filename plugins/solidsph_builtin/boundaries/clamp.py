@@ -1,9 +1,9 @@
-"""Particles held where they are in the reference configuration."""
+"""Particles held at their reference positions."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import final
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, final
 
 import attrs
 
@@ -20,10 +20,12 @@ from solidsph_builtin.boundaries._reports import COMPONENTS
 @final
 @attrs.frozen
 class Clamp(BoundaryHandler):
-    """u = 0 on the chosen particles, along the chosen axes (all by default)."""
+    """u = 0 on the particles at `where`, along `axes` (all by default)."""
 
     where: Where
     axes: Sequence[str] | None = None  # such as ["x", "y"]
+
+    example: ClassVar[Mapping[str, Any]] = {"where": "left"}
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         names = COMPONENTS[: model.particles.dimension]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -22,31 +22,25 @@ from solidsph_builtin.boundaries._dirichlet import Solve, factorised, smoothed_v
 @final
 @attrs.frozen
 class ExactDirichlet(BoundaryHandler):
-    """Changes boundary and ghost values as little as possible from a smooth extension, so that the
-    approximation at the boundary particles is exact.
+    """The smallest change of boundary and ghost values from a smooth extension that makes the
+    approximation exact at the boundary particles.
 
-    Ismail & Reddy, section 2.3, amended: solving for every boundary and ghost value, as the
-    paper has it, is badly conditioned and spoils the approximation beside the boundary.
+    Ismail & Reddy, section 2.3, amended: the paper's solve for every boundary and ghost value is
+    badly conditioned and spoils the approximation beside the boundary.
     """
 
     where: Where  # boundary particles
     displacement: Mapping[str, Component]  # such as {x = "0.1*Y"} [m]
     ghosts: Where = "ghosts"  # those that may change with them
-    extension: Mapping[str, Component] | None = None  # ghosts' values, if known; else reflected
+    extension: Mapping[str, Component] | None = None  # at ghosts; reflected if None
+
+    example: ClassVar[Mapping[str, Any]] = {
+        "where": "left",
+        "displacement": {"x": "0.002*sin(300*t)"},
+    }
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
-        return [
-            smoothed_value(
-                model,
-                label,
-                where=self.where,
-                ghosts=self.ghosts,
-                displacement=self.displacement,
-                extension=self.extension,
-                handler="exact-dirichlet",
-                solve=_MinimumNorm.of,
-            )
-        ]
+        return [smoothed_value(self, "exact-dirichlet", _MinimumNorm.of, model, label)]
 
 
 @final
@@ -65,7 +59,7 @@ class _MinimumNorm(Solve):
     def values(self, smooth: Array, interior: Array, target: Array) -> Array:
         wanted = target - interior[: len(target)]
         values = smooth
-        # A A^T squares the condition number of A; the second pass wins the lost digits back.
+        # A A^T squares the condition number of A; the second pass recovers the lost digits.
         for _ in range(2):
             values = values + self.rows.T @ self.normal.solve(wanted - self.rows @ values)
         return values

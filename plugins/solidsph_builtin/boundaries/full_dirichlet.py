@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import Any, ClassVar, final
 
 import attrs
 from scipy.sparse import csr_array
@@ -26,31 +26,25 @@ from solidsph_builtin.boundaries._dirichlet import (
 @final
 @attrs.frozen
 class FullDirichlet(BoundaryHandler):
-    """Solves W_BG,BG u_new = u_BG - W_BG,I u_I, so that the approximation equals the given value at
+    """Solve W_BG,BG u_new = u_BG - W_BG,I u_I, so that the approximation equals the given value at
     the boundary and its smooth extension at the ghosts.
 
-    Ismail & Reddy, eq. 11, with the contribution of the interior that the printed matrix leaves
-    out. Exact, but badly conditioned: for comparison with `exact-dirichlet`.
+    Ismail & Reddy, eq. 11, with the contribution of the interior, which the printed matrix
+    omits. Exact, but badly conditioned: for comparison with `exact-dirichlet`.
     """
 
     where: Where  # boundary particles
     displacement: Mapping[str, Component]  # such as {x = "0.1*Y"} [m]
     ghosts: Where = "ghosts"  # those that may change with them
-    extension: Mapping[str, Component] | None = None  # ghosts' values, if known; else reflected
+    extension: Mapping[str, Component] | None = None  # at ghosts; reflected if None
+
+    example: ClassVar[Mapping[str, Any]] = {
+        "where": "left",
+        "displacement": {"x": "0.002*sin(300*t)"},
+    }
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
-        return [
-            smoothed_value(
-                model,
-                label,
-                where=self.where,
-                ghosts=self.ghosts,
-                displacement=self.displacement,
-                extension=self.extension,
-                handler="full-dirichlet",
-                solve=_FullSolve.of,
-            )
-        ]
+        return [smoothed_value(self, "full-dirichlet", _FullSolve.of, model, label)]
 
 
 @final

@@ -1,4 +1,4 @@
-"""Ghosts that continue the body's fields smoothly beyond its surface."""
+"""Ghosts that extend the body's fields smoothly beyond its surface."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ from solidsph_builtin.boundaries._images import interpolation, reflected
 @final
 @attrs.frozen
 class GhostExtension(BoundaryHandler):
-    """Displacements are reflected through the surface value, stresses mirrored.
+    """Displacements of ghosts by reflection through the surface value, stresses by mirror images.
 
-    A linear field is continued exactly. By itself this imposes nothing: it completes the support
-    of particles near a surface that another handler holds or loads. Ismail & Reddy, section 2.3.
+    The extension is exact for a linear field. By itself it imposes nothing: it completes the
+    support of particles near a surface that another handler holds or loads. Ismail & Reddy,
+    section 2.3.
     """
 
     where: Where = "ghosts"
@@ -45,7 +46,11 @@ class GhostExtension(BoundaryHandler):
 
 
 def chosen_ghosts(model: DiscreteModel, where: Where, handler: str) -> Indices:
-    """The particles at `where`, all of which must be ghosts."""
+    """The particles at `where`.
+
+    Raises:
+        SceneError: one of them is not a ghost.
+    """
     if not model.particles.ghosts.any():
         raise SceneError(
             f"{handler}: the scene has no ghosts; give its discretisation some, such as "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -27,30 +27,24 @@ from solidsph_builtin.boundaries._dirichlet import (
 @final
 @attrs.frozen
 class LiteralDirichlet(BoundaryHandler):
-    """Solves W_BG,BG u_new = u_BG, whatever the interior contributes.
+    """Solve W_BG,BG u_new = u_BG, without the contribution of the interior.
 
-    Ismail & Reddy, eq. 11 to the letter. The approximation misses the boundary value by what the
-    interior adds to it: kept to show that, and reported as the miss.
+    Ismail & Reddy, eq. 11 to the letter. The approximation misses the boundary value by that
+    contribution. The handler exists to show this, and reports it as the miss.
     """
 
     where: Where  # boundary particles
     displacement: Mapping[str, Component]  # such as {x = "0.1*Y"} [m]
     ghosts: Where = "ghosts"  # those that may change with them
-    extension: Mapping[str, Component] | None = None  # ghosts' values, if known; else reflected
+    extension: Mapping[str, Component] | None = None  # at ghosts; reflected if None
+
+    example: ClassVar[Mapping[str, Any]] = {
+        "where": "left",
+        "displacement": {"x": "0.002*sin(300*t)"},
+    }
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
-        return [
-            smoothed_value(
-                model,
-                label,
-                where=self.where,
-                ghosts=self.ghosts,
-                displacement=self.displacement,
-                extension=self.extension,
-                handler="literal-dirichlet",
-                solve=_LiteralSolve.of,
-            )
-        ]
+        return [smoothed_value(self, "literal-dirichlet", _LiteralSolve.of, model, label)]
 
 
 @final

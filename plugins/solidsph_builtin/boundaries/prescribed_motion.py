@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import Any, ClassVar, final
 
 import attrs
 
@@ -18,19 +18,24 @@ from solidsph_builtin.boundaries._imposed import imposed_motion
 @final
 @attrs.frozen
 class PrescribedMotion(BoundaryHandler):
-    """u = displacement(X, t) on the chosen particles; components not given stay free.
+    """u = displacement(X, t) on the particles at `where`; components not given are free.
 
-    Velocity and acceleration of the imposed motion are its time derivatives, so the reaction
-    reported includes the inertia of the particles moved.
+    Velocity and acceleration of the imposed motion are its time derivatives, so the reported
+    reaction includes the inertia of these particles.
     """
 
     where: Where
     displacement: Mapping[str, Component]  # such as {x = "0.1*t", y = 0} [m]
 
+    example: ClassVar[Mapping[str, Any]] = {
+        "where": "left",
+        "displacement": {"x": "0.002*sin(300*t)"},
+    }
+
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         field = VectorField.of(self.displacement, "prescribed-motion: displacement", end=model.end)
         field.check_dimension(model.particles.dimension, "prescribed-motion")
         indices = model.select(self.where)
-        for axis in field.components:  # a formula out of its domain shows now, not in mid-run
+        for axis in field.components:  # refuses a formula out of its domain now, not in the run
             field.values(axis, model.particles.positions[indices], 0.0)
         return [imposed_motion(model, label, indices, field, self.where)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -28,14 +28,15 @@ class Pressure(BoundaryHandler):
     """f = -p cof(F) N A: force per current area, along the current normal (a follower load).
 
     Nanson's formula, n da = cof(F) N dA, with F of the particle that owns the surface. The total
-    force is that of the deformed surface as the particles see it, so it turns with the body; a
-    pressure has no dead direction, and in general no energy.
+    force follows the deformed surface, so it turns with the body; in general it has no energy.
     """
 
     loads_surface: ClassVar[bool] = True
 
     where: Where  # a face such as "inner", or a condition on the surface
     pressure: Component  # p such as "5e6*min(t/1e-3, 1)", positive when it pushes [Pa]
+
+    example: ClassVar[Mapping[str, Any]] = {"where": "left", "pressure": "1e3*sin(300*t)"}
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         particles = model.particles
@@ -56,14 +57,14 @@ class Pressure(BoundaryHandler):
 
 
 def _gradients(model: DiscreteModel, chosen: Indices) -> Sequence[csr_array]:
-    """From displacements of all to their derivatives at the chosen, (k, n) along each axis."""
+    """Derivatives at the chosen particles from displacements of all, (k, n) along each axis."""
     blocks = [BodyGradient.of(body).matrices.gradient for body in model.bodies]
     d = model.particles.dimension
-    found = []
+    gradients = []
     for axis in range(d):
-        rows = [one[axis * one.shape[1] : (axis + 1) * one.shape[1]] for one in blocks]
-        found.append(csr_array(csr_array(block_diag(rows, format="csr"))[chosen]))
-    return found
+        rows = [block[axis * block.shape[1] : (axis + 1) * block.shape[1]] for block in blocks]
+        gradients.append(csr_array(csr_array(block_diag(rows, format="csr"))[chosen]))
+    return gradients
 
 
 @final
@@ -97,7 +98,7 @@ class FollowerLoad(SurfaceLoad):
         return np.asarray(np.einsum("kij,kj->ki", cof, self.face.area_vectors))
 
     def stiffness(self, displacements: Array, time: float) -> csr_array:
-        """The symmetric part of K (d n, d n) [N/m]: all of it where the surface is closed, or its
+        """The symmetric part of K (d n, d n) [N/m]; K is symmetric if the surface is closed, or its
         edge held."""
         n, d = displacements.shape
         p = self.field.values(0, self.reference[self.particles], time)

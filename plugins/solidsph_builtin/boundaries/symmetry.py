@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -28,16 +28,19 @@ _ON_PLANE = 1e-6
 @final
 @attrs.frozen
 class Symmetry(BoundaryHandler):
-    """Mirrors the body at the plane {axis} = {at}; the rest of it lies on either side.
+    """Mirror symmetry about the plane {axis} = {at}; the body may lie on either side of it.
 
     Ghosts beyond the plane, such as those of `ghost_faces = ["left"]`, move as mirror images and
-    complete the supports; particles on the plane stay on it. One of the two must be there. On the
-    plane without ghosts, particles have half a support: unless the gradient takes the surface into
-    account, as 'consistent' does, stresses beside a hole on the plane come out a third too high.
+    complete the supports; particles on the plane stay on it. There must be ghosts or particles on
+    the plane. Without ghosts, particles on the plane have half a support: unless the gradient
+    takes the surface into account, as 'consistent' does, stresses beside a hole on the plane are a
+    third too high.
     """
 
     axis: str
     at: float = number(default=0.0)  # [m]
+
+    example: ClassVar[Mapping[str, Any]] = {"axis": "x"}
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         particles = model.particles
@@ -57,12 +60,12 @@ class Symmetry(BoundaryHandler):
                 "many as the cover and ghost_faces = [its name]; with gradient = 'consistent', "
                 "particles on the plane (on_boundary = true) do as well"
             )
-        conditions: list[Term] = []
+        terms: list[Term] = []
         if len(on_plane):
-            conditions.append(imposed_motion(model, label, on_plane, VectorField({normal: 0.0})))
+            terms.append(imposed_motion(model, label, on_plane, VectorField({normal: 0.0})))
         if len(beyond):
             X, images = particles.positions[beyond], particles.images[beyond]
-            conditions.append(
+            terms.append(
                 Mirror(
                     label=label,
                     ghosts=beyond,
@@ -70,10 +73,10 @@ class Symmetry(BoundaryHandler):
                     images=interpolation(particles, images),
                     # Beyond a corner of two planes a ghost is mirrored in both.
                     signs=np.where(np.abs(X - images) > _on_plane_tolerance(model), -1.0, 1.0),
-                    reports=not conditions,
+                    reports=not terms,
                 )
             )
-        return conditions
+        return terms
 
 
 def _on_plane_tolerance(model: DiscreteModel) -> float:
@@ -81,7 +84,7 @@ def _on_plane_tolerance(model: DiscreteModel) -> float:
 
 
 def _ghosts_of(model: DiscreteModel, normal: int, at: float) -> Indices:
-    """Ghosts that are mirror images in the plane; beyond a corner, in the plane of least axis."""
+    """Ghosts that are mirror images in the plane; beyond a corner, in the first plane."""
     particles = model.particles
     tolerance = _on_plane_tolerance(model)
     X, images = particles.positions, particles.images
@@ -100,7 +103,7 @@ class Mirror(LinearExtension):
     shape: tuple[int, ...]  # (n, d)
     images: csr_array  # (k, n)
     signs: Array  # (k, d) the diagonals of R
-    reports: bool  # the reaction of the plane, unless the particles on it do
+    reports: bool  # the reaction of the plane, unless the particles on it report it
 
     @property
     def displacement(self) -> csr_array:

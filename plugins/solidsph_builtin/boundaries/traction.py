@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -24,18 +24,20 @@ from solidsph_builtin.boundaries._reports import COMPONENTS, asked_resultant
 class Traction(BoundaryHandler):
     """Force per reference area on a face, fixed in direction (a dead load).
 
-    The weak form's own natural condition: each particle receives traction times the area of the
-    surface that it owns, so the total force is that of the sampled area, and nothing of it is lost.
-    It is reported as the mean traction asked, as its resultant and as its moment about the origin.
-    The particle stress beside them is the mean of P N at the loaded particles. These stand up to
-    half a spacing inside, where the stress is another one, and linear gradients are one-sided
-    there: it may be twice, or half, the traction asked, though the mean strain is right.
+    The natural condition of the weak form: each particle receives traction times the area of the
+    surface that it owns, so the total force is exactly that on the sampled area. The report has the
+    mean traction asked, its resultant and its moment about the origin, and the particle stress, the
+    mean of P N at the loaded particles. These are up to half a spacing inside, where the stress
+    differs, and linear gradients are one-sided there: the particle stress may be twice, or half,
+    the traction asked, though the mean strain is right.
     """
 
     loads_surface: ClassVar[bool] = True
 
     where: Where  # a face such as "right", or a condition on the surface
     traction: Mapping[str, Component]  # such as {x = "5e6*min(t/1e-3, 1)"} [Pa]
+
+    example: ClassVar[Mapping[str, Any]] = {"where": "left", "traction": {"x": "1e3*sin(300*t)"}}
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         particles = model.particles

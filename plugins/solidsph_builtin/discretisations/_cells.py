@@ -1,4 +1,4 @@
-"""Particles on a lattice, with a cell each: what every lattice arrangement starts from."""
+"""Particles on a lattice with a cell each, from which every lattice arrangement starts."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ def lattice_particles(
     """One particle at every lattice point in the shape, then the ghosts around them.
 
     Args:
-        discretisation: who asks, for the messages.
+        discretisation: the part that messages name.
         shape: the body.
         grid: the lattice, at least `ghosts` layers larger than the shape.
-        spacing: what was asked for [m]; what the particles have is that of the grid.
+        spacing: as requested [m]; the particles have that of the grid.
         ghosts: layers of ghosts.
         ghost_faces: faces behind which there are ghosts; None for all.
 
@@ -78,34 +78,35 @@ def lattice_particles(
         occupied[ghost_numbers[kept]] = True
         cells = np.maximum(volumes, grid.cell_volume * grid.completed(occupied)[numbers])
     count = numbers.size + len(ghost_positions)
-    own = faces(surface, owners)
+    owned = faces(surface, owners)
     is_ghost = np.arange(count) >= numbers.size
     everywhere = np.concatenate([positions, ghost_positions])
     return Particles(
         positions=everywhere,
         volumes=np.concatenate([volumes, np.full(len(ghost_positions), grid.cell_volume)]),
         spacings=np.full(count, mean_spacing(grid, spacing)),
-        area_vectors=area_vectors(own, count, shape.dimension),
+        area_vectors=area_vectors(owned, count, shape.dimension),
         ghosts=is_ghost,
         images=np.concatenate([positions, images]) if len(images) else everywhere,
-        tags=tags(own, is_ghost, [surface.faces[sample] for sample in samples]),
-        faces=own,
-        # A ghost weighs in sums what the particle does whose image it is.
+        tags=tags(owned, is_ghost, [surface.faces[sample] for sample in samples]),
+        faces=owned,
+        # A ghost has the weight in sums of the particle whose image it is.
         cells=np.concatenate([cells, cells[tree.query(images)[1]]]) if len(images) else cells,
     )
 
 
 def mean_spacing(grid: Grid, wanted: float) -> float:
-    """Spacing whose power d is the volume of a cell [m]; just what was `wanted` where it fits."""
+    """Spacing whose power d is the volume of a cell [m]; exactly `wanted` where it fits."""
     mean = float(grid.cell_volume ** (1.0 / len(grid.cells)))
     return wanted if np.allclose(grid.steps, wanted, rtol=1e-9, atol=0.0) else mean
 
 
 def _shares(shape: Shape, grid: Grid, distance: Array, tolerance: float) -> tuple[Array, Mask]:
-    """What part of its cell each lattice point has (size,) [-], and which are particles (size,).
+    """Share of the shape in the cell of each lattice point (size,) [-], and which points are
+    particles (size,).
 
-    A point on the boundary that has none is no particle: it lies where a composite shape closes
-    up, as on the face of a box of which a box with the same face has been taken away.
+    A point on the boundary with a share of zero is no particle: it lies where a composite shape
+    closes up, as on the face of a box minus a box with the same face.
     """
     inside = distance <= tolerance
     shares = np.zeros(grid.size)
@@ -115,12 +116,12 @@ def _shares(shape: Shape, grid: Grid, distance: Array, tolerance: float) -> tupl
 
 
 def cell_shares(shape: Shape, grid: Grid, numbers: Indices, distance: Array) -> Array:
-    """What part of the cell of each of these `numbers` (n,) lies in the shape, (n,) [-].
+    """Share of the shape in the cell of each of these lattice points (n,) [-].
 
     `distance` (size,) [m] is that of all lattice points.
     """
     shares = np.ones(numbers.size)
-    # A cell that the boundary does not reach is whole; only the others are looked into.
+    # A cell that the boundary does not reach is whole; only the others are divided.
     cut = np.flatnonzero(distance[numbers] > -grid.half_diagonal)
     for start in range(0, cut.size, _CELLS_AT_ONCE):
         some = cut[start : start + _CELLS_AT_ONCE]
@@ -130,7 +131,7 @@ def cell_shares(shape: Shape, grid: Grid, numbers: Indices, distance: Array) -> 
 
 
 def _adopted(shape: Shape, grid: Grid, orphans: Indices, tree: cKDTree) -> Array:
-    """Volume of the cells without a particle that goes to the particles nearest, (n,) [m^d]."""
+    """Volume of cells without a particle that is nearest to each particle, (n,) [m^d]."""
     adopted = np.zeros(tree.n)
     for start in range(0, orphans.size, _CELLS_AT_ONCE):
         centres = grid.positions(orphans[start : start + _CELLS_AT_ONCE])
@@ -141,14 +142,14 @@ def _adopted(shape: Shape, grid: Grid, orphans: Indices, tree: cKDTree) -> Array
 
 
 def fitted(volumes: Array, cell: float, total: float | None) -> Array:
-    """The same volumes with the exact total, if that is known; whole cells stay what they are."""
+    """Volumes scaled to the exact total, if that is known; those of whole cells do not change."""
     if total is None:
         return volumes
     cut = np.abs(volumes - cell) > 1e-12 * cell
     missing = total - float(volumes.sum())
     if abs(missing) <= 1e-13 * total:
         return volumes
-    # Without cells that could take the difference, it goes to all.
+    # If cut cells cannot take the difference, all cells share it.
     if abs(missing) > 0.5 * volumes[cut].sum():
         cut[:] = True
     scale = np.where(cut, 1.0 + missing / volumes[cut].sum(), 1.0)
@@ -158,7 +159,7 @@ def fitted(volumes: Array, cell: float, total: float | None) -> Array:
 def _owners(grid: Grid, real: Mask, tree: cKDTree, points: Array) -> Assignment:
     """The particles nearest to each of `points` (m, d)."""
     cells = grid.cell_of(points)
-    # A particle is the nearest to all in its own cell: the tree is for the other points only.
+    # A particle is the nearest to all points in its cell: the tree is for other points only.
     own, elsewhere = np.flatnonzero(real[cells]), np.flatnonzero(~real[cells])
     others = nearest(tree, points[elsewhere])
     return Assignment(

@@ -1,4 +1,4 @@
-"""What every discretisation asks of its input."""
+"""Checks of the input of discretisations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MOST_PARTICLES = 5e7
 
 
 def refusal(discretisation: Discretisation, reason: str) -> SceneError:
-    """The error to raise when a discretisation cannot do what it is asked."""
+    """The error to raise when a discretisation cannot represent a shape."""
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", type(discretisation).__name__).lower()
     return SceneError(f"discretisation {words!r}: {reason}")
 

@@ -1,4 +1,4 @@
-"""Where the smooth parts of a boundary meet: its edges and corners, found from samples of it."""
+"""Edges and corners of a boundary, found from samples of it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from solidsph.interfaces.shape import Surface
 from solidsph.maths.arrays import Array
 from solidsph_builtin.discretisations._nearest import thinned
 
-# Tangent planes that cross at more than this angle make an edge; less is a bend.
+# Tangent planes at more than this angle make an edge; at less, a bend.
 _SHARPEST_BEND = np.cos(np.radians(30.0))
-# Normals that differ by less are not even looked at.
+# Pairs of normals that differ by less are skipped.
 _SMOOTH = 0.2
-# Singular values of the normals that are smaller than this part of the largest are rounding.
+# Singular values of the normals below this part of the largest are rounding.
 _DEPENDENT = 1e-6
-# Samples farther from each other than so many gaps between samples are no neighbours.
+# Samples are neighbours up to so many gaps between samples.
 _NEIGHBOURS = 2.0
 
 
@@ -28,7 +28,7 @@ class Features:
     normals: Array  # (m, k, d) of the planes through each point, not all independent [-]
 
     def along(self, offsets: Array) -> Array:
-        """That part of `offsets` (m, d), one from each point, that leaves no plane, (m, d)."""
+        """The part of `offsets` (m, d), one from each point, along all its planes, (m, d)."""
         inverse = np.linalg.pinv(self.normals, rcond=_DEPENDENT)
         part: Array = offsets - np.einsum("mik,mkj,mj->mi", inverse, self.normals, offsets)
         return part
@@ -47,11 +47,11 @@ def smooth(surface: Surface) -> Features:
 
 
 def meetings(of: Features, reach: float) -> Features:
-    """Where the planes of neighbours `of` the same kind cross: edges of faces, corners of edges.
+    """Intersections of the planes of neighbouring features: edges of faces, corners of edges.
 
-    Each point is the one on all planes of two neighbours that is nearest to the middle between
-    them; `reach` [m] is how far neighbours are apart. Of many at the same place, the one stays
-    whose neighbours are closest to each other.
+    Each point is that on all planes of two neighbours which is nearest to the middle between them;
+    `reach` [m] is the distance of neighbours. Of several points at the same place, the one whose
+    neighbours are closest to each other is kept.
     """
     d = of.points.shape[1]
     pairs = cKDTree(of.points).query_pairs(_NEIGHBOURS * reach, output_type="ndarray")
@@ -77,7 +77,7 @@ def meetings(of: Features, reach: float) -> Features:
 
 
 def _rank(normals: Array) -> Array:
-    """How many of the planes with these `normals` (m, k, d) cross sharply, (m,)."""
+    """Number of planes with these `normals` (m, k, d) that cross sharply, (m,)."""
     # The singular values of two unit normals at an angle a are sqrt(1 +- cos a).
     sharp = np.sqrt(1.0 - _SHARPEST_BEND)
     return np.asarray(np.sum(np.linalg.svd(normals, compute_uv=False) > sharp, axis=1))

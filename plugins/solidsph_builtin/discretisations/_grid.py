@@ -22,15 +22,15 @@ _CHUNK = 1 << 15
 class Grid:
     """Lattice points, and the cell around each.
 
-    They are numbered along the axis with most of them first, so that as many as can be follow each
-    other with the same neighbourhood: engines treat such a run as one.
+    They are numbered along the axis with most points first, so that long runs of them have the
+    same neighbourhood: engines process such a run as a whole.
     """
 
     lower: Array  # (d,) lower corner of the bounding box [m]
     lengths: Array  # (d,) of the bounding box [m]
-    cells: tuple[int, ...]  # how many fill the bounding box along each axis
-    first: float  # where the first point along an axis is, counted in cells from the lower corner
-    counts: tuple[int, ...]  # lattice points along each axis, those beyond the box included
+    cells: tuple[int, ...]  # number that fills the bounding box along each axis
+    first: float  # place of the first point along an axis, in cells from the lower corner
+    counts: tuple[int, ...]  # lattice points along each axis, including those beyond the box
 
     @property
     def steps(self) -> Array:
@@ -45,7 +45,7 @@ class Grid:
 
     @property
     def order(self) -> tuple[int, ...]:
-        """Axes from the slowest in the numbering to the fastest; of equal ones the last is."""
+        """Axes from the slowest in the numbering to the fastest; the last of equal ones."""
         return tuple(sorted(range(len(self.counts)), key=lambda axis: self.counts[axis]))
 
     @property
@@ -67,7 +67,7 @@ class Grid:
         """Lattice points of these `numbers` (n,), (n, d) [m]."""
         index = np.stack(np.unravel_index(numbers, self.shape), axis=1)
         index = index[:, np.argsort(self.order)]
-        # One rounding less than with the step: the last point is on the far face exactly.
+        # Without the step, which is rounded: the last point is exactly on the far face.
         result: Array = self.lower + (index + self.first) / np.array(self.cells) * self.lengths
         return result
 
@@ -79,7 +79,7 @@ class Grid:
         return np.asarray(np.ravel_multi_index(tuple(index.T), self.shape), dtype=np.intp)
 
     def near(self, marked: Mask, layers: int) -> Mask:
-        """Points at most so many `layers` of cells away from one that is `marked`, (size,)."""
+        """Points at most so many `layers` of cells away from a `marked` one, (size,)."""
         grown = marked.reshape(self.shape)
         for axis in range(grown.ndim):
             along = np.moveaxis(grown, axis, 0)
@@ -91,7 +91,7 @@ class Grid:
         return grown.ravel()
 
     def completed(self, occupied: Mask) -> Array:
-        """What part of each cell has `occupied` points on both sides along every axis, (size,)."""
+        """Share of each cell with `occupied` points on both sides along every axis, (size,)."""
         filled = occupied.reshape(self.shape)
         part = np.ones(self.shape)
         for axis in range(filled.ndim):
@@ -111,17 +111,17 @@ def grid_over(
     on_boundary: bool = False,
     beyond: int = 0,
 ) -> Grid:
-    """The grid that fits the bounding box of `shape`, with cells as near to `spacing` as fit.
+    """The grid over the bounding box of `shape` with cells whose size is nearest to `spacing`.
 
     Args:
-        discretisation: who asks, for the messages.
-        shape: what is to be covered.
-        spacing: wanted size of the cells [m].
-        on_boundary: lattice points on the faces of the bounding box, not half a cell inside.
+        discretisation: the part that messages name.
+        shape: the shape to be covered.
+        spacing: requested size of the cells [m].
+        on_boundary: True for points on the faces of the box, not half a cell inside.
         beyond: layers of lattice points beyond the box.
 
     Raises:
-        SceneError: the shape is as good as empty, or there would be too many points.
+        SceneError: the shape has no extent, or there would be too many points.
     """
     lower, upper = shape.bounds()
     lengths = upper - lower
@@ -132,7 +132,7 @@ def grid_over(
             "give it sizes that do not vanish beside its coordinates",
         )
     extra = int(on_boundary) + 2 * beyond
-    # In floating point first: the product may be beyond any integer.
+    # In floating point: the product may be too large for an integer.
     check_count(discretisation, math.prod(length / spacing + extra for length in lengths.tolist()))
     cells = tuple(cells_along(length, spacing) for length in lengths.tolist())
     return Grid(
@@ -145,7 +145,7 @@ def grid_over(
 
 
 def in_chunks(size: int, values: Callable[[Indices], Array]) -> Array:
-    """`values` of the numbers 0 to `size`, computed some at a time to bound the memory, (size,)."""
+    """`values` of the numbers 0 to `size`, computed in chunks to bound the memory, (size,)."""
     result = np.empty(size)
     for start in range(0, size, _CHUNK):
         numbers = np.arange(start, min(start + _CHUNK, size))

@@ -7,12 +7,12 @@ from solidsph.interfaces.shape import Shape
 from solidsph.maths.arrays import Array
 from solidsph_builtin.discretisations._checks import refusal
 
-# How often a displacement that leaves the shape is halved before the particle stays in place.
+# How often a displacement out of the shape is halved before the particle is left in place.
 _ATTEMPTS = 8
 
 
 def moved_inside(shape: Shape, points: Array, displacements: Array) -> Array:
-    """`points` (n, d) after as much of their `displacements` (n, d) as keeps them inside [m]."""
+    """`points` (n, d) plus `displacements` (n, d), those halved that leave the shape [m]."""
     moved = points + displacements
     scale = 1.0
     for attempt in range(_ATTEMPTS + 1):
@@ -25,7 +25,7 @@ def moved_inside(shape: Shape, points: Array, displacements: Array) -> Array:
 
 
 def check_noise(discretisation: Discretisation, amplitude: object, seed: object) -> None:
-    """Refuse an amplitude at which particles could meet, and a seed that is none.
+    """Refuse an amplitude at which particles could meet, and an invalid seed.
 
     Raises:
         SceneError: one of them is of the wrong kind or out of range.

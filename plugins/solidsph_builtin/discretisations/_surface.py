@@ -1,4 +1,4 @@
-"""What particles get from the surface of their shape: area vectors, tags, mirror images."""
+"""Data of particles from the surface of their shape: area vectors, tags, mirror images."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array, Indices, Mask
-from solidsph.model.particles import Face
+from solidsph.model.particles import Face, Particles
 from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations._nearest import Assignment
 
@@ -32,17 +32,17 @@ def sampled(discretisation: Discretisation, shape: Shape, spacing: float) -> Sur
 
 
 def faces(surface: Surface, owners: Assignment) -> dict[str, Face]:
-    """What each particle owns of each face, so that all of it together closes.
+    """Area that each particle owns of each face, with a total that closes.
 
     A uniform pressure over a closed surface must not push the body. Where a composite shape cuts
-    through samples, their sum is off by about the size of one; so every area A is rescaled, its
-    normal n kept, by the smallest changes that close the sum:
+    through samples, their sum is off by about the size of a sample. So every area A is rescaled at
+    constant normal n by the smallest changes that close the sum:
 
         A <- A (1 + n . l),    (sum |A| n n^T) l = -sum A
 
     Args:
         surface: samples of a closed surface.
-        owners: the particles to which the samples go.
+        owners: the particles that own the samples.
     """
     numbers = {name: number for number, name in enumerate(dict.fromkeys(surface.faces))}
     face_of = np.array([numbers[name] for name in surface.faces], dtype=np.intp)[owners.points]
@@ -80,7 +80,7 @@ def faces(surface: Surface, owners: Assignment) -> dict[str, Face]:
 
 
 def area_vectors(faces: Mapping[str, Face], count: int, dimension: int) -> Array:
-    """All that each of `count` particles owns of the `faces`, (count, d) [m^(d-1)]."""
+    """Area vector of each of `count` particles on all `faces`, (count, d) [m^(d-1)]."""
     total = np.zeros((count, dimension))
     for face in faces.values():
         total[face.particles] += face.area_vectors
@@ -103,6 +103,31 @@ def tags(faces: Mapping[str, Face], ghosts: Mask, nearest_faces: Sequence[str]) 
     return {**found, "surface": surface, "interior": ~surface & ~ghosts, "ghosts": ghosts}
 
 
+def without_ghosts(
+    positions: Array, volumes: Array, spacing: float, faces: Mapping[str, Face]
+) -> Particles:
+    """Particles at `positions` (n, d), their own images, that own these `faces`.
+
+    Args:
+        positions: of the particles [m].
+        volumes: (n,) [m^d].
+        spacing: that they are said to have [m].
+        faces: the particles on each face.
+    """
+    count, d = positions.shape
+    none = np.zeros(count, dtype=np.bool_)
+    return Particles(
+        positions=positions,
+        volumes=volumes,
+        spacings=np.full(count, spacing),
+        area_vectors=area_vectors(faces, count, d),
+        ghosts=none,
+        images=positions.copy(),
+        tags=tags(faces, none, ()),
+        faces=faces,
+    )
+
+
 def _mask(count: int, members: Indices) -> Mask:
     mask = np.zeros(count, dtype=np.bool_)
     mask[members] = True
@@ -116,7 +141,7 @@ def mirrored(
     whether all its mirrors lie on `allowed` faces (n,), any face if None.
 
     The mirror is the plane through the nearest sample. Beyond an edge or a corner an image may
-    still lie outside; it is mirrored again then, at most once for each dimension.
+    still lie outside; it is then mirrored again, at most once for each dimension.
     """
     images, samples = points.copy(), np.zeros(len(points), dtype=np.intp)
     kept = np.ones(len(points), dtype=np.bool_)

@@ -18,15 +18,15 @@ from solidsph_builtin.discretisations._features import Features, gap, meetings, 
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._nearest import nearest, thinned
 from solidsph_builtin.discretisations._pieces import finest_pieces
-from solidsph_builtin.discretisations._surface import area_vectors, faces, sampled, tags
+from solidsph_builtin.discretisations._surface import faces, sampled, without_ghosts
 
-# Closer than this, in cells, a point is on the boundary, or two are at the same place.
+# Closer than this, in cells, a point is on the boundary, or two points coincide.
 _AT = 1e-9
 # Two particles on the boundary closer than this, in cells, become one.
 _CLOSEST = 0.5
-# The boundary is sampled so much more finely than the particles, in each dimension.
+# How much more finely than the particles the boundary is sampled, in each dimension.
 _FINER = {1: 1.0, 2: 4.0, 3: 2.0}
-# Steps along the gradient of the distance, which halve what is left at the sharpest of corners.
+# Steps along the gradient of the distance, which halve the distance at the sharpest of corners.
 _STEPS = 40
 _CELLS_AT_ONCE = 1024
 
@@ -36,20 +36,20 @@ _CELLS_AT_ONCE = 1024
 class ConformingLattice(Discretisation):
     """A lattice whose outermost particles lie on the boundary of any shape.
 
-    It begins as a lattice with points on the faces of the bounding box. Every point whose cell
-    the boundary crosses, from inside or outside, is moved to the place on the boundary nearest to
-    it, or onto an edge or a corner in its cell: so each corner has a particle, also where an arc
-    meets a straight line. Of those that come closer than half a spacing to each other, one stays.
-    A box aligned with the axes has the particles of `lattice` with `on_boundary`.
+    It starts from a lattice with points on the faces of the bounding box. Every point whose cell
+    the boundary crosses, inside or outside, is moved to the nearest place on the boundary, or onto
+    an edge or a corner in its cell: so each corner has a particle, also where an arc meets a
+    straight line. Of points closer to each other than half a spacing, one is kept. A box aligned
+    with the axes has the particles of `lattice` with `on_boundary`.
 
-    The volume of a particle is that part of the shape which is nearest to it; the total is exact
-    where the shape knows its own. Particles come in the order of the lattice points. Tags: each
-    face of the shape, `surface` and `interior`. There are no ghosts: behind a curved boundary
-    they have no place of their own.
+    The volume of a particle is the part of the shape nearest to it; the total is exact if the
+    shape knows its volume. Particles are in the order of the lattice points. Tags: each face of
+    the shape, `surface` and `interior`. There are no ghosts: behind a curved boundary their places
+    are not defined.
     """
 
     def particles(self, shape: Shape, spacing: float) -> Particles:
-        """As in the interface.
+        """Particles of the lattice, the outermost on the boundary.
 
         Raises:
             SceneError: the spacing is not positive, so large that no particle is left, or so
@@ -71,31 +71,20 @@ class ConformingLattice(Discretisation):
             grid.cell_volume,
             shape.volume(),
         )
-        # What lies where a composite shape closes up belongs to no part of it.
+        # A particle on a seam where a composite shape closes up has no volume.
         kept = volumes > _AT * grid.cell_volume
         positions, volumes, onto = positions[kept], volumes[kept], onto[kept]
-        count = len(positions)
         outermost = np.flatnonzero(onto)
         owners = nearest(cKDTree(positions[outermost]), surface.points)
-        own = faces(surface, attrs.evolve(owners, particles=outermost[owners.particles]))
-        none = np.zeros(count, dtype=np.bool_)
-        return Particles(
-            positions=positions,
-            volumes=volumes,
-            spacings=np.full(count, mean_spacing(grid, spacing)),
-            area_vectors=area_vectors(own, count, shape.dimension),
-            ghosts=none,
-            images=positions.copy(),
-            tags=tags(own, none, ()),
-            faces=own,
-        )
+        owned = faces(surface, attrs.evolve(owners, particles=outermost[owners.particles]))
+        return without_ghosts(positions, volumes, mean_spacing(grid, spacing), owned)
 
 
 def _arranged(
     shape: Shape, grid: Grid, distance: Array, spacing: float
 ) -> tuple[Indices, Mask, Array, Mask]:
-    """Lattice points that are particles (n,), which are on the boundary (n,), where they are now
-    (n, d) [m], and which points of the whole lattice are not where they were (size,)."""
+    """Numbers of the lattice points that are particles (n,), whether they are on the boundary (n,),
+    their positions (n, d) [m], and which points of the whole lattice have moved (size,)."""
     d = shape.dimension
     surface = shape.surface(spacing / _FINER[d])
     reach = gap(surface)
@@ -115,7 +104,7 @@ def _arranged(
         chosen, found = _feet(features, grid, start, reach, everywhere=codimension == 1)
         places[chosen], rank[chosen] = found, codimension
     moved = _pulled(shape, surface, places, spacing)
-    # What is on the boundary already, and keeps its place, does so to the last bit.
+    # Points that are on the boundary already stay in place to the last bit.
     still = np.abs((moved - start) / grid.steps).max(axis=1, initial=0.0) <= _AT
     moved[still] = start[still]
 
@@ -138,9 +127,9 @@ def _arranged(
 def _feet(
     features: Features, grid: Grid, start: Array, reach: float, *, everywhere: bool
 ) -> tuple[Indices, Array]:
-    """Which of the lattice points `start` (m, d) go onto the features, (k,), and where (k, d) [m].
+    """Which of the lattice points `start` (m, d) move onto features (k,), and to where (k, d) [m].
 
-    All do, or with `everywhere` false those in whose cell there is a feature.
+    All of them, or with `everywhere` false those with a feature in their cell.
     """
     if not len(features.points):
         return np.empty(0, dtype=np.intp), np.empty((0, start.shape[1]))
@@ -153,14 +142,14 @@ def _feet(
     first = np.asarray(nearest_at)[chosen]
     own = Features(features.points[first], features.normals[first])
     along = own.along(start[chosen] - own.points)
-    # Between samples only: beyond the last of them the feature may end.
+    # Only between samples: beyond the last of them the feature may end.
     length = np.linalg.norm(along, axis=1, keepdims=True)
     along *= np.minimum(1.0, reach / np.where(length > 0.0, length, 1.0))
     return chosen, own.points + along
 
 
 def _pulled(shape: Shape, surface: Surface, points: Array, spacing: float) -> Array:
-    """`points` (m, d) close to the boundary, brought onto it along the gradient of the distance."""
+    """`points` (m, d) close to the boundary, moved onto it along the gradient of the distance."""
     d, tolerance = points.shape[1], 1e-14 * spacing
     points = points.copy()
     for _ in range(_STEPS):
@@ -168,7 +157,7 @@ def _pulled(shape: Shape, surface: Surface, points: Array, spacing: float) -> Ar
         off = np.flatnonzero(np.abs(distance) > tolerance)
         if not off.size:
             return points
-        # Across so little that beside an edge only the face that the point is off is seen.
+        # So small a step that beside an edge it stays on the side of one face.
         step = np.maximum(1e-3 * np.abs(distance[off]), 1e-9 * spacing)[:, None]
         slope = np.stack(
             [
@@ -190,7 +179,7 @@ def _pulled(shape: Shape, surface: Surface, points: Array, spacing: float) -> Ar
 def _volumes(
     shape: Shape, grid: Grid, distance: Array, changed: Mask, numbers: Indices, positions: Array
 ) -> Array:
-    """What part of the shape is nearest to each particle, (n,) [m^d]."""
+    """Volume of the shape nearest to each particle, (n,) [m^d]."""
     around = grid.near(changed, 1)
     own = np.zeros(grid.size)
     unaffected = np.flatnonzero(~around[numbers])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import final
+from collections.abc import Mapping
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -20,19 +21,21 @@ _SAMPLES = 4
 @final
 @attrs.frozen
 class FittedMoments(Discretisation):
-    """Another discretisation, its volumes changed as little as possible so that the body's volume,
-    centre and second moments come out exactly.
+    """Another discretisation with the smallest change of its volumes that makes the body's volume,
+    centre and second moments exact.
 
-    A sum over the centres of n cells across a section gives it 1 - 1/n^2 of its second moment, and
-    one over points on its surface too much, so that a beam of five particles is some per cent too
-    soft or too stiff before anything else. The smallest relative change that mends this is
+    A sum over the centres of n cells across a section gives 1 - 1/n^2 of its second moment, and
+    one with points on its surface too much, so that a beam of five particles is some per cent too
+    soft or too stiff for that reason alone. The smallest relative change that corrects this is
     V <- V (1 + a + b . X + X . C X).
     """
 
     of: Discretisation = attrs.field(metadata={"part": "discretisations"})
 
+    example: ClassVar[Mapping[str, Any]] = {"of": "lattice"}
+
     def particles(self, shape: Shape, spacing: float) -> Particles:
-        """As in the interface.
+        """Particles of the wrapped discretisation with fitted volumes.
 
         Raises:
             SceneError: the fit would make a volume negative.
@@ -53,7 +56,7 @@ class FittedMoments(Discretisation):
 def fitted_volumes(positions: Array, volumes: Array, shape: Shape, spacing: float) -> Array:
     """Volumes (n,) of particles at `positions` (n, d) with the moments of `shape` up to the second.
 
-    `spacing` [m] is that of the particles; the surface is sampled more finely.
+    `spacing` [m] is that of the particles; samples of the surface are finer.
     """
     d = positions.shape[1]
     # About the centre, in units of the size, so that the equations are well scaled.
@@ -63,8 +66,8 @@ def fitted_volumes(positions: Array, volumes: Array, shape: Shape, spacing: floa
     upper = np.triu_indices(d)
     basis = np.hstack([np.ones((len(X), 1)), X, X[:, upper[0]] * X[:, upper[1]]])
     missing = _moments(shape, centre, scale, spacing / _SAMPLES) - volumes @ basis
-    # Volume and centre come first; second moments by what is left of their functions, which is
-    # nothing along a direction in which the particles stand in one or two layers.
+    # Volume and centre first, then second moments by what is left of their functions, which is
+    # zero along a direction with one or two layers of particles.
     fitted = volumes * (1.0 + _change(basis[:, : 1 + d], volumes, missing[: 1 + d]))
     gram = basis[:, : 1 + d].T @ (volumes[:, None] * basis[:, : 1 + d])
     along = np.linalg.lstsq(gram, basis[:, : 1 + d].T @ (volumes[:, None] * basis[:, 1 + d :]))[0]
@@ -76,7 +79,7 @@ def fitted_volumes(positions: Array, volumes: Array, shape: Shape, spacing: floa
 
 def _change(functions: Array, volumes: Array, missing: Array) -> Array:
     """The smallest relative change (n,) of the volumes that adds `missing` (k,) to the sums of
-    `functions` (n, k); what no change can add is left out."""
+    `functions` (n, k), as far as any change can."""
     gram = functions.T @ (volumes[:, None] * functions)
     change: Array = functions @ np.linalg.lstsq(gram, missing, rcond=1e-10)[0]
     return change
@@ -94,7 +97,7 @@ def _moments(shape: Shape, centre: Array, scale: float, spacing: float) -> Array
     sizes = np.linalg.norm(surface.area_vectors, axis=1)
     normals = surface.area_vectors / sizes[:, None]
     flux = np.sum(x * surface.area_vectors, axis=1) * scale
-    # A sample is an edge or a square, with a second moment of its own about its middle.
+    # A sample is an edge or a square, with a second moment about its own middle.
     edges = sizes ** (2.0 / max(d - 1, 1)) / scale**2 if d > 1 else np.zeros(len(x))
     own = (np.eye(d) - normals[:, :, None] * normals[:, None, :]) * edges[:, None, None] / 12.0
     second = x[:, upper[0]] * x[:, upper[1]] + own[:, upper[0], upper[1]]

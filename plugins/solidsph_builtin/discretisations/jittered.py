@@ -1,8 +1,9 @@
-"""Jittered: the particles of another discretisation, those inside the body a little off."""
+"""Jittered: another discretisation with random displacements inside the body."""
 
 from __future__ import annotations
 
-from typing import final
+from collections.abc import Mapping
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -19,13 +20,12 @@ from solidsph_builtin.shapes._checks import as_number
 @final
 @attrs.frozen
 class Jittered(Discretisation):
-    """The particles that `of` gives, each that owns no surface moved by a random displacement.
+    """The particles of `of`, with random displacements of those that own no surface.
 
-    So an arrangement without rows, that follows the boundary all the same: about
-    `conforming-lattice` for one. Along each axis the displacement is uniform in
-    [-amplitude, amplitude] spacings. One that would leave the shape is halved until it does not.
-    The volume of a particle is what part of the shape is nearest to it now, scaled to the volume
-    of all before; areas and tags stay.
+    With `conforming-lattice`, for example, this arrangement has no rows and still follows the
+    boundary. Along each axis the displacement is uniform in [-amplitude, amplitude] spacings; one
+    that would leave the shape is halved until it does not. The volume of a particle is the part of
+    the shape nearest to it, scaled to the former total volume; areas and tags do not change.
 
     Raises:
         SceneError: a parameter is of the wrong kind or out of range.
@@ -35,11 +35,13 @@ class Jittered(Discretisation):
     amplitude: float = attrs.field(converter=as_number)  # in spacings, 0 <= amplitude < 1/2 [-]
     seed: int  # of the random numbers: the same seed gives the same particles
 
+    example: ClassVar[Mapping[str, Any]] = {"of": "lattice", "amplitude": 0.2, "seed": 1}
+
     def __attrs_post_init__(self) -> None:
         check_noise(self, self.amplitude, self.seed)
 
     def particles(self, shape: Shape, spacing: float) -> Particles:
-        """As in the interface.
+        """The displaced particles.
 
         Raises:
             SceneError: `of` has ghosts, which would no longer be images of particles.

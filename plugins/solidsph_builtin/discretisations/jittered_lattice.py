@@ -1,8 +1,9 @@
-"""Jittered lattice: particles a little off the centres of their cells."""
+"""Jittered lattice: particles displaced from the centres of their cells."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -19,12 +20,11 @@ from solidsph_builtin.shapes._checks import as_number
 
 @attrs.frozen
 class JitteredLattice(Discretisation):
-    """The particles of a lattice, each moved by a random displacement, to test without symmetry.
+    """The particles of a lattice with random displacements, for tests without symmetry.
 
-    Along each axis the displacement is uniform in [-amplitude, amplitude] cells. One that would
-    leave the shape is halved until it does not. Volume and area of a particle are those of the
-    cell that it came from; ghosts stay on the lattice, with their images. Tags are those of the
-    lattice.
+    Along each axis the displacement is uniform in [-amplitude, amplitude] cells; one that would
+    leave the shape is halved until it does not. Volume and area of a particle are those of its
+    cell; ghosts stay on the lattice, with their images. Tags are those of the lattice.
 
     Raises:
         SceneError: a parameter is of the wrong kind or out of range.
@@ -35,12 +35,14 @@ class JitteredLattice(Discretisation):
     ghosts: int = 0  # layers
     ghost_faces: Sequence[str] | None = None  # where there are ghosts; behind every face if None
 
+    example: ClassVar[Mapping[str, Any]] = {"amplitude": 0.2, "seed": 1}
+
     def __attrs_post_init__(self) -> None:
         check_noise(self, self.amplitude, self.seed)
         check_ghosts(self, self.ghosts)
 
     def particles(self, shape: Shape, spacing: float) -> Particles:
-        """As in the interface.
+        """The displaced particles and the ghosts.
 
         Raises:
             SceneError: the spacing is not positive, so large that no particle lies in the shape,
@@ -49,12 +51,7 @@ class JitteredLattice(Discretisation):
         spacing = check_spacing(self, spacing)
         grid = grid_over(self, shape, spacing, beyond=self.ghosts)
         regular = lattice_particles(
-            self,
-            shape,
-            grid,
-            spacing,
-            ghosts=self.ghosts,
-            ghost_faces=self.ghost_faces,
+            self, shape, grid, spacing, ghosts=self.ghosts, ghost_faces=self.ghost_faces
         )
         real = np.flatnonzero(~regular.ghosts)
         noise = np.random.default_rng(self.seed).uniform(-1.0, 1.0, (real.size, shape.dimension))

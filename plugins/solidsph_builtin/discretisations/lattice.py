@@ -18,18 +18,18 @@ from solidsph_builtin.discretisations._grid import grid_over
 class Lattice(Discretisation):
     """A cubic lattice in the bounding box of the shape; the points inside the shape are particles.
 
-    Particles sit at the centres of the cells, or with `on_boundary` at their corners, so that the
-    outermost lie on the faces of the box. A spacing that does not divide a side of the box is
-    changed along it to the nearest that does; `spacings` tells the geometric mean of the axes.
+    Particles are at the centres of the cells, or with `on_boundary` at their corners, so that the
+    outermost are on the faces of the box. A spacing that does not divide a side of the box is
+    changed along it to the nearest that does; `spacings` is the geometric mean over the axes.
 
-    The volume of a particle is that part of the shape which is nearest to it: half a cell on a
-    face with `on_boundary`, a quarter or an eighth on an edge or in a corner. The total is exact
-    where the shape knows its own. Particles come in the order of their coordinates, the axis with
-    most of them running fastest, ghosts after all others.
+    The volume of a particle is the part of the shape nearest to it: half a cell on a face with
+    `on_boundary`, a quarter or an eighth on an edge or in a corner. The total is exact if the shape
+    knows its volume. Particles are in the order of their coordinates, the axis with most of them
+    fastest, ghosts after all others.
 
-    `ghosts` adds so many layers of lattice points beyond the surface, in holes as well, or only
-    behind some faces: with `ghost_faces = ["left", "bottom"]` at those two and their corner. Each
-    has the volume of a whole cell, and as image its mirror image in the surface.
+    `ghosts` is the number of layers of lattice points beyond the surface, in holes as well, or only
+    behind some faces: `ghost_faces = ["left", "bottom"]` for those two and their corner. A ghost
+    has the volume of a whole cell, and its mirror image in the surface as image.
 
     Tags: each face of the shape, `surface`, `interior` and `ghosts`; with ghosts also each face
     with `-ghosts` appended, for those nearest to it.
@@ -48,7 +48,7 @@ class Lattice(Discretisation):
         check_ghosts(self, self.ghosts)
 
     def particles(self, shape: Shape, spacing: float) -> Particles:
-        """As in the interface.
+        """The lattice points in the shape, and the ghosts.
 
         Raises:
             SceneError: the spacing is not positive, so large that no particle lies in the shape,
@@ -57,10 +57,5 @@ class Lattice(Discretisation):
         spacing = check_spacing(self, spacing)
         grid = grid_over(self, shape, spacing, on_boundary=self.on_boundary, beyond=self.ghosts)
         return lattice_particles(
-            self,
-            shape,
-            grid,
-            spacing,
-            ghosts=self.ghosts,
-            ghost_faces=self.ghost_faces,
+            self, shape, grid, spacing, ghosts=self.ghosts, ghost_faces=self.ghost_faces
         )

@@ -1,9 +1,9 @@
-"""Mapped: particles of a simple shape, moved by a formula to where a curved body has its own."""
+"""Mapped: particles of a simple shape, moved by a formula into a curved body."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -27,22 +27,29 @@ _SAMPLES = 8
 @final
 @attrs.frozen
 class Mapped(Discretisation):
-    """The particles that `of` gives to the shape `before`, moved `to` formulas of X, Y and Z.
+    """The particles of `of` in the shape `before`, moved `to` formulas of X, Y and Z.
 
-    Rows of particles then follow a curved boundary and bend back smoothly towards the inside,
-    where a lattice that is cut or nudged at the boundary has irregular neighbours, which cost a
-    clamped beam one per cent. Components that `to` does not name stay. The particles must lie in
-    the body's own shape, whose faces they take: those of `before` are forgotten.
+    Rows of particles then follow a curved boundary and straighten smoothly towards the inside. A
+    lattice that is cut or moved at the boundary has irregular neighbours instead, which costs a
+    clamped beam one per cent. Components that `to` does not name do not change. The particles must
+    lie in the shape of the body, and have its faces, not those of `before`.
 
-    Volumes grow with the Jacobian of the map, and are scaled to those of the body.
+    Volumes are multiplied by the Jacobian of the map, and scaled to that of the body.
     """
 
     of: Discretisation = attrs.field(metadata={"part": "discretisations"})
     before: Shape = attrs.field(metadata={"part": "shapes"})
     to: Mapping[str, Component]  # {x = "X + 0.1*Y**2"} [m]
 
+    # The rectangle of the conformance kit, mapped to itself.
+    example: ClassVar[Mapping[str, Any]] = {
+        "of": "lattice",
+        "before": {"type": "box", "lengths": [1.2, 0.8]},
+        "to": {"x": "X + 0.05*sin(2*pi*X/1.2)"},
+    }
+
     def particles(self, shape: Shape, spacing: float) -> Particles:
-        """As in the interface.
+        """The moved particles.
 
         Raises:
             SceneError: the map turns a volume over, a particle leaves the shape, or `of` has
@@ -77,7 +84,7 @@ class Mapped(Discretisation):
 
 
 def _moved(field: VectorField, X: Array) -> Array:
-    """Where the map takes X (n, d) [m]."""
+    """Images of X (n, d) under the map [m]."""
     x = X.copy()
     for axis in field.components:
         x[:, axis] = field.values(axis, X, 0.0)
@@ -85,7 +92,7 @@ def _moved(field: VectorField, X: Array) -> Array:
 
 
 def _jacobian(field: VectorField, X: Array, steps: Array) -> Array:
-    """Volume after the map over that before, (n,)."""
+    """Ratio of volumes after and before the map, (n,)."""
     columns = []
     for axis in np.eye(X.shape[1]):
         offset = steps[:, None] * axis
@@ -97,7 +104,7 @@ def _jacobian(field: VectorField, X: Array, steps: Array) -> Array:
 
 
 def _volume(shape: Shape, spacing: float) -> float:
-    """Of the shape, by its own knowledge or by the divergence theorem [m^d]."""
+    """Volume of the shape, in closed form or by the divergence theorem [m^d]."""
     known = shape.volume()
     if known is not None:
         return known

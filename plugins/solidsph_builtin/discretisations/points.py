@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from reprlib import repr as short
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -21,20 +22,20 @@ from solidsph.system.files import content, located
 from solidsph_builtin.discretisations._checks import check_spacing, refusal
 from solidsph_builtin.discretisations._grid import Grid, grid_over
 from solidsph_builtin.discretisations._nearest import nearest
-from solidsph_builtin.discretisations._surface import area_vectors, faces, sampled, tags
+from solidsph_builtin.discretisations._surface import faces, sampled, without_ghosts
 
-# Closer than this, in spacings, two points are one; and so far outside a point is still inside.
+# Closer than this, in spacings, two points coincide; a point outside by less than this is inside.
 _TOLERANCE = 1e-6
-# Samples along a spacing that find out which point is the nearest, for each dimension. Even, so
-# that none lies between two points of a lattice.
+# Samples along a spacing from which the volumes nearest to points are found, for each dimension.
+# Even, so that none lies half way between two points of a lattice.
 _SAMPLES = {1: 64, 2: 8, 3: 4}
 _CHUNK = 1 << 16
-# Of a file of points: some 25 characters for each coordinate of 5e7 points in space.
+# Size of a file of points: some 25 characters for each coordinate of 5e7 points in space.
 _MOST_BYTES = 2**32
 
 
 def _as_array(value: Any) -> Any:
-    """Numbers as a read-only copy; anything else as it is, for the check to refuse."""
+    """Numbers as a read-only copy; anything else unchanged, for the check to refuse."""
     if value is None:
         return None
     try:
@@ -51,13 +52,12 @@ class Points(Discretisation):
 
     They are either listed as `positions`, or read from a `file` with a row for each point and a
     column for each dimension: .npy, .csv with commas, or text with blanks; comments begin
-    with #. It is a regular file of up to 4 GiB. A relative path starts from the working directory;
-    of a run that is gone on with, from the one that it was begun in.
+    with #. It is a regular file of up to 4 GiB. A relative path is relative to the working
+    directory; in a resumed run, to that in which the run was started.
 
-    Volumes are given, and taken as they are, or else what part of the shape is nearest to each
-    point, found by sampling and scaled to the exact total where the shape knows its own. Each
-    sample of the surface goes to the point nearest to it. Tags are those of a lattice. There are
-    no ghosts.
+    Without given `volumes` that of a point is the part of the shape nearest to it, found by
+    sampling and scaled to the exact total if the shape knows its volume. Each sample of the surface
+    belongs to the nearest point. Tags are those of a lattice. There are no ghosts.
 
     Raises:
         SceneError: not exactly one of `positions` and `file` is given, or one cannot be read.
@@ -66,6 +66,11 @@ class Points(Discretisation):
     positions: Array | None = attrs.field(default=None, converter=_as_array)  # (n, d) [m]
     file: str | Path | None = None
     volumes: Array | None = attrs.field(default=None, converter=_as_array)  # (n,) [m^d]
+
+    # Points in the rectangle of the conformance kit.
+    example: ClassVar[Mapping[str, Any]] = {
+        "positions": [[0.05 + 0.1 * i, 0.05 + 0.1 * j] for i in range(12) for j in range(8)]
+    }
 
     def __attrs_post_init__(self) -> None:
         if (self.positions is None) == (self.file is None):
@@ -76,7 +81,7 @@ class Points(Discretisation):
                 raise refusal(self, f"{name} must be numbers in equal rows, got {short(value)}")
 
     def particles(self, shape: Shape, spacing: float) -> Particles:
-        """As in the interface; `spacing` is what the points are said to have.
+        """The points as particles, with the given `spacing`.
 
         Raises:
             SceneError: the spacing is not positive, the file cannot be read, or a point is not
@@ -87,23 +92,11 @@ class Points(Discretisation):
         self._check_places(shape, positions, spacing)
         tree = cKDTree(positions)
         surface = sampled(self, shape, spacing)
-        owners = nearest(tree, surface.points)
-        count = len(positions)
-        own = faces(surface, owners)
-        none = np.zeros(count, dtype=np.bool_)
-        return Particles(
-            positions=positions,
-            volumes=self._volumes(shape, tree, spacing),
-            spacings=np.full(count, spacing),
-            area_vectors=area_vectors(own, count, shape.dimension),
-            ghosts=none,
-            images=positions.copy(),
-            tags=tags(own, none, ()),
-            faces=own,
-        )
+        owned = faces(surface, nearest(tree, surface.points))
+        return without_ghosts(positions, self._volumes(shape, tree, spacing), spacing, owned)
 
     def _positions(self, dimension: int) -> Array:
-        """The points as an array of our own (n, d) [m]."""
+        """The points as a new array (n, d) [m]."""
         given = self._read(Path(self.file)) if self.file is not None else self.positions
         points = np.array(given, dtype=np.float64, order="C")
         if points.ndim == 1 and dimension == 1:
@@ -123,7 +116,7 @@ class Points(Discretisation):
     def _read(self, path: Path) -> Array:
         try:
             with warnings.catch_warnings():
-                # A file without any number is only warned about.
+                # For a file without any number NumPy only warns.
                 warnings.simplefilter("error", UserWarning)
                 data, suffix = content(located(path), _MOST_BYTES), path.suffix.lower()
                 if suffix == ".npy":
@@ -173,7 +166,7 @@ class Points(Discretisation):
         return self.volumes.copy()
 
     def _nearest_volumes(self, shape: Shape, tree: cKDTree, spacing: float) -> Array:
-        """What part of the shape is nearest to each point (n,) [m^d]."""
+        """Volume of the shape nearest to each point, (n,) [m^d]."""
         grid: Grid = grid_over(self, shape, spacing)
         fine = _SAMPLES[shape.dimension]
         samples = attrs.evolve(
@@ -202,7 +195,7 @@ def _table(text: str, delimiter: str | None) -> Array:
     """Rows of numbers.
 
     Raises:
-        ValueError: there are others.
+        ValueError: a row holds something else.
     """
     try:
         return np.loadtxt(io.StringIO(text), delimiter=delimiter, ndmin=2)
@@ -211,7 +204,7 @@ def _table(text: str, delimiter: str | None) -> Array:
         first = next(filter(None, lines), "")
         if any(_is_number(word) for word in first.split(delimiter)):
             raise
-        hint = f"its first line {short(first)} is no row of numbers; begin a header with '#'"
+        hint = f"its first line {short(first)} is not a row of numbers; begin a header with '#'"
         raise ValueError(f"{cause}: {hint}") from None
 
 

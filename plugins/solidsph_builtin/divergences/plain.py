@@ -15,9 +15,9 @@ from solidsph.maths.arrays import Scalar
 class Plain(PointwiseDivergence):
     """f_p = V_p sum over q of T_q g_pq without q = p: the sum of Ismail & Reddy, eq. 17.
 
-    A gradient of differences has a weight at q = p; left in, it would make this a sum over
+    A gradient of differences has a weight at q = p. Included, it would make this a sum over
     T_q - T_p, which is not the paper's and hides the tensile instability: a uniform stress would
-    exert no force however the particles are arranged.
+    exert no force in any arrangement of the particles.
     """
 
     conserves_momentum: ClassVar[bool] = False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 
@@ -25,6 +25,8 @@ class BodyForce(Effect):
 
     acceleration: Mapping[str, Component]  # b such as {y = -9.81} [m/s^2]
     where: Where = "all"
+
+    example: ClassVar[Mapping[str, Any]] = {"acceleration": {"x": "-9.81*cos(50*t)"}}
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
         field = VectorField.of(self.acceleration, "body-force: acceleration", end=model.end)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -57,6 +57,8 @@ class BondFailure(Effect):
 
     critical_stretch: float = number()  # [-]
     where: Where = "all"  # particles between which bonds may fail
+
+    example: ClassVar[Mapping[str, Any]] = {"critical_stretch": 4e-4}
 
     def __attrs_post_init__(self) -> None:
         check_positive(

@@ -73,6 +73,13 @@ class Heat(Effect):
     held: Sequence[Any] = attrs.field(default=(), converter=_places)
     largest: float = number(default=1000.0)  # |T| up to which the time step is stable [K]
 
+    example: ClassVar[Mapping[str, Any]] = {
+        "conductivity": 50.0,
+        "heat_capacity": 500.0,
+        "expansion": 1e-4,
+        "initial": "100*sin(4*X)",
+    }
+
     def __attrs_post_init__(self) -> None:
         check_positive("heat", "conductivity", self.conductivity, "W/(m K)")
         check_positive("heat", "heat_capacity", self.heat_capacity, "J/(kg K)")

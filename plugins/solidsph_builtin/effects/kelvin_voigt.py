@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -38,6 +38,8 @@ class KelvinVoigt(Effect):
     uses_initial_pairs: ClassVar[bool] = True
 
     time: float = number()  # retardation time [s]
+
+    example: ClassVar[Mapping[str, Any]] = {"time": 1e-5}
 
     def __attrs_post_init__(self) -> None:
         check_positive("kelvin-voigt", "time", self.time, "s, or leave the effect out")

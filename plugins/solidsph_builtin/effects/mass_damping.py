@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 
@@ -26,6 +26,8 @@ class MassDamping(Effect):
 
     rate: float = number()  # c [1/s]
     where: Where = "all"
+
+    example: ClassVar[Mapping[str, Any]] = {"rate": 20.0}
 
     def __attrs_post_init__(self) -> None:
         check_positive("mass-damping", "rate", self.rate, "1/s, or leave the effect out")

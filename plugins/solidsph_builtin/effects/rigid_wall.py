@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import isfinite, sqrt
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -60,6 +60,8 @@ class RigidWall(Effect):
     strength: float = number(default=1.0)  # [-]
     clearance: float | None = optional_number()  # [spacings]; the depth below the surface if none
     displacement: Mapping[str, Component] | None = None  # such as {y = "-0.1*t"} [m]
+
+    example: ClassVar[Mapping[str, Any]] = {"point": {"x": 0.05}, "normal": {"x": 1.0}}
 
     def __attrs_post_init__(self) -> None:
         check_positive("rigid-wall", "strength", self.strength, "1 / spacings that it yields")

@@ -20,8 +20,8 @@ from solidsph_builtin.gradients.corrected import Corrected
 class UpdatedLagrangian(Formulation):
     """F = (I - du/dx)^-1, rho a = div sigma with sigma = P F^T / J. Ismail & Reddy, section 5.2.
 
-    Neighbours and kernel are found anew at every step. Under tension neighbouring particles
-    attract each other: the tensile instability, which this form is here to show.
+    Neighbours and kernel values are recomputed at every step. Under tension neighbouring particles
+    attract each other: the tensile instability, which this form demonstrates.
     """
 
     configuration: ClassVar[Configuration] = Configuration.CURRENT

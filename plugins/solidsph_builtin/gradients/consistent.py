@@ -1,4 +1,4 @@
-"""A gradient whose sums integrate what the surface must carry."""
+"""A gradient whose sums satisfy discrete integration by parts."""
 
 from __future__ import annotations
 
@@ -18,59 +18,58 @@ from solidsph.model.neighbours import Pairs
 from solidsph.model.particles import Particles
 from solidsph_builtin.gradients.quadratic import Quadratic, closeness
 
-# Eigenvalues of a moment matrix below this part of the largest belong to what the neighbours do
-# not tell apart; nothing can be asked of a weight there.
+# Eigenvalues of a moment matrix below this part of the largest belong to functions that the
+# neighbours do not determine; no condition can be imposed on those.
 _DEPENDENT = 1e-10
 
-# How far the sums of surface particles may miss their area, beside the change of the weights that
-# would be needed: sampled areas may disagree with the volumes, and then none is exact. It must be
-# small: a multiplier that varies over n particles costs n^-6 of one that alternates, so that with
-# 1e-6 the loads on a side of 48 particles were missed by enough to spoil the second order.
+# How far the sums of surface particles may miss their area, relative to the change of the weights:
+# sampled areas may disagree with the volumes, and then no weights are exact. It must be small: a
+# multiplier that varies over n particles costs n^-6 of one that alternates, so that with 1e-6 the
+# loads on a side of 48 particles had errors large enough to spoil the second order.
 _AT_SURFACE = 1e-9
 
-# Only so that smooth fields, which hardly change any weight, leave the matrix regular; taken back
-# by refinement.
+# Keeps the matrix regular in spite of smooth fields, which hardly change any weight; corrected by
+# iterative refinement.
 _REGULAR = 1e-12
 _REFINEMENTS = 50
 _SOLVED = 1e-12
 
-# Where few neighbours leave little to change, refinement stalls and some 1e-4 of what is missing
-# stays so; with more than this the wrapper would be of no use.
+# With few neighbours there is little to change, and refinement stalls at some 1e-4 of what is
+# missing; with more than this left over, the wrapper would be of no use.
 _USELESS = 1e-2
 
 
 @final
 @attrs.frozen
 class Consistent(Gradient):
-    """Another gradient, its weights changed as little as possible so that in every particle inside
-    a body the forces of a constant stress cancel, and on its surface give the traction.
+    """Another gradient with the smallest change of its weights that makes the forces of a constant
+    stress cancel at every particle inside a body, and equal the traction on its surface.
 
     Integration by parts, sum over q of V_q g_qp = A_p, with the area vector A_p of the surface and
-    0 inside, is what a sum of forces must keep to pass the patch test (Chen, Hillman & Rueter
-    2013). It holds by symmetry on a lattice, and fails beside a surface and wherever particles
-    stand irregularly: there a constant stress pushes them, and the error does not fall with the
-    spacing. Chen et al. change test functions only, which costs the energy and the angular
-    momentum; here the gradient itself is changed, so that the variational divergence remains the
-    derivative of an energy:
+    0 inside, is the condition of the patch test (Chen, Hillman & Rueter 2013). It holds by symmetry
+    on a lattice, and fails beside a surface and in irregular arrangements: there a constant stress
+    exerts forces, and the error does not decrease with the spacing. Chen et al. change test
+    functions only, which costs the energy and the angular momentum; here the gradient itself is
+    changed, so that the variational divergence remains the derivative of an energy:
 
         g_pq <- g_pq + w_pq V_p (l_q - l_p - b(X_pq) . a_p),
 
     with a_p such that polynomials up to the degree of the gradient, at most the second, keep what
-    they have, and l from the sparse linear system of the sums: the least change, each divided by
-    its kernel weight w. It is solved once, when the body is built, and costs a factorisation over
-    neighbours of neighbours: some tenths of a second for 5000 particles in the plane, and too much
-    for more than some 10^4 in space.
+    their gradients, and l from the sparse linear system of the sums: the least change, with each
+    weight's change divided by its kernel weight w. The system is solved once, when the body is
+    built, by a factorisation over neighbours of neighbours: some tenths of a second for 5000
+    particles in the plane, and too expensive beyond some 10^4 in space.
     """
 
     of: Gradient = attrs.field(factory=Quadratic, metadata={"part": "gradients"})
 
     @property
     def exact_degree(self) -> int:
-        """That of the gradient within."""
+        """That of the wrapped gradient."""
         return self.of.exact_degree
 
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
-        """Those of the gradient within: what is to be added is known once there is a body."""
+        """Those of the wrapped gradient: the change is known once there is a body."""
         return self.of.weights(pairs, kernel_gradients, volumes)
 
     def of_body(
@@ -87,8 +86,8 @@ class Consistent(Gradient):
             raise BuildError(
                 [
                     f"gradient 'consistent': body {body!r} has {int(particles.ghosts.sum())} "
-                    "ghosts, and there is no telling what their sums should be; put particles on "
-                    "the boundary in their place (conforming-lattice)"
+                    "ghosts, whose sums have no known value; put particles on the boundary "
+                    "instead (conforming-lattice)"
                 ]
             )
         if moving:
@@ -116,7 +115,7 @@ class Consistent(Gradient):
 @final
 @attrs.frozen(eq=False)
 class _OfBody(Gradient):
-    """The gradient of one body: row by row, so that an engine may ask for some rows at a time."""
+    """The gradient of one body, whose weights are computed row by row as engines need them."""
 
     of: Gradient
     volumes: Array  # (n,) of the body [m^d]
@@ -134,7 +133,7 @@ class _OfBody(Gradient):
 
 @attrs.frozen(eq=False)
 class _Change:
-    """How the weights of some rows change with the multipliers."""
+    """Change of the weights of some rows with the multipliers."""
 
     pairs: Pairs
     closeness: Array  # (m,) w
@@ -160,10 +159,10 @@ class _Change:
         return cls(pairs, w, np.einsum("mi,mij->mj", basis, pairs.spread(units)), volumes)
 
     def weights(self, multipliers: Array) -> Array:
-        """What the multipliers (n, d) add to the weights, (m, d)."""
+        """Change of the weights by multipliers (n, d), (m, d)."""
         pairs, w, b = self.pairs, self.closeness, self.tests
         y = multipliers[pairs.columns] - multipliers[pairs.rows]
-        for _ in range(2):  # once leaves rounding that shows as stress in a rigid rotation
+        for _ in range(2):  # a single pass leaves rounding, which shows as stress in a rotation
             along = pairs.row_sums((w[:, None] * b)[:, :, None] * y[:, None, :])
             y = y - np.einsum("mk,mki->mi", b, pairs.spread(along))
         return pairs.of_differences((w * self.volumes[pairs.rows])[:, None] * y)
@@ -182,10 +181,10 @@ class _Change:
 
 
 def _possible(missing: Array, positions: Array, surface: Mask, degree: int) -> Array:
-    """What is `missing` (n, d), with the least change at the surface that makes it possible.
+    """`missing` (n, d) with the least change at the surface that makes the system solvable.
 
-    Polynomials keep their gradients, so that the sums of a polynomial f, sum of f_p A_p, are those
-    of V grad f whatever the weights: the areas must agree with the volumes as far as that.
+    Gradients of polynomials do not change, so that the sum of f_p A_p of a polynomial f is the sum
+    of V grad f whatever the weights: so far the areas must agree with the volumes.
     """
     X = positions - positions.mean(axis=0)
     X = X / np.abs(X).max()
@@ -217,9 +216,9 @@ def _solved(matrix: csr_array, missing: Array, surface: Mask) -> Array:
     if not unsolved <= _USELESS:
         raise BuildError(
             [
-                "gradient 'consistent': no change of the weights makes the sums right (a part of "
+                "gradient 'consistent': no change of the weights satisfies the sums (a part of "
                 f"{unsolved:.3g} of what is missing is left); a larger cover gives it more weights "
-                "to change, or take the gradient within by itself"
+                "to change, or use the wrapped gradient by itself"
             ]
         )
     return multipliers

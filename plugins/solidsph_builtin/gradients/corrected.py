@@ -31,5 +31,5 @@ class Corrected(PointwiseGradient):
     def correction(moment: Tensor) -> Tensor:
         K = inverse_transpose(moment)
         condition = np.sqrt(contraction(moment, moment) * contraction(K, K))
-        # 1 where it is to be trusted, and infinite elsewhere.
+        # A factor 1 where K is accurate, infinite elsewhere.
         return scale(1.0 / (condition < _WORST_CONDITION), K)

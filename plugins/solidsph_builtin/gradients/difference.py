@@ -14,9 +14,9 @@ from solidsph.interfaces.gradient import PointwiseGradient
 class Difference(PointwiseGradient):
     """grad f_p = sum over q of (f_q - f_p) dW/dx_p V_q: the gradient of a constant is zero.
 
-    Equal to the standard one where supports are complete, and unlike it independent of where the
-    body stands, which the updated Lagrangian form needs: there, moved neighbours unbalance the
-    weights.
+    It equals the standard gradient where supports are complete. Unlike that, it does not depend on
+    the position of the body, as the updated Lagrangian form requires: there, moved neighbours
+    unbalance the weights.
     """
 
     exact_degree: ClassVar[int] = 0

@@ -14,13 +14,13 @@ from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs
 from solidsph_builtin.gradients.corrected import Corrected
 
-# Beyond this condition number of the scaled moment matrix the neighbours do not determine the
-# second derivatives: well placed ones, surfaces included, stay below some thousands.
+# Beyond this condition number of the scaled moment matrix the neighbours do not determine second
+# derivatives; of good arrangements, surfaces included, it is below some thousands.
 _WORST_CONDITION = 1e7
 
-# Largest sum of the lengths of a particle's weights, times its reach. A fit that leans on small
-# differences of large weights answers noise like a feature smaller by this factor, and the stable
-# step shrinks with it. On lattices it is about 20 at a corner, five times that of a linear fit.
+# Largest sum of the lengths of a particle's weights, times its reach. A fit that relies on small
+# differences of large weights amplifies noise by this factor, and the stable step shrinks with it.
+# On lattices it is about 20 at a corner, five times that of a linear fit.
 _WORST_AMPLIFICATION = 60.0
 
 # Pairs treated at once: a moment matrix in 3D has 81 entries a pair.
@@ -36,7 +36,7 @@ class Quadratic(Gradient):
     the offset and their products; the gradient is the linear part of a. The weight of a neighbour
     is -V_q W'(r) / r, with which a fit of linear terms alone is the `corrected` gradient. So the
     gradient is exact for a constant strain gradient, at free surfaces too, where the corrected one
-    is one-sided and makes a bending beam soft.
+    is one-sided and makes a bending beam too soft.
 
     Where the neighbours do not determine a quadratic fit (bodies fewer than about four particles
     thick), that particle falls back to the linear one, with a warning.
@@ -51,7 +51,7 @@ class Quadratic(Gradient):
             own = slice(pairs.starts[rows.start], pairs.starts[rows.stop])
             weights[own], poor[rows] = _fitted(pairs, rows, kernel_gradients[own], volumes)
         if poor.any():
-            # Without a count: an engine may ask for some rows at a time, and one warning is enough.
+            # Without a count: an engine may compute some rows at a time, and one warning is enough.
             warnings.warn(
                 "gradient 'quadratic': some particles have too few or too flat neighbours for a "
                 "quadratic fit and use the linear one; a larger cover or a finer spacing gives "
@@ -95,7 +95,7 @@ def _fitted(
     poor = ~(np.linalg.cond(moments) < _WORST_CONDITION)
     moments[poor] = np.eye(basis.shape[1])  # any regular matrix: these rows are replaced
     inverse = np.linalg.inv(moments)
-    # One step of refinement: what the inverse lacks would show as stress in a rigid rotation.
+    # One step of refinement: the error of the inverse would show as stress in a rigid rotation.
     missing = np.eye(basis.shape[1])[:d] - inverse[:, :d] @ moments
     slopes = inverse[:, :d] + missing @ inverse
     weights = np.einsum("mij,mj->mi", slopes[row], w[:, None] * basis)
@@ -104,6 +104,6 @@ def _fitted(
 
 
 def closeness(kernel_gradients: Array, distances: Array) -> Array:
-    """-W'(r) / r of every pair, (k,); a particle's own offset is zero and needs no weight."""
+    """-W'(r) / r of every pair, (k,); 0 for self pairs, whose offset is zero."""
     safe = np.where(distances > 0.0, distances, 1.0)
     return np.where(distances > 0.0, np.linalg.norm(kernel_gradients, axis=1) / safe, 0.0)

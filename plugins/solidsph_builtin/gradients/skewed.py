@@ -23,10 +23,10 @@ class Skewed(Gradient):
     """The corrected gradient with neighbours ahead along an axis weighing more than those behind.
 
     Each weight is multiplied by 1 + skew cos(angle between the neighbour's offset and the axis):
-    the "non-symmetric cover functions" by which Ismail & Reddy, section 6, think upwinding may be
-    possible. Linear fields stay exact. The case `upwinding` measures what it does: with the
-    variational divergence, which leans the other way, no energy is lost and motions that alternate
-    from particle to particle are seen; with the plain one waves against the axis grow.
+    the "non-symmetric cover functions" of Ismail & Reddy, section 6, who expect upwinding from
+    them. Linear fields stay exact. The case `upwinding` measures the effect: with the variational
+    divergence, which is skewed the other way, no energy is lost and motions that alternate from
+    particle to particle are resisted; with the plain one waves against the axis grow.
     """
 
     exact_degree: ClassVar[int] = 1
@@ -48,7 +48,7 @@ class Skewed(Gradient):
         if axis >= pairs.offsets.shape[1]:
             raise SceneError(
                 f"gradient 'skewed': axis {self.axis!r} in a {pairs.offsets.shape[1]}D scene; take "
-                "one that it has"
+                "an axis of the scene"
             )
         safe = np.where(pairs.distances > 0.0, pairs.distances, 1.0)
         factor = 1.0 + self.skew * pairs.offsets[:, axis] / safe

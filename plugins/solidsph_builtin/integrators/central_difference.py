@@ -15,8 +15,8 @@ from solidsph.maths.arrays import Scalar
 class CentralDifference(PointwiseIntegrator):
     """u_n+1 = dt^2 a_n + 2 u_n - u_n-1. Ismail & Reddy, eq. 18.
 
-    Carried out on h_n = (u_n - u_n-1) / dt: the same numbers in exact arithmetic, but no digits are
-    lost in the difference of near equals. The velocity shown is (u_n+1 - u_n-1) / (2 dt).
+    Evaluated in h_n = (u_n - u_n-1) / dt: the same in exact arithmetic, but no digits are lost in
+    the difference of nearly equal numbers. The velocity of a state is (u_n+1 - u_n-1) / (2 dt).
     """
 
     order: ClassVar[int] = 2

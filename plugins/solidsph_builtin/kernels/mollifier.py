@@ -10,7 +10,7 @@ import numpy as np
 from solidsph.interfaces.kernel import Kernel
 from solidsph.maths.arrays import Scalar
 
-# Below this 1 - q^2 the profile is far under the smallest double; it only keeps 1 / 0 away.
+# Avoids 1 / 0; for smaller 1 - q^2 the profile is far below the smallest double anyway.
 _TINY = 1e-9
 
 

@@ -1,12 +1,12 @@
-"""Plastic flow that keeps volume: the way back to the yield surface at a fixed deformation.
+"""Isochoric plastic flow: the return to the yield surface at a fixed deformation.
 
 The history holds G = C_p^-1, symmetric and of determinant 1. With the isochoric elastic metric
 b = J^(-2/3) F G F^T = c I + x n, where n is a deviator of length 1, the deviator of the Kirchhoff
-stress is mu x n. At fixed F flow shortens x and keeps n, and c follows from det b = 1; the radial
-return of Simo (1988), but for that last condition, without which elastic volumes drift.
+stress is mu x n. At fixed F flow reduces x and keeps n, and c follows from det b = 1. This is the
+radial return of Simo (1988) with that last condition added, without which elastic volumes drift.
 
-The equivalent plastic strain is the conjugate of the equivalent stress sqrt(3/2) mu x: what flow
-takes from the stored energy, mu/2 d(tr b), is equivalent stress times its increment, exactly.
+The equivalent plastic strain is the conjugate of the equivalent stress sqrt(3/2) mu x: the energy
+that flow dissipates, mu/2 d(tr b), is exactly equivalent stress times its increment.
 """
 
 from __future__ import annotations
@@ -33,14 +33,15 @@ from solidsph.maths.tensors import (
 ROOT = sqrt(2.0 / 3.0)
 
 # Newton's method from above, where the cubic is convex: each step squares the error, x^2 / 3 at
-# first. Two do for metals, whose x is some thousandths, five for a flow stress near mu.
+# first. Two steps suffice for metals, whose x is some thousandths, five for a flow stress near mu.
 _CUBIC_STEPS = 5
 
-_NONE = 1e-30  # keeps the direction of no deviator at all finite
+_NONE = 1e-30  # keeps the direction of a zero deviator finite
 
 
 def metric(history: History, F: Tensor) -> Tensor:
-    """G (3, 3), which the history begins with, in the dimensions of F: det G = 1 gives the rest."""
+    """G (3, 3) from the first internal variables, its components in the dimensions of F; det G = 1
+    gives the others."""
     if len(F) == 1:
         across = 1.0 / np.sqrt(history[0])
         return ((history[0], 0.0, 0.0), (0.0, across, 0.0), (0.0, 0.0, across))
@@ -77,9 +78,9 @@ def spherical_part(x: Scalar, det_n: Scalar) -> Scalar:
 
 
 def strain_of_flow(x: Scalar, before: Scalar, det_n: Scalar) -> Scalar:
-    """Equivalent plastic strain over the fall of x from `before`: sqrt(3/2) (dc/dx) / x half way.
+    """Equivalent plastic strain over the decrease of x from `before`: sqrt(3/2) (dc/dx) / x.
 
-    The middle makes a step of the second order where the direction stays.
+    It is evaluated half way, which makes a step of second order at constant direction.
     """
     half = 0.5 * (x + before)
     c = spherical_part(half, det_n)
@@ -87,7 +88,7 @@ def strain_of_flow(x: Scalar, before: Scalar, det_n: Scalar) -> Scalar:
 
 
 def flowed(F: Tensor, G: Tensor, b: Tensor, x: Scalar, before: Scalar, det_n: Scalar) -> Tensor:
-    """G after x has fallen from `before`, that of b: J^(2/3) F^-1 (c I + x n) F^-T."""
+    """G after x has decreased from `before`, its value in b: J^(2/3) F^-1 (c I + x n) F^-T."""
     share, B = x / before, inverse_transpose(F)
     rest = spherical_part(x, det_n) - share * trace(b) / 3.0
     sphere = scale(rest * determinant(F) ** (2.0 / 3.0), product(transpose(B), B))
@@ -95,7 +96,7 @@ def flowed(F: Tensor, G: Tensor, b: Tensor, x: Scalar, before: Scalar, det_n: Sc
 
 
 def chosen(flows: Scalar, after: History, history: History) -> History:
-    """`after` where `flows` is 1; where it is 0, to the last bit, what the history begins with."""
+    """`after` where `flows` is 1; where it is 0 the first of the history, to the last bit."""
     stays = 1.0 - flows
     if len(after) == 1:
         return (flows * after[0] + stays * history[0],)

@@ -1,4 +1,4 @@
-"""A stiffness against change of volume beside one against change of shape alone.
+"""Energy of a change of volume plus that of an isochoric change of shape.
 
 psi = kappa/2 ((J^2 - 1)/2 - ln J) + mu/2 (J^(-2/3) C : G - 3), Simo & Hughes (1998), eq. 9.2.3,
 with a symmetric G of determinant 1: the inverse of a plastic metric, or I. All tensors are (3, 3).

@@ -1,4 +1,4 @@
-"""Symmetric tensors as the tuples of numbers that a history keeps."""
+"""Symmetric tensors as tuples of components, the form in which a history holds them."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from solidsph.maths.arrays import Tensor
 
 
 def component_count(dimension: int) -> int:
-    """Of a symmetric tensor."""
+    """Number of components of a symmetric tensor."""
     return dimension * (dimension + 1) // 2
 
 
 def names(dimension: int) -> Sequence[str]:
-    """Of its components, in their order."""
+    """Names of the components of a symmetric tensor, in order."""
     return {1: ("xx",), 2: ("xx", "yy", "xy"), 3: ("xx", "yy", "zz", "yz", "xz", "xy")}[dimension]
 
 
 def components(A: Tensor) -> History:
-    """The tuple of a symmetric tensor."""
+    """The components of a symmetric tensor."""
     if len(A) == 1:
         return (A[0][0],)
     if len(A) == 2:
@@ -28,7 +28,7 @@ def components(A: Tensor) -> History:
 
 
 def symmetric(values: History, dimension: int) -> Tensor:
-    """The tensor of such a tuple."""
+    """The symmetric tensor with these components."""
     if dimension == 1:
         return ((values[0],),)
     if dimension == 2:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, final
 
 import attrs
@@ -42,7 +43,7 @@ def _direction(given: Any, field: attrs.Attribute[Any]) -> tuple[float, ...]:
     if not 0.0 < length < np.inf:
         raise SceneError(
             f"holzapfel-ogden: {field.name} must be a direction such as [1, 0, 0], got {given!r}; "
-            "in two dimensions, too, the third component counts"
+            "all three components are needed in two dimensions too"
         )
     return tuple(float(x) / length for x in vector)
 
@@ -62,8 +63,8 @@ class HolzapfelOgden(Material):
               + a_fs/(2 b_fs) (exp(b_fs I8fs^2) - 1) + kappa/2 ((J^2 - 1)/2 - ln J)
 
     with I4i = i . C i for the fibres f and the sheets s at right angles to them, I8fs = f . C s and
-    <x> = max(x, 0): fibres carry tension only. Those invariants keep their volume, so that a fibre
-    feels its own stretch (Sansour, 2008). The directions are the same throughout the body.
+    <x> = max(x, 0): fibres carry tension only. These two invariants are not freed of volume, so
+    that a fibre responds to its full stretch (Sansour, 2008). The directions are uniform.
 
     `lame_parameters` are those of an isotropic solid that is as stiff as the fibres in every
     direction: the stable step and the scale of hourglass control follow from them.
@@ -81,6 +82,23 @@ class HolzapfelOgden(Material):
     density: float = number()  # rho_0 [kg/m^3]
     fibre: tuple[float, ...] = direction((1.0, 0.0, 0.0))
     sheet: tuple[float, ...] = direction((0.0, 1.0, 0.0))
+
+    # Fibres of the stiffness of rubber: real ones stiffen so fast that at the 40 % of strain of the
+    # conformance kit their stress would be a million times its scale.
+    example: ClassVar[Mapping[str, Any]] = {
+        "matrix_stiffness": 3e5,
+        "matrix_exponent": 0.5,
+        "fibre_stiffness": 2e5,
+        "fibre_exponent": 0.6,
+        "sheet_stiffness": 1e5,
+        "sheet_exponent": 0.4,
+        "coupling_stiffness": 0.5e5,
+        "coupling_exponent": 0.3,
+        "bulk_modulus": 1e6 / 1.2,
+        "density": 1000.0,
+        "fibre": [0.8, 0.6, 0.0],
+        "sheet": [-0.36, 0.48, 0.8],
+    }
 
     isotropic: ClassVar[bool] = False
     smooth: ClassVar[bool] = False
@@ -194,7 +212,7 @@ def _outer(v: Vector, w: Vector) -> Tensor:
 
 
 def _tension(f: Vector) -> Scalar:
-    """<I4 - 1> of a fibre that has become f."""
+    """<I4 - 1> of a fibre that is deformed to f."""
     return np.maximum(dot(f, f) - 1.0, 0.0)
 
 
@@ -204,17 +222,17 @@ def _stored(x: Scalar, a: float, b: float) -> Scalar:
 
 
 def _force(x: Scalar, a: float, b: float) -> Scalar:
-    """Its derivative by x."""
+    """Derivative of the stored energy by x."""
     return a * x * np.exp(b * x**2)
 
 
 def _stiffness(x: Scalar, a: float, b: float) -> Scalar:
-    """Its second derivative."""
+    """Second derivative of the stored energy by x."""
     return a * (1.0 + 2.0 * b * x**2) * np.exp(b * x**2)
 
 
 def _change_of_fibres(f: Vector, df: Vector, f0: Vector, a: float, b: float) -> Tensor:
-    """Change of the stress of fibres along f0 that have become f, along a change of them."""
+    """Change of the stress of fibres along f0, deformed to f, with a change df."""
     x = _tension(f)
     taut = 1.0 * (x > 0.0)
     change = taut * _stiffness(x, a, b) * 2.0 * dot(f, df)

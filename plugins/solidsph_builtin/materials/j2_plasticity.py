@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -11,8 +11,8 @@ import numpy as np
 from solidsph.errors import SceneError
 from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.maths.arrays import Scalar, Tensor
-from solidsph.maths.tensors import identity
 from solidsph.registry.parameters import check_positive, number
+from solidsph_builtin.materials import _plastic
 from solidsph_builtin.materials._flow import (
     ROOT,
     chosen,
@@ -23,16 +23,15 @@ from solidsph_builtin.materials._flow import (
     metric,
     strain_of_flow,
 )
-from solidsph_builtin.materials._isochoric import energy_of, stress_of, tangent_of
-from solidsph_builtin.materials._lame import checked_lame
-from solidsph_builtin.materials._symmetric import component_count, components, names
-from solidsph_builtin.materials._wide import narrowed, widened, widened_change
+from solidsph_builtin.materials._lame import RUBBER, check_elastic, lame
+from solidsph_builtin.materials._plastic import PLASTIC_STRAIN
+from solidsph_builtin.materials._symmetric import component_count, components
+from solidsph_builtin.materials._wide import narrowed, widened
 
-# Newton's method from the trial state comes down monotonically, since hardening never quickens. Two
-# do for a straight line, six for the bend of saturation within steps of some per cent of strain.
+# Newton's method from the trial state decreases monotonically, since the slope of hardening never
+# rises. Two steps suffice for linear hardening, six for saturation at some per cent of strain a
+# step.
 _STEPS = 6
-
-PLASTIC_STRAIN = "plastic strain [-]"
 
 
 @final
@@ -48,8 +47,8 @@ class J2Plasticity(HistoryMaterial):
     e the equivalent plastic strain. A step is a radial return that keeps det C_p = 1
     (`materials/_flow.py`), solved to rounding.
 
-    All plastic work counts as dissipated: what hardening stores in the crystal is no more given
-    back by unloading than heat is.
+    All plastic work counts as dissipated: unloading does not return what hardening stores in the
+    crystal.
     """
 
     youngs_modulus: float = number()  # E [Pa]
@@ -57,31 +56,39 @@ class J2Plasticity(HistoryMaterial):
     density: float = number()  # rho_0 [kg/m^3]
     yield_stress: float = number()  # [Pa]
     hardening: float = number(default=0.0)  # slope over the plastic strain [Pa]
-    saturation_stress: float = number(default=0.0)  # [Pa]; 0: there is none, the yield stress stays
+    saturation_stress: float = number(default=0.0)  # [Pa]; 0 for no saturation
     saturation_exponent: float = number(default=1.0)  # [-]
+
+    # The conformance kit strains by ten times the strain of first yield and more.
+    example: ClassVar[Mapping[str, Any]] = {
+        **RUBBER,
+        "yield_stress": 1e4,
+        "hardening": 2e4,
+        "saturation_stress": 1.5e4,
+        "saturation_exponent": 20.0,
+    }
 
     shown: ClassVar[Sequence[str]] = (PLASTIC_STRAIN,)
 
     def __attrs_post_init__(self) -> None:
-        law = "j2-plasticity"
-        checked_lame(law, self.youngs_modulus, self.poissons_ratio, self.density)
-        check_positive(f"material {law!r}", "yield_stress", self.yield_stress, "Pa")
-        check_positive(f"material {law!r}", "saturation_exponent", self.saturation_exponent, "1")
+        law = "material 'j2-plasticity'"
+        check_elastic("j2-plasticity", self)
+        check_positive(law, "yield_stress", self.yield_stress, "Pa")
+        check_positive(law, "saturation_exponent", self.saturation_exponent, "1")
         if not 0.0 <= self.hardening < 1e100:
             raise SceneError(
-                f"material {law!r}: hardening must not be negative, got {self.hardening}; a law "
-                "that softens has no width of its own for what localises"
+                f"{law}: hardening must not be negative, got {self.hardening}; under a softening "
+                "law deformation localises to a width that the spacing decides"
             )
         if self.saturation_stress and not self.yield_stress <= self.saturation_stress < 1e100:
             raise SceneError(
-                f"material {law!r}: saturation_stress must be at least the yield stress of "
+                f"{law}: saturation_stress must be at least the yield stress of "
                 f"{self.yield_stress:g} Pa, got {self.saturation_stress}; leave it out for none"
             )
 
     @property
     def lame_parameters(self) -> tuple[float, float]:
-        law = "j2-plasticity"
-        return checked_lame(law, self.youngs_modulus, self.poissons_ratio, self.density)
+        return lame(self)
 
     @property
     def params(self) -> tuple[float, ...]:
@@ -92,23 +99,14 @@ class J2Plasticity(HistoryMaterial):
         return (lam + 2.0 / 3.0 * mu, mu, self.yield_stress, *hardening)
 
     def initial_history(self, dimension: int) -> Mapping[str, float]:
-        one = {"xx": 1.0, "yy": 1.0, "zz": 1.0}
-        inverse = {f"inverse plastic metric {a} [-]": one.get(a, 0.0) for a in names(dimension)}
-        return {**inverse, PLASTIC_STRAIN: 0.0, "dissipated energy [J/m^3]": 0.0}
+        return _plastic.initial_history(dimension, {})
 
-    @staticmethod
-    def energy(F: Tensor, params: tuple[float, ...]) -> Scalar:
-        wide = widened(F)
-        return energy_of(wide, identity(wide), params[0], params[1])
-
-    @staticmethod
-    def first_piola(F: Tensor, params: tuple[float, ...]) -> Tensor:
-        wide = widened(F)
-        return narrowed(stress_of(wide, identity(wide), params[0], params[1]), F)
-
-    @staticmethod
-    def tangent(F: Tensor, dF: Tensor, params: tuple[float, ...]) -> Tensor:
-        return narrowed(tangent_of(widened(F), widened_change(dF), params[0], params[1]), F)
+    energy = staticmethod(_plastic.energy)
+    first_piola = staticmethod(_plastic.first_piola)
+    tangent = staticmethod(_plastic.tangent)
+    stored = staticmethod(_plastic.stored)
+    stress = staticmethod(_plastic.stress)
+    dissipated = staticmethod(_plastic.dissipated)
 
     @staticmethod
     def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
@@ -132,20 +130,6 @@ class J2Plasticity(HistoryMaterial):
         work = _plastic_work(e, params) - _plastic_work(e_before, params)
         # A sum of tuples: unpacking does not compile.
         return chosen(flows, after, history) + (e, lost + work)  # noqa: RUF005
-
-    @staticmethod
-    def stored(F: Tensor, history: History, params: tuple[float, ...]) -> Scalar:
-        G = metric(history, F)
-        return energy_of(widened(F), G, params[0], params[1])
-
-    @staticmethod
-    def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:
-        G = metric(history, F)
-        return narrowed(stress_of(widened(F), G, params[0], params[1]), F)
-
-    @staticmethod
-    def dissipated(history: History) -> Scalar:
-        return history[-1]
 
 
 def _flow_stress(e: Scalar, params: tuple[float, ...]) -> Scalar:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
@@ -11,8 +11,8 @@ import numpy as np
 from solidsph.errors import SceneError
 from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.maths.arrays import Scalar, Tensor
-from solidsph.maths.tensors import identity
 from solidsph.registry.parameters import check_positive, number
+from solidsph_builtin.materials import _plastic
 from solidsph_builtin.materials._flow import (
     ROOT,
     chosen,
@@ -23,17 +23,16 @@ from solidsph_builtin.materials._flow import (
     metric,
     strain_of_flow,
 )
-from solidsph_builtin.materials._isochoric import energy_of, stress_of, tangent_of
-from solidsph_builtin.materials._lame import checked_lame
-from solidsph_builtin.materials._symmetric import component_count, components, names
-from solidsph_builtin.materials._wide import narrowed, widened, widened_change
-from solidsph_builtin.materials.j2_plasticity import PLASTIC_STRAIN
+from solidsph_builtin.materials._lame import RUBBER, check_elastic, lame
+from solidsph_builtin.materials._plastic import PLASTIC_STRAIN
+from solidsph_builtin.materials._symmetric import component_count, components
+from solidsph_builtin.materials._wide import narrowed, widened
 
 TEMPERATURE = "temperature [K]"
 
-# Newton's method for the logarithm of the fall of x, in which the flow stress is next to linear at
-# high rates. The miss is concave, so that it comes down monotonically from a fall that is too far.
-# Twelve reach rounding for strains of up to a per cent in a step.
+# Newton's method for the logarithm of the decrease of x, in which the flow stress is nearly linear
+# at high rates. The residual is concave, so that the iteration is monotonic from a decrease that is
+# too large. Twelve steps reach rounding for strains of up to a per cent in a step.
 _STEPS = 12
 
 # Slopes of powers below 1, and logarithms, have no value at zero.
@@ -48,10 +47,10 @@ class JohnsonCook(HistoryMaterial):
         (yield + B e^n) (1 + C ln(e' / reference rate)) (1 - T*^m),
         T* = (T - reference) / (melting - reference), within 0 and 1,
 
-    e the equivalent plastic strain, e' its rate; below the reference rate the logarithm is 0. Heat
-    has no time to flow: rho_0 c dT = heat_share times the plastic work (Taylor & Quinney, 1934),
+    e the equivalent plastic strain, e' its rate; below the reference rate the logarithm is 0.
+    Heating is adiabatic: rho_0 c dT = heat_share times the plastic work (Taylor & Quinney, 1934),
     all of which counts as dissipated. A step is the radial return of `materials/_flow.py` to the
-    flow stress at its end, with the rate and the temperature there.
+    flow stress at the rate and the temperature of its end.
     """
 
     youngs_modulus: float = number()  # E [Pa]
@@ -69,12 +68,23 @@ class JohnsonCook(HistoryMaterial):
     temperature: float = number(default=293.0)  # at the start [K]
     heat_share: float = number(default=0.9)  # of the plastic work [-]
 
+    example: ClassVar[Mapping[str, Any]] = {
+        **RUBBER,
+        "yield_stress": 1e4,
+        "hardening_modulus": 2e4,
+        "hardening_exponent": 0.3,
+        "rate_coefficient": 0.02,
+        "softening_exponent": 1.1,
+        "melting_temperature": 500.0,
+        "specific_heat": 0.1,  # small, so that such a soft solid warms up
+    }
+
     shown: ClassVar[Sequence[str]] = (PLASTIC_STRAIN, TEMPERATURE)
     rate_dependent: ClassVar[bool] = True
 
     def __attrs_post_init__(self) -> None:
         law = "material 'johnson-cook'"
-        checked_lame("johnson-cook", self.youngs_modulus, self.poissons_ratio, self.density)
+        check_elastic("johnson-cook", self)
         for name, unit in (
             ("yield_stress", "Pa"),
             ("hardening_exponent", "1"),
@@ -101,7 +111,7 @@ class JohnsonCook(HistoryMaterial):
 
     @property
     def lame_parameters(self) -> tuple[float, float]:
-        return checked_lame("johnson-cook", self.youngs_modulus, self.poissons_ratio, self.density)
+        return lame(self)
 
     @property
     def params(self) -> tuple[float, ...]:
@@ -123,24 +133,14 @@ class JohnsonCook(HistoryMaterial):
         )
 
     def initial_history(self, dimension: int) -> Mapping[str, float]:
-        one = {"xx": 1.0, "yy": 1.0, "zz": 1.0}
-        inverse = {f"inverse plastic metric {a} [-]": one.get(a, 0.0) for a in names(dimension)}
-        rest = {TEMPERATURE: self.temperature, "dissipated energy [J/m^3]": 0.0}
-        return {**inverse, PLASTIC_STRAIN: 0.0, **rest}
+        return _plastic.initial_history(dimension, {TEMPERATURE: self.temperature})
 
-    @staticmethod
-    def energy(F: Tensor, params: tuple[float, ...]) -> Scalar:
-        wide = widened(F)
-        return energy_of(wide, identity(wide), params[0], params[1])
-
-    @staticmethod
-    def first_piola(F: Tensor, params: tuple[float, ...]) -> Tensor:
-        wide = widened(F)
-        return narrowed(stress_of(wide, identity(wide), params[0], params[1]), F)
-
-    @staticmethod
-    def tangent(F: Tensor, dF: Tensor, params: tuple[float, ...]) -> Tensor:
-        return narrowed(tangent_of(widened(F), widened_change(dF), params[0], params[1]), F)
+    energy = staticmethod(_plastic.energy)
+    first_piola = staticmethod(_plastic.first_piola)
+    tangent = staticmethod(_plastic.tangent)
+    stored = staticmethod(_plastic.stored)
+    stress = staticmethod(_plastic.stress)
+    dissipated = staticmethod(_plastic.dissipated)
 
     @staticmethod
     def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
@@ -167,20 +167,6 @@ class JohnsonCook(HistoryMaterial):
         G_kept = chosen(flows, G_after, history)
         # A sum of tuples: unpacking does not compile.
         return G_kept + (e + added, T + params[10] * work, lost + work)  # noqa: RUF005
-
-    @staticmethod
-    def stored(F: Tensor, history: History, params: tuple[float, ...]) -> Scalar:
-        G = metric(history, F)
-        return energy_of(widened(F), G, params[0], params[1])
-
-    @staticmethod
-    def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:
-        G = metric(history, F)
-        return narrowed(stress_of(widened(F), G, params[0], params[1]), F)
-
-    @staticmethod
-    def dissipated(history: History) -> Scalar:
-        return history[-1]
 
 
 def _of_rate(added: Scalar, step: float, params: tuple[float, ...]) -> Scalar:

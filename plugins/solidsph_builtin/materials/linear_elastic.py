@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, final
+from collections.abc import Mapping
+from typing import Any, ClassVar, final
 
 import attrs
 
@@ -10,7 +11,7 @@ from solidsph.interfaces.material import Material
 from solidsph.maths.arrays import Scalar, Tensor
 from solidsph.maths.tensors import add, contraction, identity, scale, small_strain, trace, transpose
 from solidsph.registry.parameters import number
-from solidsph_builtin.materials._lame import checked_lame
+from solidsph_builtin.materials._lame import RUBBER, check_elastic, lame
 
 
 @final
@@ -25,16 +26,16 @@ class LinearElastic(Material):
     poissons_ratio: float = number()  # nu [-]
     density: float = number()  # rho_0 [kg/m^3]
 
+    example: ClassVar[Mapping[str, Any]] = RUBBER
+
     objective: ClassVar[bool] = False
 
     def __attrs_post_init__(self) -> None:
-        checked_lame("linear-elastic", self.youngs_modulus, self.poissons_ratio, self.density)
+        check_elastic("linear-elastic", self)
 
     @property
     def lame_parameters(self) -> tuple[float, float]:
-        return checked_lame(
-            "linear-elastic", self.youngs_modulus, self.poissons_ratio, self.density
-        )
+        return lame(self)
 
     @property
     def params(self) -> tuple[float, ...]:

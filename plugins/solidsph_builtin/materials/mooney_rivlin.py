@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import final
+from collections.abc import Mapping
+from typing import Any, ClassVar, final
 
 import attrs
 
@@ -43,6 +44,13 @@ class MooneyRivlin(Material):
     c01: float = number()  # [Pa]; may be slightly negative
     bulk_modulus: float = number()  # kappa [Pa]
     density: float = number()  # rho_0 [kg/m^3]
+
+    example: ClassVar[Mapping[str, Any]] = {
+        "c10": 1.5e5,
+        "c01": 0.4e5,
+        "bulk_modulus": 1e6 / 1.2,
+        "density": 1000.0,
+    }
 
     def __attrs_post_init__(self) -> None:
         check_positive("material 'mooney-rivlin'", "bulk_modulus", self.bulk_modulus, "Pa")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import final
+from collections.abc import Mapping
+from typing import Any, ClassVar, final
 
 import attrs
 
@@ -19,7 +20,7 @@ from solidsph.maths.tensors import (
     transpose,
 )
 from solidsph.registry.parameters import number
-from solidsph_builtin.materials._lame import checked_lame
+from solidsph_builtin.materials._lame import RUBBER, check_elastic, lame
 
 
 @final
@@ -35,16 +36,14 @@ class SaintVenantKirchhoff(Material):
     poissons_ratio: float = number()  # nu [-]
     density: float = number()  # rho_0 [kg/m^3]
 
+    example: ClassVar[Mapping[str, Any]] = RUBBER
+
     def __attrs_post_init__(self) -> None:
-        checked_lame(
-            "saint-venant-kirchhoff", self.youngs_modulus, self.poissons_ratio, self.density
-        )
+        check_elastic("saint-venant-kirchhoff", self)
 
     @property
     def lame_parameters(self) -> tuple[float, float]:
-        return checked_lame(
-            "saint-venant-kirchhoff", self.youngs_modulus, self.poissons_ratio, self.density
-        )
+        return lame(self)
 
     @property
     def params(self) -> tuple[float, ...]:

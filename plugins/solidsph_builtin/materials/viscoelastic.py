@@ -22,7 +22,7 @@ from solidsph.maths.tensors import (
     transpose,
 )
 from solidsph.registry.parameters import number
-from solidsph_builtin.materials._lame import checked_lame
+from solidsph_builtin.materials._lame import RUBBER, check_elastic, lame
 from solidsph_builtin.materials._symmetric import (
     component_count,
     components,
@@ -31,7 +31,7 @@ from solidsph_builtin.materials._symmetric import (
 )
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 
-# Plain functions by names of their own: what compiles a law looks for those.
+# Plain functions of this module, which is where the compiler looks for them.
 _spring_energy = NeoHookean.energy
 _spring_stress = NeoHookean.first_piola
 _spring_tangent = NeoHookean.tangent
@@ -41,21 +41,22 @@ def _elements(given: Any) -> tuple[tuple[float, float], ...]:
     """(share, time [s]) of every element, from what a scene gives."""
     wanted = "viscoelastic: prony takes a list such as [{share = 0.3, time = 0.01}]"
     if isinstance(given, (str, Mapping)) or not isinstance(given, Sequence) or not given:
-        raise SceneError(f"{wanted}, got {given!r}; give one element at least")
+        raise SceneError(f"{wanted}, got {given!r}; give at least one element")
     found = []
-    for one in given:
-        pair = (one.get("share"), one.get("time")) if isinstance(one, Mapping) else tuple(one)
-        if (isinstance(one, Mapping) and set(one) != {"share", "time"}) or len(pair) != 2:
-            raise SceneError(f"{wanted}, got the element {one!r}")
+    for element in given:
+        named = isinstance(element, Mapping)
+        pair = (element.get("share"), element.get("time")) if named else tuple(element)
+        if (named and set(element) != {"share", "time"}) or len(pair) != 2:
+            raise SceneError(f"{wanted}, got the element {element!r}")
         if not all(isinstance(x, (int, float)) and 0.0 < x < np.inf for x in pair):
             raise SceneError(
-                f"{wanted}, got the element {one!r}; both are numbers above 0, time in s"
+                f"{wanted}, got the element {element!r}; both are numbers above 0, time in s"
             )
         found.append((float(pair[0]), float(pair[1])))
     if not sum(share for share, _ in found) < 1.0:
         raise SceneError(
             f"viscoelastic: the shares of prony add up to {sum(s for s, _ in found):.6g}; keep "
-            "them below 1, what is left being the long-term part of the shear modulus"
+            "them below 1; the rest is the long-term part of the shear modulus"
         )
     return tuple(found)
 
@@ -66,7 +67,7 @@ class Viscoelastic(HistoryMaterial):
     """psi = neo-Hookean(lambda, mu_inf) + sum over i of mu_i |dev(E - E_i)|^2.
 
     The shear modulus relaxes as the Prony series mu(t) = mu_inf + sum mu_i exp(-t / tau_i) with
-    mu_i = share_i mu, while lambda + 2 mu / 3 stays: the deviator only creeps. E_i is the viscous
+    mu_i = share_i mu, at constant lambda + 2 mu / 3: only the deviator creeps. E_i is the viscous
     strain of a Maxwell element in the reference configuration, so that the law is objective, with
     dE_i/dt = (E - E_i) / tau_i solved exactly for a strain that changes linearly over the step.
     It dissipates 2 mu_i |dev(E - E_i)|^2 / tau_i. Simo & Hughes (1998), chapter 10, with the
@@ -74,18 +75,23 @@ class Viscoelastic(HistoryMaterial):
     """
 
     prony: Sequence[Any] = attrs.field(converter=_elements)  # (share [-], time [s]) of elements
-    youngs_modulus: float = number()  # of a sudden load, E [Pa]
-    poissons_ratio: float = number()  # of a sudden load, nu [-]
+    youngs_modulus: float = number()  # instantaneous, E [Pa]
+    poissons_ratio: float = number()  # instantaneous, nu [-]
     density: float = number()  # rho_0 [kg/m^3]
+
+    example: ClassVar[Mapping[str, Any]] = {
+        **RUBBER,
+        "prony": [{"share": 0.4, "time": 1e-2}, {"share": 0.2, "time": 1.0}],  # [-], [s]
+    }
 
     rate_dependent: ClassVar[bool] = True
 
     def __attrs_post_init__(self) -> None:
-        checked_lame("viscoelastic", self.youngs_modulus, self.poissons_ratio, self.density)
+        check_elastic("viscoelastic", self)
 
     @property
     def lame_parameters(self) -> tuple[float, float]:
-        return checked_lame("viscoelastic", self.youngs_modulus, self.poissons_ratio, self.density)
+        return lame(self)
 
     @property
     def params(self) -> tuple[float, ...]:
@@ -182,17 +188,17 @@ class Viscoelastic(HistoryMaterial):
 
 def _rise(x: float) -> float:
     """Integral over s, up to x, of (1 - exp(-s))^2 / x^2."""
-    if x < 0.02:  # what the formula below takes from each other is lost in rounding
+    if x < 0.02:  # the differences in the formula below are lost in rounding
         return x * (1.0 / 3.0 - x * (1.0 / 4.0 - x * (7.0 / 60.0 - x / 24.0)))
     faded = -np.expm1(-x)
     return float((x - faded - 0.5 * faded**2) / x**2)
 
 
 def _deviator(E: Tensor) -> Tensor:
-    """What of dev E lies in the dimensions that there are."""
+    """The components of dev E in the dimensions of E."""
     return add(E, scale(-trace(E) / 3.0, identity(E)))
 
 
 def _deviator_product(A: Tensor, B: Tensor) -> Scalar:
-    """dev A : dev B of symmetric tensors, the missing dimensions counted."""
+    """dev A : dev B of symmetric tensors in 3D, with missing components 0."""
     return contraction(A, B) - trace(A) * trace(B) / 3.0

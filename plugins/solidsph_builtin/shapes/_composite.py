@@ -1,4 +1,4 @@
-"""What shapes made of other shapes share: which parts they hold, and what is left of a boundary."""
+"""Helpers of shapes made of other shapes: their parts, and what remains of the boundaries."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import attrs
 import numpy as np
 
 from solidsph.interfaces.shape import Shape, Surface
-from solidsph.maths.arrays import Mask
+from solidsph.maths.arrays import Array, Mask
 from solidsph_builtin.shapes._checks import as_tuple, refusal
 from solidsph_builtin.shapes._sampling import unit
 
 
 def as_parts(value: Any) -> Any:
-    """One shape, or a list of them, as a tuple; anything else as it is."""
+    """One shape, or a list of them, as a tuple; anything else unchanged."""
     return (value,) if isinstance(value, Shape) else as_tuple(value, lambda part: part)
 
 
 def check_parts(shape: Shape, field: attrs.Attribute[Any], value: object) -> None:
-    """Refuse what is not one or several shapes of equal dimension."""
+    """Refuse a value that is not one or several shapes of equal dimension."""
     if not (isinstance(value, tuple) and value and all(isinstance(p, Shape) for p in value)):
         raise refusal(shape, field.name, "one or several shapes", short(value))
     dimensions = tuple(part.dimension for part in value)
@@ -29,20 +29,26 @@ def check_parts(shape: Shape, field: attrs.Attribute[Any], value: object) -> Non
         raise refusal(shape, field.name, "shapes of equal dimension", f"dimensions {dimensions}")
 
 
+def corners(parts: Sequence[Shape]) -> tuple[Array, Array]:
+    """Lower and upper corners of the boxes of shapes, each (k, d) [m]."""
+    lower, upper = zip(*(part.bounds() for part in parts), strict=True)
+    return np.array(lower), np.array(upper)
+
+
 def remaining(
     whole: Shape, parts: Sequence[Shape], surfaces: Sequence[Surface], spacing: float
 ) -> Surface:
-    """Those samples of the parts' boundaries that lie on the boundary of the `whole`.
+    """The samples of the parts' boundaries that lie on the boundary of the `whole`.
 
-    A sample stays if the whole is right behind it and nothing of it right before it: that drops
-    what lies inside another part as well as a face that two parts share back to back. A face that
-    two parts have in common side by side stays once, from the first of them.
+    A sample is kept if the whole is just behind it and not just in front of it. That drops samples
+    inside another part and a face that two parts share back to back. A face that two parts have in
+    common side by side is kept once, from the first of them.
 
     Args:
         whole: the shape made of the parts.
         parts: its parts.
         surfaces: the boundary of each part, with normals that point out of the whole.
-        spacing: that of the samples [m].
+        spacing: distance of the samples [m].
     """
     # Far above rounding, far below what the samples resolve.
     step = 1e-6 * spacing
@@ -51,9 +57,9 @@ def remaining(
     all_kept = whole.signed_distance(points + ahead) > 0.0
     all_kept &= whole.signed_distance(points - ahead) < 0.0
     kept: list[Mask] = np.split(all_kept, np.cumsum([len(s.points) for s in surfaces])[:-1])
-    lower, upper = (np.array(one) for one in zip(*(p.bounds() for p in parts), strict=True))
+    lower, upper = corners(parts)
     for i, (surface, keep) in enumerate(zip(surfaces, kept, strict=True)):
-        # Only a part whose box comes so near has a boundary there.
+        # Only a part whose box is so near has a boundary there.
         low, high = surface.points.min(axis=0) - 2.0 * step, surface.points.max(axis=0) + 2.0 * step
         near = ((lower[:i] <= high) & (upper[:i] >= low)).all(axis=1)
         for earlier in np.flatnonzero(near).tolist():

@@ -1,4 +1,4 @@
-"""Outlines of many straight edges: which edge is nearest to a point, and whether any two cross."""
+"""Outlines of many straight edges: the edge nearest to a point, and edges that cross."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from scipy.spatial import cKDTree
 
 from solidsph.maths.arrays import Array, Indices
 
-# Pairs of a point and an edge, or of two edges, that are looked at together.
+# Pairs of a point and an edge, or of two edges, that are processed together.
 _AT_ONCE = 1 << 20
 
 
 @attrs.frozen(eq=False)
 class Outline:
-    """A closed line of straight edges, found by a tree of short pieces of them."""
+    """A closed line of straight edges, searched by a tree of short pieces of them."""
 
     starts: Array  # (m, d=2) where each edge starts [m]
     edges: Array  # (m, 2) from there to where the next one starts [m]
@@ -27,61 +27,60 @@ class Outline:
 
     @classmethod
     def of(cls, starts: Array, *, counterclockwise: bool) -> Outline:
-        """From its corners (m, 2), each joined to the next and the last to the first."""
+        """The outline through corners (m, 2), each joined to the next, the last to the first."""
         edges = np.roll(starts, -1, axis=0) - starts
         lengths = np.hypot(*edges.T)
         # Pieces no longer than an edge is on average: there are at most twice as many.
         counts = np.ceil(lengths / lengths.mean()).astype(np.intp)
-        owners = np.repeat(np.arange(len(starts)), counts)
-        within = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
-        along = (within + 0.5) / counts[owners]
+        owners, middles = pieces(starts, edges, counts)
         right = np.stack([edges[:, 1], -edges[:, 0]], axis=1) / lengths[:, np.newaxis]
         return cls(
             starts=starts,
             edges=edges,
             normals=right if counterclockwise else -right,
-            tree=cKDTree(starts[owners] + along[:, np.newaxis] * edges[owners]),
+            tree=cKDTree(middles),
             owners=owners,
             reach=0.5 * float((lengths / counts).max()),
         )
 
     def signed_distance(self, points: Array) -> Array:
-        """Of `points` (n, 2) from the line, (n,) [m]; negative inside."""
+        """Distance of `points` (n, 2) from the line, (n,) [m]; negative inside."""
         distance = np.empty(len(points))
         for rows, near in self._nearest(points):
             distance[rows] = self._signed(points[rows], near)
         return distance
 
     def _nearest(self, points: Array) -> Iterator[tuple[Indices, Indices]]:
-        """Some of the points, and the edge nearest to each of them."""
-        left, count = np.arange(len(points)), 4
-        while left.size:
+        """Indices of some of the points, and the edge nearest to each."""
+        remaining, count = np.arange(len(points)), 4
+        while remaining.size:
             count = min(count, len(self.owners))
             again = []
-            for rows in np.array_split(left, 1 + left.size * count // _AT_ONCE):
-                found = self.tree.query(points[rows], k=np.arange(1, count + 1))
-                gaps, pieces = (np.asarray(one) for one in found)
+            for rows in np.array_split(remaining, 1 + remaining.size * count // _AT_ONCE):
+                answer = self.tree.query(points[rows], k=np.arange(1, count + 1))
+                gaps, pieces = map(np.asarray, answer)
                 edges = self.owners[pieces]
                 squares = _squared(self._offsets(points[rows, np.newaxis], edges)[0])
                 best = np.argmin(squares, axis=1)
                 nearest = np.take_along_axis(squares, best[:, np.newaxis], axis=1)[:, 0]
-                # No piece beyond those asked for can be nearer.
+                # No piece beyond those found can be nearer.
                 near = gaps[:, -1] - self.reach > np.sqrt(nearest)
                 near |= count == len(self.owners)
                 yield rows[near], edges[near, best[near]]
                 again.append(rows[~near])
-            left, count = np.concatenate(again), 8 * count
+            remaining, count = np.concatenate(again), 8 * count
 
     def _offsets(self, points: Array, edges: Indices) -> tuple[Array, Array]:
-        """From the nearest place on each edge to the point (..., 2), and how far along it is."""
+        """Offsets (..., 2) from the nearest place on each edge to the point, and that place as a
+        fraction of the edge."""
         edge, offset = self.edges[edges], points - self.starts[edges]
         along = np.clip(np.sum(offset * edge, axis=-1) / _squared(edge), 0.0, 1.0)
         return offset - along[..., np.newaxis] * edge, along
 
     def _signed(self, points: Array, edges: Indices) -> Array:
         gaps, along = self._offsets(points, edges)
-        # At a corner neither edge alone tells the side, the sum of their normals does (Baerentzen &
-        # Aanaes 2005, in the plane).
+        # At a corner the sum of the normals of both edges decides the side (Baerentzen & Aanaes
+        # 2005, in the plane).
         count = len(self.starts)
         normals = self.normals[edges]
         for end, step in ((0.0, -1), (1.0, 1)):
@@ -92,15 +91,23 @@ class Outline:
         return np.where(outside, distance, -distance)
 
 
-def first_crossing(starts: Array, ends: Array) -> tuple[int, int] | None:
-    """Two edges that share a point other than the vertex between neighbours.
+def pieces(starts: Array, edges: Array, counts: Indices) -> tuple[Indices, Array]:
+    """Edge (p,) and middle (p, 2) of each piece of edges in `counts` (m,) equal pieces."""
+    owners = np.repeat(np.arange(len(starts)), counts)
+    within = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
+    along = (within + 0.5) / counts[owners]
+    return owners, starts[owners] + along[:, np.newaxis] * edges[owners]
 
-    The lowest of those that are found together: of a tangle not all pairs are looked at.
+
+def first_crossing(starts: Array, ends: Array) -> tuple[int, int] | None:
+    """Two edges that share a point other than the vertex between neighbours, or None.
+
+    Of pairs found together these are the lowest; the search ends with them.
     """
     edges, count = ends - starts, len(starts)
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
-    for one, two in _overlapping(low, high):
-        i, j = np.minimum(one, two), np.maximum(one, two)
+    for first, second in _overlapping(low, high):
+        i, j = np.minimum(first, second), np.maximum(first, second)
         # Two segments meet where their boxes overlap and each has its ends on both sides of the
         # other, or on it.
         near = ((low[j] <= high[i]) & (high[j] >= low[i])).all(axis=1)
@@ -122,12 +129,12 @@ def first_crossing(starts: Array, ends: Array) -> tuple[int, int] | None:
 
 def _overlapping(low: Array, high: Array) -> Iterator[tuple[Indices, Indices]]:
     """Pairs of boxes that overlap along the axis on which fewer do, some at a time."""
-    ways = []
+    candidates = []
     for axis in range(low.shape[1]):
         order = np.argsort(low[:, axis], kind="stable")
         last = np.searchsorted(low[order, axis], high[order, axis], side="right")
-        ways.append((order, last - np.arange(1, len(order) + 1)))
-    order, counts = min(ways, key=lambda way: int(way[1].sum()))
+        candidates.append((order, last - np.arange(1, len(order) + 1)))
+    order, counts = min(candidates, key=lambda pair: int(pair[1].sum()))
     bounds = np.cumsum(counts)
     begin = 0
     while begin < len(order):

@@ -1,8 +1,8 @@
-"""Where a boundary is sampled.
+"""Samples of boundaries.
 
-The same count of cells along a length serves a lattice and the flat faces that bound it, and the
-samples of a cell are even in number and centred. So on a face aligned with a lattice no sample
-lies between two particles, whether these are at the centres of the cells or at their corners.
+A lattice and the flat faces that bound it have the same number of cells along a length, and each
+cell an even number of samples, centred. So on a face aligned with a lattice no sample is as near
+to one particle as to another, whether these are at the centres of the cells or at their corners.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ Piece: TypeAlias = tuple[str, Array, Array]  # a face, its points (m, d), its ar
 
 
 def cells_along(length: float, spacing: float) -> int:
-    """How many cells of about `spacing` [m] fill `length` [m] best, at least 1."""
-    # A hair upwards, so that a half fits alike for lengths that differ by rounding only.
+    """Number of cells of about `spacing` [m] that fill `length` [m] best, at least 1."""
+    # Slightly upwards, so that lengths that differ by rounding only are rounded alike.
     return max(1, math.floor(length / spacing + 0.5 + 1e-9))
 
 
 def samples_along(length: float, spacing: float, per_cell: int) -> int:
-    """How many samples `length` [m] gets, `per_cell` for each cell of about `spacing` [m]."""
+    """Number of samples along `length` [m], `per_cell` for each cell of about `spacing` [m]."""
     return per_cell * cells_along(length, spacing)
 
 
@@ -43,7 +43,7 @@ def angles(radius: float, spacing: float, per_cell: int) -> Array:
     """Centres of equal arcs that fill a circle, (m,) [rad].
 
     Their number is a multiple of 8: sines and cosines then cancel in pairs to rounding, and no
-    sample lies on an axis or a diagonal, where two particles of a lattice would be as near.
+    sample lies on an axis or a diagonal, where two particles of a lattice may be equally near.
     """
     count = 8 * math.ceil(2.0 * math.pi * radius * per_cell / (8.0 * spacing))
     return np.arange(0.5, count) * (2.0 * math.pi / count)
@@ -59,14 +59,14 @@ def circle(radius: float, spacing: float, per_cell: int) -> tuple[Array, Array]:
 def disc(radius: float, spacing: float) -> tuple[Array, Array]:
     """Points of a flat disc about 0 (m, 2) [m] and the area of each (m,) [m^2].
 
-    A square grid cut by the rim: like this a disc suits the lattice that its bounding box gets.
+    A square grid cut by the rim, which matches the lattice of the disc's bounding box.
     """
     along = midpoints(2.0 * radius, spacing, ON_SURFACE) - radius
     width = 2.0 * radius / along.size
     x, y = np.meshgrid(along, along, indexing="ij")
     points = np.stack([x.ravel(), y.ravel()], axis=1)
     distance = np.hypot(points[:, 0], points[:, 1])
-    # The part of a square that a straight rim leaves; the squares cut make up the exact area.
+    # The part of a square inside a straight rim; cut squares are scaled to the exact area.
     shares = np.clip(0.5 - (distance - radius) / width, 0.0, 1.0)
     kept = shares > 0.0
     points, distance, areas = points[kept], distance[kept], shares[kept] * width**2
@@ -80,7 +80,7 @@ def sphere(radius: float, spacing: float) -> tuple[Array, Array]:
     """Outward unit normals of a sphere (m, 3) [-] and the area of each sample (m,) [m^2].
 
     The six faces of a cube, each in squares of equal angles, are projected from the centre. The
-    set has every symmetry of the cube, and so have the areas that the particles of a lattice get.
+    set has every symmetry of the cube, and so have the areas of the particles of a lattice.
     """
     count = 2 * math.ceil(math.pi * radius * ON_SURFACE / (4.0 * spacing))
     edges = np.tan(np.linspace(-math.pi / 4.0, math.pi / 4.0, count + 1))
@@ -92,7 +92,7 @@ def sphere(radius: float, spacing: float) -> tuple[Array, Array]:
     x, y = np.meshgrid(centres, centres, indexing="ij")
     face = np.stack([np.ones(x.size), x.ravel(), y.ravel()], axis=1)
     face /= np.linalg.norm(face, axis=1, keepdims=True)
-    # An odd mirror image is as good as a rotation here: the grid of a face is its own image.
+    # A reflection serves as a rotation here: the grid of a face is its own mirror image.
     half = np.concatenate([np.roll(face, axis, axis=1) for axis in range(3)])
     return np.concatenate([half, -half]), radius**2 * np.tile(solid, 6)
 

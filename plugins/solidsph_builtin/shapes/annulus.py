@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from reprlib import repr as short
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
 
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array
-from solidsph_builtin.shapes._checks import (
-    as_number,
-    as_numbers,
-    check_coordinates,
-    check_length,
-    refusal,
-)
+from solidsph_builtin.shapes._checks import length_field, point_field, refusal
 from solidsph_builtin.shapes._sampling import ON_LINE, Piece, circle, joined
 
 
@@ -31,35 +27,30 @@ class Annulus(Shape):
             one, or the centre is not two numbers.
     """
 
-    inner_radius: float = attrs.field(converter=as_number, validator=check_length)  # [m]
-    outer_radius: float = attrs.field(converter=as_number, validator=check_length)  # [m]
-    centre: tuple[float, ...] = attrs.field(  # [m]
-        default=(0.0, 0.0), converter=as_numbers, validator=check_coordinates(2)
-    )
+    inner_radius: float = length_field()  # [m]
+    outer_radius: float = length_field()  # [m]
+    centre: tuple[float, ...] = point_field(2)  # [m]
+
+    dimension: ClassVar[int] = 2
+    example: ClassVar[Mapping[str, Any]] = {"inner_radius": 0.2, "outer_radius": 0.5}
 
     def __attrs_post_init__(self) -> None:
         if self.inner_radius >= self.outer_radius:
             expected = f"less than outer_radius = {self.outer_radius!r} m"
             raise refusal(self, "inner_radius", expected, short(self.inner_radius))
 
-    @property
-    def dimension(self) -> int:
-        """2."""
-        return 2
-
     def bounds(self) -> tuple[Array, Array]:
-        """As in the interface."""
         centre = np.array(self.centre)
         return centre - self.outer_radius, centre + self.outer_radius
 
     def signed_distance(self, points: Array) -> Array:
-        """As in the interface; exact everywhere."""
+        """The distance, exact everywhere."""
         radius = np.hypot(*(points - np.array(self.centre)).T)
         distance: Array = np.maximum(self.inner_radius - radius, radius - self.outer_radius)
         return distance
 
     def surface(self, spacing: float) -> Surface:
-        """As in the interface; the arc lengths add up to the exact circumferences."""
+        """Samples whose arc lengths add up to the exact circumferences."""
         pieces: list[Piece] = []
         for name, radius, sign in (
             ("inner", self.inner_radius, -1.0),
@@ -71,5 +62,4 @@ class Annulus(Shape):
         return joined(pieces)
 
     def volume(self) -> float:
-        """Area [m^2]."""
         return math.pi * (self.outer_radius**2 - self.inner_radius**2)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Mapping
 from reprlib import repr as short
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -43,6 +44,9 @@ class Box(Shape):
         validator=check_coordinates(1, 2, 3),
     )
 
+    convex: ClassVar[bool] = True
+    example: ClassVar[Mapping[str, Any]] = {"lengths": [1.2, 0.8]}
+
     def __attrs_post_init__(self) -> None:
         if len(self.origin) != len(self.lengths):
             expected = f"a list of {len(self.lengths)} coordinates, one for each length"
@@ -50,21 +54,14 @@ class Box(Shape):
 
     @property
     def dimension(self) -> int:
-        """1, 2 or 3: the number of lengths."""
         return len(self.lengths)
 
-    @property
-    def convex(self) -> bool:
-        """True."""
-        return True
-
     def bounds(self) -> tuple[Array, Array]:
-        """As in the interface."""
         lower = np.array(self.origin)
         return lower, lower + np.array(self.lengths)
 
     def signed_distance(self, points: Array) -> Array:
-        """As in the interface; exact everywhere."""
+        """The distance, exact everywhere."""
         # Column by column: NumPy is slow at reductions over rows this short.
         beyond = [
             np.abs(points[:, axis] - (start + 0.5 * length)) - 0.5 * length
@@ -76,7 +73,6 @@ class Box(Shape):
         return distance
 
     def surface(self, spacing: float) -> Surface:
-        """As in the interface."""
         per_cell = ON_SURFACE if self.dimension == 3 else ON_LINE
         along = [
             start + midpoints(length, spacing, per_cell)
@@ -95,5 +91,4 @@ class Box(Shape):
         return joined(pieces)
 
     def volume(self) -> float:
-        """Product of the lengths [m^d]."""
         return math.prod(self.lengths)

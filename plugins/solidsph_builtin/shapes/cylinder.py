@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from reprlib import repr as short
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
 
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array
-from solidsph_builtin.shapes._checks import (
-    as_number,
-    as_numbers,
-    check_coordinates,
-    check_length,
-    refusal,
-)
+from solidsph_builtin.shapes._checks import length_field, point_field, refusal
 from solidsph_builtin.shapes._sampling import ON_SURFACE, Piece, circle, disc, joined, midpoints
 
 
@@ -37,25 +32,16 @@ class Cylinder(Shape):
             three numbers, or the axis is not a letter x, y or z.
     """
 
-    radius: float = attrs.field(converter=as_number, validator=check_length)  # [m]
-    length: float = attrs.field(converter=as_number, validator=check_length)  # [m]
-    base_centre: tuple[float, ...] = attrs.field(  # [m]
-        default=(0.0, 0.0, 0.0), converter=as_numbers, validator=check_coordinates(3)
-    )
+    radius: float = length_field()  # [m]
+    length: float = length_field()  # [m]
+    base_centre: tuple[float, ...] = point_field(3)  # [m]
     axis: str = attrs.field(default="z", validator=_axis)  # from the base to the end
 
-    @property
-    def dimension(self) -> int:
-        """3."""
-        return 3
-
-    @property
-    def convex(self) -> bool:
-        """True."""
-        return True
+    dimension: ClassVar[int] = 3
+    convex: ClassVar[bool] = True
+    example: ClassVar[Mapping[str, Any]] = {"radius": 0.5, "length": 1.3}
 
     def bounds(self) -> tuple[Array, Array]:
-        """As in the interface."""
         across = np.full(3, self.radius)
         across["xyz".index(self.axis)] = 0.0
         lower, upper = np.array(self.base_centre) - across, np.array(self.base_centre) + across
@@ -63,7 +49,7 @@ class Cylinder(Shape):
         return lower, upper
 
     def signed_distance(self, points: Array) -> Array:
-        """As in the interface; exact everywhere."""
+        """The distance, exact everywhere."""
         # Rolled so that the axis comes first: (axial, across, across).
         offset = np.roll(points - np.array(self.base_centre), -"xyz".index(self.axis), axis=1)
         beyond_ends = np.abs(offset[:, 0] - 0.5 * self.length) - 0.5 * self.length
@@ -74,11 +60,11 @@ class Cylinder(Shape):
         return distance
 
     def surface(self, spacing: float) -> Surface:
-        """As in the interface; the areas of each face add up to the exact one."""
+        """Samples whose areas add up to the exact area of each face."""
         along = midpoints(self.length, spacing, ON_SURFACE)
         normals, arcs = circle(self.radius, spacing, ON_SURFACE)
         flat, areas = disc(self.radius, spacing)
-        # Axis first, as above: every point around at every height, then the two flat faces.
+        # Axis first, as above: every direction at every height, then the two flat faces.
         up, around = np.tile(along, len(arcs)), np.repeat(normals, along.size, axis=0)
         areas_around = np.repeat(arcs * (self.length / along.size), along.size)[:, np.newaxis]
         side_points = np.column_stack([up, self.radius * around])
@@ -101,5 +87,4 @@ class Cylinder(Shape):
         )
 
     def volume(self) -> float:
-        """Volume [m^3]."""
         return math.pi * self.radius**2 * self.length

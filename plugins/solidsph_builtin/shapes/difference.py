@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from reprlib import repr as short
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -27,13 +28,18 @@ class Difference(Shape):
     box leaves left and hole-left.
 
     Raises:
-        SceneError: one is not a shape, nothing is removed, or the dimensions differ.
+        SceneError: a value is not a shape, nothing is removed, or the dimensions differ.
     """
 
     of: Shape = attrs.field(validator=_check_shape, metadata={"part": "shapes"})
     minus: tuple[Shape, ...] = attrs.field(
         converter=as_parts, validator=check_parts, metadata={"part": "shapes"}
     )
+
+    example: ClassVar[Mapping[str, Any]] = {
+        "of": {"type": "box", "lengths": [1.2, 0.8]},
+        "minus": {"type": "disc", "radius": 0.22, "centre": [0.6, 0.4]},
+    }
 
     def __attrs_post_init__(self) -> None:
         dimension = self.minus[0].dimension
@@ -43,7 +49,6 @@ class Difference(Shape):
 
     @property
     def dimension(self) -> int:
-        """That of the shapes."""
         return self.of.dimension
 
     def bounds(self) -> tuple[Array, Array]:
@@ -51,14 +56,14 @@ class Difference(Shape):
         return self.of.bounds()
 
     def signed_distance(self, points: Array) -> Array:
-        """As in the interface; outside, no more than the distance."""
+        """The distance; outside, a lower bound of it."""
         distance = self.of.signed_distance(points)
         for part in self.minus:
             distance = np.maximum(distance, -part.signed_distance(points))
         return distance
 
     def surface(self, spacing: float) -> Surface:
-        """As in the interface, closed but for a sample wherever two boundaries cross."""
+        """Samples of a surface that is closed up to a sample where two boundaries cross."""
         outer = self.of.surface(spacing)
         taken = frozenset(outer.faces)
         surfaces = [outer, *(_inverted(part.surface(spacing), taken) for part in self.minus)]
@@ -70,8 +75,5 @@ class Difference(Shape):
 
 def _inverted(surface: Surface, taken: frozenset[str]) -> Surface:
     """The boundary of a hole: normals point into it."""
-    return Surface(
-        points=surface.points,
-        area_vectors=-surface.area_vectors,
-        faces=tuple(f"hole-{face}" if face in taken else face for face in surface.faces),
-    )
+    faces = tuple(f"hole-{face}" if face in taken else face for face in surface.faces)
+    return attrs.evolve(surface, area_vectors=-surface.area_vectors, faces=faces)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
 import attrs
 import numpy as np
 
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array
-from solidsph_builtin.shapes._checks import as_number, check_coordinate, check_length
+from solidsph_builtin.shapes._checks import as_number, check_coordinate, length_field
 
 
 @attrs.frozen
@@ -18,27 +21,20 @@ class Interval(Shape):
         SceneError: a parameter is not a finite number, or the length is not positive.
     """
 
-    length: float = attrs.field(converter=as_number, validator=check_length)  # [m]
+    length: float = length_field()  # [m]
     origin: float = attrs.field(  # left end [m]
         default=0.0, converter=as_number, validator=check_coordinate
     )
 
-    @property
-    def dimension(self) -> int:
-        """1."""
-        return 1
-
-    @property
-    def convex(self) -> bool:
-        """True."""
-        return True
+    dimension: ClassVar[int] = 1
+    convex: ClassVar[bool] = True
+    example: ClassVar[Mapping[str, Any]] = {"length": 1.3}
 
     def bounds(self) -> tuple[Array, Array]:
-        """As in the interface."""
         return np.array([self.origin]), np.array([self.origin + self.length])
 
     def signed_distance(self, points: Array) -> Array:
-        """As in the interface; exact everywhere."""
+        """The distance, exact everywhere."""
         centre = self.origin + 0.5 * self.length
         distance: Array = np.abs(points[:, 0] - centre) - 0.5 * self.length
         return distance
@@ -49,5 +45,4 @@ class Interval(Shape):
         return Surface(ends, np.array([[-1.0], [1.0]]), ("left", "right"))
 
     def volume(self) -> float:
-        """Length [m]."""
         return self.length

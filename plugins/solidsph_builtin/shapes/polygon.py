@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from reprlib import repr as short
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -12,12 +13,12 @@ import numpy as np
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes._checks import as_points, check_coordinates, refusal
-from solidsph_builtin.shapes._outline import Outline, first_crossing
+from solidsph_builtin.shapes._outline import Outline, first_crossing, pieces
 from solidsph_builtin.shapes._sampling import ON_LINE, samples_along
 
 
 def _as_ring(value: Any) -> Any:
-    """Points without the first one repeated at the end; anything else as it is."""
+    """Points without the first one repeated at the end; anything else unchanged."""
     points = as_points(value)
     closed = isinstance(points, tuple) and len(points) > 3 and points[0] == points[-1]
     return points[:-1] if closed else points
@@ -47,6 +48,11 @@ class Polygon(Shape):
         converter=_as_ring, validator=_check_vertices
     )
 
+    dimension: ClassVar[int] = 2
+    example: ClassVar[Mapping[str, Any]] = {
+        "vertices": [[0.0, 0.0], [1.2, 0.0], [0.5, 0.3], [0.0, 0.9]]
+    }
+
     def __attrs_post_init__(self) -> None:
         starts, ends = self._edges()
         repeated = (starts == ends).all(axis=1)
@@ -62,13 +68,8 @@ class Polygon(Shape):
             raise refusal(self, "vertices", "a closed line that never meets itself", got)
 
     @property
-    def dimension(self) -> int:
-        """2."""
-        return 2
-
-    @property
     def convex(self) -> bool:
-        """Whether it turns the same way at every vertex."""
+        """True if it turns the same way at every vertex."""
         starts, ends = self._edges()
         edges = ends - starts
         following = np.roll(edges, -1, axis=0)
@@ -77,33 +78,29 @@ class Polygon(Shape):
         return bool(np.all(turns >= 0.0))
 
     def bounds(self) -> tuple[Array, Array]:
-        """As in the interface."""
         vertices = np.array(self.vertices)
         return vertices.min(axis=0), vertices.max(axis=0)
 
     def signed_distance(self, points: Array) -> Array:
-        """As in the interface; exact everywhere."""
+        """The distance, exact everywhere."""
         return self._outline.signed_distance(points)
 
     def surface(self, spacing: float) -> Surface:
-        """As in the interface; every edge has its exact length and normal."""
+        """Samples with the exact length and normal of every edge."""
         starts, ends = self._edges()
         edges = ends - starts
         lengths = np.hypot(*edges.T).tolist()
         counts = np.array([samples_along(length, spacing, ON_LINE) for length in lengths])
-        owners = np.repeat(np.arange(len(edges)), counts)
-        within = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
-        along = (within + 0.5) / counts[owners]
+        owners, middles = pieces(starts, edges, counts)
         normals = np.sign(self._signed_area()) * np.stack([edges[:, 1], -edges[:, 0]], axis=1)
         names = [f"edge-{i}" for i in range(len(edges))]
         return Surface(
-            points=starts[owners] + along[:, np.newaxis] * edges[owners],
+            points=middles,
             area_vectors=(normals / counts[:, np.newaxis])[owners],
             faces=tuple(names[i] for i in owners.tolist()),
         )
 
     def volume(self) -> float:
-        """Area [m^2]."""
         return abs(self._signed_area())
 
     @cached_property
@@ -111,12 +108,12 @@ class Polygon(Shape):
         return Outline.of(self._edges()[0], counterclockwise=self._signed_area() > 0.0)
 
     def _edges(self) -> tuple[Array, Array]:
-        """Where each edge starts (m, 2) and where it ends (m, 2) [m]."""
+        """Start and end of each edge, each (m, 2) [m]."""
         starts = np.array(self.vertices)
         return starts, np.roll(starts, -1, axis=0)
 
     def _signed_area(self) -> float:
         """Area [m^2], negative where the vertices run clockwise."""
-        # Seen from the first vertex, so that a body far from the origin loses no digits.
+        # Relative to the first vertex, so that a body far from the origin loses no digits.
         x, y = (np.array(self.vertices) - self.vertices[0]).T
         return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))

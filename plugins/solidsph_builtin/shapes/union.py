@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -10,9 +11,9 @@ from scipy.spatial import cKDTree
 
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array, Indices
-from solidsph_builtin.shapes._composite import as_parts, check_parts, remaining
+from solidsph_builtin.shapes._composite import as_parts, check_parts, corners, remaining
 
-# Up to so many parts, all are asked of every point.
+# Up to so many parts, the distance of every point to each is computed.
 _FEW_PARTS = 16
 
 # Points that are compared with the boxes of all parts at once.
@@ -26,25 +27,30 @@ class Union(Shape):
     Faces keep the names that they have in their shape; equal names become one face.
 
     Raises:
-        SceneError: there is no shape, one is not a shape, or their dimensions differ.
+        SceneError: there is no shape, a value is not a shape, or their dimensions differ.
     """
 
     of: tuple[Shape, ...] = attrs.field(
         converter=as_parts, validator=check_parts, metadata={"part": "shapes"}
     )
 
+    example: ClassVar[Mapping[str, Any]] = {
+        "of": [
+            {"type": "box", "lengths": [1.2, 0.8]},
+            {"type": "disc", "radius": 0.3, "centre": [1.2, 0.8]},
+        ]
+    }
+
     @property
     def dimension(self) -> int:
-        """That of the shapes."""
         return self.of[0].dimension
 
     def bounds(self) -> tuple[Array, Array]:
-        """As in the interface."""
-        lower, upper = zip(*(part.bounds() for part in self.of), strict=True)
-        return np.min(lower, axis=0), np.max(upper, axis=0)
+        lower, upper = corners(self.of)
+        return lower.min(axis=0), upper.max(axis=0)
 
     def signed_distance(self, points: Array) -> Array:
-        """As in the interface; inside, no more than the distance, and 0 on a seam of two parts."""
+        """The distance; inside, a lower bound of it, 0 on a seam of two parts."""
         distance = np.full(len(points), np.inf)
         for rows, parts in self._near(points):
             for part in parts:
@@ -58,17 +64,17 @@ class Union(Shape):
         if len(self.of) <= _FEW_PARTS or not len(points):
             yield slice(None), range(len(self.of))
             return
-        lower, upper = (np.array(one) for one in zip(*(p.bounds() for p in self.of), strict=True))
-        order = cKDTree(points, leafsize=_TOGETHER).indices  # near each other in the order
+        lower, upper = corners(self.of)
+        order = cKDTree(points, leafsize=_TOGETHER).indices  # near points follow each other
         for rows in np.array_split(order, 1 + len(order) // _TOGETHER):
             low, high = points[rows].min(axis=0), points[rows].max(axis=0)
-            # Between the box of the points and that of a part: the least distance, and the most.
+            # Least and largest distance between the box of the points and that of a part.
             least = np.linalg.norm(np.maximum(0.0, np.maximum(lower - high, low - upper)), axis=1)
             most = np.linalg.norm(np.maximum(upper - low, high - lower), axis=1)
             yield rows, np.flatnonzero(least <= most.min()).tolist()
 
     def surface(self, spacing: float) -> Surface:
-        """As in the interface, closed but for a sample wherever two boundaries cross."""
+        """Samples of a surface that is closed up to a sample where two boundaries cross."""
         surfaces = [part.surface(spacing) for part in self.of]
         return remaining(self, self.of, surfaces, spacing)
 

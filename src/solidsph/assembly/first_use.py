@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from solidsph.conformance.kits import KITS
 from solidsph.errors import BuildError, PartWarning
 from solidsph.interfaces.terms import EnergyTerm, Load
 from solidsph.model.particles import read_only
-from solidsph.promises.kits import KITS
 from solidsph.registry.origin import described
 from solidsph.registry.registry import entry_of, singular
 from solidsph.run.built_scene import BuiltScene

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -22,7 +21,7 @@ from solidsph.errors import SceneError
 from solidsph.registry import registry
 
 if TYPE_CHECKING:
-    from solidsph.promises.check import CheckResult
+    from solidsph.conformance.check import CheckResult
 
 
 @click.command()
@@ -102,13 +101,7 @@ def _conform(name: str, kind: str | None, settings: tuple[str, ...], as_json: bo
             f"there is no conformance kit for a {registry.singular(found)}; kits exist for "
             f"{', '.join(registry.singular(one) for one in kits())}"
         )
-    try:
-        part = example_part(found, name, **parameters(settings))
-    except SceneError as cause:
-        missing = re.search(r"missing parameter '(\w+)'", str(cause))
-        if missing is None:
-            raise
-        raise SceneError(f"{cause}, such as --set {missing[1]}=1.0") from None
+    part = example_part(found, name, **parameters(settings))
     entry = registry.find(found, name)
     results = conformance(found, part)
     good = all(result.passed for result in results)

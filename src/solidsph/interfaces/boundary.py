@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar
 
 from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.part import Part
 from solidsph.interfaces.terms import Term
 
 
-class BoundaryHandler(ABC):
+class BoundaryHandler(Part):
     """Parameters of what is imposed; `bind` makes it act on particles.
 
     An implementation is a frozen attrs class whose fields are the TOML keys of the handler. One

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 
+from solidsph.interfaces.part import Part
 from solidsph.interfaces.shape import Shape
 from solidsph.model.particles import Particles
 
 
-class Discretisation(ABC):
+class Discretisation(Part):
     """A shape and a spacing -> Particles.
 
     Promises, whatever the arrangement: volumes add up to the shape's, area vectors of a closed

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from typing import ClassVar, final
 
 import numpy as np
 
+from solidsph.interfaces.part import Part
 from solidsph.maths.arrays import Array, Scalar
 from solidsph.model.neighbours import Pairs
 
 
-class Divergence(ABC):
+class Divergence(Part):
     """Weights d_pq of the discrete force, f_p = sum over q of T_q d_pq."""
 
     conserves_momentum: ClassVar[bool]

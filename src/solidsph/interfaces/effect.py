@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
 
 from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.part import Part
 from solidsph.interfaces.terms import Load
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ class Need(Enum):
     MEETING = "bodies that meet, or hang together"
 
 
-class Effect(ABC):
+class Effect(Part):
     """A term that a scene names, and pays for; a scene that does not name it runs none of it.
 
     An implementation is a frozen attrs class whose fields are the TOML keys of the effect.

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from enum import Enum
 from typing import ClassVar
 
 from solidsph.interfaces.divergence import Divergence
 from solidsph.interfaces.gradient import Gradient
+from solidsph.interfaces.part import Part
 from solidsph.maths.arrays import Tensor
 
 
@@ -18,7 +19,7 @@ class Configuration(Enum):
     CURRENT = "current"  # at every step, at x
 
 
-class Formulation(ABC):
+class Formulation(Part):
     """From displacement to force in four lines, the same for every formulation:
 
     the gradient H of the displacement in the formulation's own configuration, the deformation

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import ClassVar, final
 
 import numpy as np
 
 from solidsph.errors import BuildError
+from solidsph.interfaces.part import Part
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.maths.arrays import Array, Mask, Tensor
 from solidsph.maths.tensors import components_first, particles_first
@@ -16,7 +17,7 @@ from solidsph.model.neighbours import Pairs
 from solidsph.model.particles import Particles
 
 
-class Gradient(ABC):
+class Gradient(Part):
     """Weights g_pq of the discrete gradient, grad f at p = sum over q of f_q g_pq."""
 
     @property

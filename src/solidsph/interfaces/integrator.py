@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from typing import ClassVar
 
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
+from solidsph.interfaces.part import Part
 from solidsph.maths.arrays import Scalar
 from solidsph.model.particles import State
 
@@ -13,7 +14,7 @@ MEAN_VELOCITY = "mean velocity of the step"
 """What a pointwise integrator keeps in `memory`: (u_n - u_n-1) / dt of every particle [m/s]."""
 
 
-class Integrator(ABC):
+class Integrator(Part):
     """An explicit scheme with one evaluation of the forces a step."""
 
     order: ClassVar[int]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from typing import ClassVar
 
+from solidsph.interfaces.part import Part
 from solidsph.maths.arrays import Scalar
 
 
-class Kernel(ABC):
+class Kernel(Part):
     """A radial profile w(q) on 0 <= q < 1, where q = r / H is distance over support radius.
 
     The author writes the formula and nothing else. The core finds the constant that gives the

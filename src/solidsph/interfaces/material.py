@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from math import sqrt
 from typing import ClassVar
 
+from solidsph.interfaces.part import Part
 from solidsph.maths.arrays import Scalar, Tensor
 
 
-class Material(ABC):
+class Material(Part):
     """A hyperelastic law.
 
     `energy`, `first_piola` and `tangent` are pure pointwise functions written in the words of

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 
 import attrs
 
+from solidsph.interfaces.part import Part
 from solidsph.maths.arrays import Array
 
 
@@ -18,7 +19,7 @@ class Surface:
     faces: tuple[str, ...]  # (m,) the named face that each sample lies on
 
 
-class Shape(ABC):
+class Shape(Part):
     """A closed region in 1, 2 or 3 dimensions.
 
     An implementation is a frozen attrs class whose fields are the TOML keys of the shape.

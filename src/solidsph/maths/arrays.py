@@ -1,7 +1,7 @@
-"""Names for the arrays that cross interfaces.
+"""Types of the arrays that interfaces use.
 
-Arrays that users see are particle-first: X (n, d), F (n, d, d). Pointwise functions see
-component axes first, F (d, d, n), so that one source serves arrays and scalars alike.
+Public arrays are particle-first: X (n, d), F (n, d, d). Pointwise functions get component axes
+first, F (d, d, n), so that the same source works for arrays and for scalars.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Formulas in scene files: arithmetic on named variables, and nothing else.
 
-A formula is parsed by Python's own parser and then evaluated node by node from a short list of
-permitted ones, so a scene file can never run code.
+A formula is parsed by Python's own parser and evaluated node by node from a short list of
+permitted nodes, so a scene file can never run code.
 
-A comparison is true or false where a condition is wanted: by `and`, `or`, `not` and `where`. In
-arithmetic and in other functions it is the number 1.0 or 0.0, so that "(t > 1) + (t > 2)" counts.
-A number without any comparison is no condition: "(t > 1) and 5" would be 1, and is refused.
+A comparison is true or false as an operand of `and`, `or`, `not` and `where`. In arithmetic and in
+other functions it is the number 1.0 or 0.0, so that "(t > 1) + (t > 2)" counts. A number without
+any comparison is not a condition: "(t > 1) and 5" would be 1, and is refused.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ import numpy as np
 from solidsph.errors import SceneError
 
 MAX_LENGTH = 1000  # characters
-MAX_DEPTH = 50  # of nesting; evaluation recurses, and no formula that a person writes comes near
+MAX_DEPTH = 50  # of nesting; evaluation recurses, and formulas written by hand are far below
 
 _CONSTANTS = {"pi": np.pi, "e": np.e}
 
@@ -92,10 +92,10 @@ class Expression:
         Args:
             text: the formula.
             variables: the names that it may use.
-            conditions: those of them that are true or false; the others are numbers.
+            conditions: the variables that are true or false; the others are numbers.
 
         Raises:
-            SceneError: it is no formula, or names something unknown.
+            SceneError: it is not a formula, or uses an unknown name.
         """
         if len(text) > MAX_LENGTH:
             raise SceneError(f"formula of {len(text)} characters; at most {MAX_LENGTH} are allowed")
@@ -114,21 +114,21 @@ class Expression:
         return cls(text, tuple(variables), tree)
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
-        """The value of the formula, where `values` holds a number or an array by variable."""
-        # A formula may divide by zero or leave a function's domain; whoever uses the value checks.
+        """The value of the formula; `values` holds a number or an array for each variable."""
+        # A formula may divide by zero or leave a function's domain; the caller checks the value.
         with np.errstate(all="ignore"):
             return _evaluate(self._tree, {**_CONSTANTS, **values})
 
 
 @cache
 def names_in(text: str) -> frozenset[str]:
-    """Names that a formula, which can be parsed, uses."""
+    """Names used in a valid formula."""
     return frozenset(node.id for node in ast.walk(_read(text)) if isinstance(node, ast.Name))
 
 
 def _read(text: str) -> ast.expr:
     with warnings.catch_warnings():
-        # Python only warns of what it will refuse one day, such as "1or X".
+        # Python only warns of syntax that it will refuse one day, such as "1or X".
         warnings.simplefilter("error")
         return ast.parse(text.strip(), mode="eval").body
 
@@ -144,6 +144,7 @@ def _check(node: ast.AST, text: str, variables: tuple[str, ...]) -> None:
             f"+ - * / ** %, comparisons, and/or/not, and {', '.join(_FUNCTIONS)}"
         )
 
+    parts: list[ast.expr] = []
     match node:
         case ast.Constant(value=bool()):
             raise refuse(repr(node.value))
@@ -161,34 +162,31 @@ def _check(node: ast.AST, text: str, variables: tuple[str, ...]) -> None:
                 hint = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(known)}"
                 raise SceneError(f"formula {text!r}: unknown name {name!r}{hint}")
         case ast.Attribute() if ast.unparse(node) in variables:  # a tag of one body: "two.left"
-            return
+            pass
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-            _check(left, text, variables)
-            _check(right, text, variables)
+            parts = [left, right]
         case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATORS:
-            _check(operand, text, variables)
+            parts = [operand]
         case ast.BoolOp(values=parts):
-            for part in parts:
-                _check(part, text, variables)
+            pass
         case ast.Compare(left=left, ops=ops, comparators=others) if all(
             type(op) in _OPERATORS for op in ops
         ):
-            for part in (left, *others):
-                _check(part, text, variables)
-        case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in _FUNCTIONS:
+            parts = [left, *others]
+        case ast.Call(func=ast.Name(id=name), args=parts, keywords=[]) if name in _FUNCTIONS:
             wanted = _FUNCTIONS[name][0]
-            if len(args) != wanted:
+            if len(parts) != wanted:
                 raise SceneError(
-                    f"formula {text!r}: {name} takes {wanted} arguments, got {len(args)}"
+                    f"formula {text!r}: {name} takes {wanted} arguments, got {len(parts)}"
                 )
-            for part in args:
-                _check(part, text, variables)
         case _:
             raise refuse(repr(ast.unparse(node)))
+    for part in parts:
+        _check(part, text, variables)
 
 
 def _check_conditions(tree: ast.AST, text: str, conditions: frozenset[str]) -> None:
-    """Raise SceneError where a mere number stands for a condition."""
+    """Raise SceneError if a number is used as a condition."""
     for node in ast.walk(tree):
         wanted: list[ast.expr] = []
         match node:
@@ -199,7 +197,7 @@ def _check_conditions(tree: ast.AST, text: str, conditions: frozenset[str]) -> N
             case ast.Call(func=ast.Name(id="where"), args=[first, *_]):
                 wanted, word = [first], "where"
         for part in wanted:
-            if not any(_is_condition(one, conditions) for one in ast.walk(part)):
+            if not any(_is_condition(inner, conditions) for inner in ast.walk(part)):
                 raise SceneError(
                     f"formula {text!r}: {ast.unparse(part)!r} is a number, and {word!r} takes "
                     "conditions such as 'X > 0.1'; compare it, or multiply it by a comparison: "
@@ -221,13 +219,13 @@ def _is_condition(node: ast.AST, conditions: frozenset[str]) -> bool:
 def _is_double(number: float) -> bool:
     try:
         return isfinite(float(number))
-    except OverflowError:  # a whole number of hundreds of digits
+    except OverflowError:  # an integer of hundreds of digits
         return False
 
 
 def _evaluate(node: ast.AST, values: Mapping[str, Any]) -> Any:
     def number(part: ast.AST) -> Any:
-        """Its value as a double, or an array of them: true is 1, false is 0."""
+        """The value of a part as a double or an array of doubles: true is 1, false is 0."""
         return np.asarray(_evaluate(part, values), dtype=np.float64)
 
     match node:

@@ -1,9 +1,9 @@
-"""Pointwise tensor words: one source for arrays of points and for single points.
+"""Pointwise tensor algebra: the same functions for arrays of points and for single points.
 
 A tensor is anything indexed `T[i][j]` with `len(T)` = 1, 2 or 3: nested tuples of scalars, or an
-array with component axes first, (d, d, n). Results are nested tuples. The words are plain
-functions without allocation, so a compiler can inline them into a loop over particles; the
-branches on `len(T)` are decided when it compiles.
+array with component axes first, (d, d, n). Results are nested tuples. The functions allocate
+nothing, so a compiler can inline them into a loop over particles; it resolves the branches on
+`len(T)`.
 
 In one and two dimensions the missing stretches are 1 (uniaxial strain, plane strain).
 """
@@ -190,12 +190,12 @@ def cauchy_stress(F: Tensor, P: Tensor) -> Tensor:
 
 
 def components_first(values: Array) -> Array:
-    """(n, d, d) as users see it -> (d, d, n) as pointwise functions see it (a view)."""
+    """Public (n, d, d) -> (d, d, n) of pointwise functions (a view)."""
     return np.moveaxis(values, 0, -1)
 
 
 def particles_first(values: Tensor, count: int) -> Array:
-    """A pointwise function's result -> (count, d, d); constant components are spread out."""
+    """Result of a pointwise function -> (count, d, d); constant components are broadcast."""
     d = len(values)
     out = np.empty((count, d, d))
     for i in range(d):

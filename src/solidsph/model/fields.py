@@ -25,31 +25,31 @@ _CENTRED = {1: {-1: -0.5, 1: 0.5}, 2: {-1: 1.0, 0: -2.0, 1: 1.0}}
 _AT_START = {1: {0: -1.5, 1: 2.0, 2: -0.5}, 2: {0: 2.0, 1: -5.0, 2: 4.0, 3: -1.0}}
 _AT_END = {n: {-k: (-1) ** n * w for k, w in _AT_START[n].items()} for n in _AT_START}
 
-# Of a step: times are sums of steps, and so much of one is rounding.
+# Rounding of a time, a sum of steps, in steps.
 _ROUNDING = 1e-3
 
-# And of a time itself.
+# Rounding of a time, relative to it.
 _OF_TIMES = 1e-9
 
 
 @attrs.frozen
 class VectorField:
-    """Some components of a vector as functions of position and time; the others are left alone.
+    """Some components of a vector as functions of position and time; the others are not set.
 
-    Before 0 no component is asked, and beyond the `end` of the duration only in a run that has
-    been extended, and then at no later time than the run has reached: it may have no value there.
+    Components are not evaluated before time 0, and beyond the `end` of the duration only in a run
+    that has been extended, up to the time that it has reached: they may have no value there.
     """
 
     components: Mapping[int, Component]
     end: float = inf  # of the duration [s]
-    what: str = ""  # the field, as a message about it begins
+    what: str = ""  # name of the field, with which a message begins
 
     @classmethod
     def of(cls, table: Mapping[str, Component], what: str, *, end: float = inf) -> VectorField:
-        """From a scene's table such as {x = "0.1*t", y = 0}, in a scene up to `end` [s].
+        """The field of a table such as {x = "0.1*t", y = 0}, in a scene up to `end` [s].
 
         Raises:
-            SceneError: unknown components, or formulas that cannot be read: all of them are told.
+            SceneError: unknown components, or formulas that cannot be read; names all of them.
         """
         if not isinstance(table, Mapping) or not table:
             raise SceneError(
@@ -70,7 +70,7 @@ class VectorField:
         return cls(components, end, what)
 
     def check_without(self, names: Collection[str], why: str) -> None:
-        """Raise SceneError if a formula uses one of the variables `names`, and say `why` not."""
+        """Raise SceneError if a formula uses one of the variables `names`, for the reason `why`."""
         for axis, component in self.components.items():
             used = names_in(component) & set(names) if isinstance(component, str) else ()
             for name in sorted(used):
@@ -88,16 +88,15 @@ class VectorField:
                 )
 
     def varies(self, axis: int) -> bool:
-        """Whether the component along `axis` may change in time."""
+        """True if the component along `axis` may change in time."""
         component = self.components[axis]
         if isinstance(component, str):
             return "t" in names_in(component)
         return callable(component)
 
     def schedule(self, axis: int, positions: Array, times: Array) -> Array:
-        """The component along `axis` at `positions` (k, d) and `times` (t,) [s], (t, k).
-
-        (1, k) if it does not vary.
+        """The component along `axis` at `positions` (k, d) and `times` (t,) [s], (t, k), or (1, k)
+        if it does not vary.
 
         Raises:
             SceneError: a value is not a finite number.
@@ -107,48 +106,47 @@ class VectorField:
             times = times[:1]
         times = self._asked(times)
         if callable(component):
-            found = np.stack([_spread(component(positions, float(t)), count) for t in times])
+            values = np.stack([_spread(component(positions, float(t)), count) for t in times])
         elif isinstance(component, str):
             variables = {name: positions[:, k] for k, name in enumerate(AXES[: positions.shape[1]])}
             expression = _parsed(component, (*variables, "t"))
             result = expression({**variables, "t": times[:, None]})
-            found = np.broadcast_to(np.asarray(result, dtype=np.float64), (len(times), count))
+            values = np.broadcast_to(np.asarray(result, dtype=np.float64), (len(times), count))
         else:
-            found = np.full((1, count), float(component))
-        if not np.all(np.isfinite(found)):
-            row, bad = (int(k) for k in np.argwhere(~np.isfinite(found))[0])
+            values = np.full((1, count), float(component))
+        if not np.all(np.isfinite(values)):
+            row, bad = (int(k) for k in np.argwhere(~np.isfinite(values))[0])
             whose = f"{self.what}: " if self.what else ""
             raise SceneError(
-                f"{whose}{component!r} is {found[row, bad]} at X = {positions[bad].tolist()}, "
+                f"{whose}{component!r} is {values[row, bad]} at X = {positions[bad].tolist()}, "
                 f"t = {times[row]:.6g} s; it must be finite everywhere it is used"
             )
-        return found
+        return values
 
     def values(self, axis: int, positions: Array, time: float) -> Array:
-        """As `schedule`, at one time, (k,)."""
-        found: Array = self.schedule(axis, positions, np.array([time]))[0]
-        return found
+        """The component along `axis` at one time [s], (k,)."""
+        return np.asarray(self.schedule(axis, positions, np.array([time]))[0])
 
     def derivative_schedule(
         self, axis: int, positions: Array, times: Array, order: int, step: float
     ) -> Array:
-        """Time derivative of order 0, 1 or 2 of a component, by second order differences.
+        """Time derivative of order 0, 1 or 2 of a component, by second order differences, (t, k);
+        (1, k) if it does not vary.
 
-        (t, k), or (1, k) if it does not vary. Differences over the time `step` [s] of the run are
-        what the integrators see: a kink in the motion, such as the end of a ramp, becomes the
-        impulse that the step delivers, and the work of the reaction stays right. At the start they
-        look ahead. From the end of the duration on they look back, whether or not the run is
-        extended: what it has recorded up to there stays as it is.
+        Differences are over the time `step` [s] of the run, as the integrators need: a kink in the
+        motion, such as the end of a ramp, becomes the impulse that the step delivers, and the work
+        of the reaction is right. They are one-sided at the start, and from the end of the duration
+        on, where they look back whether or not the run is extended: so its records do not change.
         """
         if order == 0:
             return self.schedule(axis, positions, times)
         if not self.varies(axis):
             return np.zeros((1, len(positions)))
-        step = min(step, self.end / 4.0)  # a run of fewer steps has no room for their differences
+        step = min(step, self.end / 4.0)  # the differences of a shorter run need smaller steps
         times = self._asked(times)
         at_start = times < step * (1.0 - _ROUNDING)
         at_end = times > self.end - step * (1.0 - _ROUNDING)
-        # What is a step from the end but for rounding is not to look beyond it.
+        # A time that is one step from the end, up to rounding, must not look beyond it.
         inside = np.clip(times, step, self.end - step)
         derivative = np.empty((len(times), len(positions)))
         for chosen, near, weights in (
@@ -165,30 +163,26 @@ class VectorField:
         return derivative
 
     def _asked(self, times: Array) -> Array:
-        """Times (t,) as components are asked; what rounding carries beyond the end is the end."""
+        """Times (t,) at which components are evaluated: without what rounding adds to the end."""
         rounded = times <= self.end * (1.0 + _OF_TIMES)
-        found: Array = np.maximum(np.where(rounded, np.minimum(times, self.end), times), 0.0)
-        return found
+        return np.asarray(np.maximum(np.where(rounded, np.minimum(times, self.end), times), 0.0))
 
     def derivative(
         self, axis: int, positions: Array, time: float, order: int, step: float
     ) -> Array:
-        """As `derivative_schedule`, at one time, (k,)."""
+        """Time derivative of a component at one time, (k,)."""
         times = np.array([time])
-        found: Array = self.derivative_schedule(axis, positions, times, order, step)[0]
-        return found
+        return np.asarray(self.derivative_schedule(axis, positions, times, order, step)[0])
 
 
 def scheduled_forces(field: VectorField, positions: Array, amounts: Array, times: Array) -> Array:
-    """Forces `amounts` (k,) times the field at `positions` (k, d) and `times` (t,), (t, k, d).
-
-    (1, k, d) if no component varies.
-    """
+    """Forces `amounts` (k,) times the field at `positions` (k, d) and `times` (t,), (t, k, d);
+    (1, k, d) if no component varies."""
     columns = {axis: field.schedule(axis, positions, times) for axis in field.components}
-    rows = max((len(one) for one in columns.values()), default=1)
+    rows = max(map(len, columns.values()), default=1)
     forces = np.zeros((rows, *positions.shape))
-    for axis, one in columns.items():
-        forces[:, :, axis] = amounts * one
+    for axis, column in columns.items():
+        forces[:, :, axis] = amounts * column
     return forces
 
 
@@ -198,7 +192,7 @@ def _spread(result: object, count: int) -> Array:
 
 @cache
 def _parsed(text: str, variables: tuple[str, ...]) -> Expression:
-    """A formula is asked at every step, and parsed once."""
+    """A formula, which is evaluated at every step, and parsed once."""
     return Expression.parse(text, variables)
 
 
@@ -215,5 +209,5 @@ def _checked(value: Component, what: str) -> Component:
 def _is_finite(value: float) -> bool:
     try:
         return isfinite(value)
-    except OverflowError:  # a whole number of hundreds of digits
+    except OverflowError:  # an integer of hundreds of digits
         return False

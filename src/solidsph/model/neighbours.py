@@ -15,10 +15,10 @@ from solidsph.maths.arrays import Array, Indices, Mask
 
 @attrs.frozen(eq=False)
 class Pairs:
-    """Ordered pairs (p, q) in rows: the neighbours of p stand together, sorted by q, p among them.
+    """Ordered pairs (p, q) in rows: the row of p holds its neighbours q in rising order, with p.
 
-    The list may hold the rows of some of the particles only, as long as they follow each other;
-    rows and columns keep their numbers among all. In a list of all rows every pair has its reverse.
+    The list may hold the rows of a contiguous range of particles only; rows and columns are
+    numbered among all. In a list of all rows every pair has its reverse.
     """
 
     starts: Indices  # (n + 1,) the row of the k-th particle listed is starts[k] : starts[k + 1]
@@ -29,7 +29,7 @@ class Pairs:
 
     @property
     def row_count(self) -> int:
-        """Number of particles n whose rows are listed."""
+        """Number n of listed rows."""
         return len(self.starts) - 1
 
     @property
@@ -38,21 +38,21 @@ class Pairs:
         return len(self.columns)
 
     def reversed_order(self) -> Indices:
-        """For every pair (p, q) the place of (q, p), (m,)."""
+        """Index of (q, p) for every pair (p, q), (m,)."""
         # In column order the pairs of column p appear as (q, p) with q rising: row p's order.
         return np.asarray(self.matrix(np.arange(self.count)).tocsc().data, dtype=np.intp)
 
     def row_sums(self, values: Array) -> Array:
         """Sum of `values` (m, ...) over each particle's pairs, (n, ...)."""
-        # Every row holds its self pair, so no segment is empty and reduceat is safe.
+        # Every row holds its self pair, so no segment is empty, as reduceat requires.
         return np.add.reduceat(values, self.starts[:-1], axis=0)
 
     def spread(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Values of the particles listed (n, ...), given to each of their pairs, (m, ...)."""
+        """Values of the particles listed (n, ...), repeated for each of their pairs, (m, ...)."""
         return np.repeat(values, np.diff(self.starts), axis=0)
 
     def of_differences(self, weights: Array) -> Array:
-        """The same weights (m, d) acting on f_q - f_p: each row is made to add up to zero."""
+        """The weights (m, d) as they act on f_q - f_p: each row adds up to zero."""
         weights = weights.copy()
         weights[self.self_pairs] = 0.0
         weights[self.self_pairs] = -self.row_sums(weights)
@@ -65,20 +65,20 @@ class Pairs:
 
     @property
     def self_pairs(self) -> Indices:
-        """Places of the pairs (p, p), (n,)."""
+        """Indices of the pairs (p, p), (n,)."""
         return np.flatnonzero(self.rows == self.columns)
 
 
 @attrs.frozen(eq=False)
 class Hidden:
-    """Particles that are no neighbours however near they are: the body is not between them.
+    """Pairs of particles that are not neighbours however close, since the body is not between them.
 
     `visibility.hidden_pairs` finds them in the reference configuration.
     """
 
     keys: Indices  # (k,) rising: p n + q of every hidden pair, (q, p) as well as (p, q)
     count: int  # number of particles n
-    pieces: Indices | None = None  # (n,) if pieces of the body may meet, which piece each is of
+    pieces: Indices | None = None  # (n,) the piece of each, if pieces of the body may meet
 
     def between(self, rows: Indices, columns: Indices) -> Mask:
         """Whether p and q are hidden from each other, for pairs of `rows` and `columns` (m,)."""
@@ -93,7 +93,7 @@ class Hidden:
         return hidden
 
     def part(self, chosen: Indices) -> Hidden:
-        """The same among the chosen particles (k,), numbered in their order."""
+        """The hidden pairs among the chosen particles (k,), numbered in their order."""
         place = np.full(self.count, -1, dtype=np.intp)
         place[chosen] = np.arange(len(chosen))
         p, q = (place[ends] for ends in np.divmod(self.keys, self.count))
@@ -103,14 +103,14 @@ class Hidden:
 
 
 def neighbour_pairs(positions: Array, radius: float, hidden: Hidden | None = None) -> Pairs:
-    """All pairs closer than `radius` [m] among `positions` (n, d), self pairs included, but for
-    those that are hidden from each other."""
-    found = cKDTree(positions).query_pairs(radius, output_type="ndarray")
+    """All pairs closer than `radius` [m] among `positions` (n, d), self pairs included, hidden
+    pairs excluded."""
+    near = cKDTree(positions).query_pairs(radius, output_type="ndarray")
     if hidden is not None:
-        found = found[~hidden.between(found[:, 0], found[:, 1])]
-    own = np.arange(len(positions), dtype=np.intp)
-    rows = np.concatenate([found[:, 0], found[:, 1], own]).astype(np.intp)
-    columns = np.concatenate([found[:, 1], found[:, 0], own]).astype(np.intp)
+        near = near[~hidden.between(near[:, 0], near[:, 1])]
+    itself = np.arange(len(positions), dtype=np.intp)
+    rows = np.concatenate([near[:, 0], near[:, 1], itself]).astype(np.intp)
+    columns = np.concatenate([near[:, 1], near[:, 0], itself]).astype(np.intp)
     order = np.lexsort((columns, rows))
     rows, columns = rows[order], columns[order]
     offsets = positions[columns] - positions[rows]

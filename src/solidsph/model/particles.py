@@ -1,7 +1,7 @@
-"""Particles (reference data, fixed) and State (evolving arrays): all that a run is made of.
+"""Particles (fixed reference data) and State (evolving arrays): all data of a run.
 
-Both are plain arrays that can be stored; nothing that evolves hides anywhere else, so a restart
-is a file read and two runs never share a history.
+Both are plain arrays that can be stored. Nothing else evolves, so a restart only reads a file, and
+two runs never share a history.
 """
 
 from __future__ import annotations
@@ -16,14 +16,17 @@ from numpy.typing import NDArray
 from solidsph.errors import SceneError
 from solidsph.maths.arrays import Array, Indices, Mask
 
+# Of particles, one row for each.
+_ARRAYS = ("positions", "volumes", "spacings", "area_vectors", "ghosts", "images", "cells")
+
 
 @attrs.frozen(eq=False)
 class Face:
-    """A named part of a body's surface: the particles that own some of it, and how much."""
+    """A named part of a body's surface: the particles that own some of it, and their areas."""
 
     particles: Indices  # (k,)
     area_vectors: Array  # (k, d) outward [m^(d-1)]
-    areas: Array = attrs.field()  # (k,) more than their length where the face is curved [m^(d-1)]
+    areas: Array = attrs.field()  # (k,) above the vectors' length where it is curved [m^(d-1)]
 
     @areas.default
     def _lengths(self) -> Array:
@@ -34,12 +37,12 @@ class Face:
 class Particles:
     """The reference configuration of every body of a scene.
 
-    Ghosts are particles beyond the surface that carry values only to complete the support of
-    those near it; they have no mass and no equation of motion.
+    Ghosts are particles beyond the surface. They carry values to complete the support of those near
+    it, and have no mass and no equation of motion.
     """
 
     positions: Array  # (n, d) reference positions X [m]
-    volumes: Array  # (n,) share of the body, by which masses and energies count [m^d]
+    volumes: Array  # (n,) share of the body, for masses and energies [m^d]
     spacings: Array  # (n,) particle spacing of the body that a particle belongs to [m]
     area_vectors: Array  # (n, d) outward surface area that a particle owns, 0 inside [m^(d-1)]
     ghosts: Mask  # (n,)
@@ -51,7 +54,7 @@ class Particles:
 
     @cells.default
     def _shares(self) -> Array:
-        # The two differ where ghosts take up the sums beyond the middle of a cell.
+        # The two differ where ghosts complete the sums beyond the middle of a cell.
         return self.volumes
 
     @property
@@ -66,7 +69,7 @@ class Particles:
 
     @classmethod
     def joined(cls, bodies: Mapping[str, Particles]) -> Particles:
-        """The particles of several bodies as one set; a body's name becomes a tag of its own."""
+        """The particles of several bodies as one set; the name of a body becomes a tag."""
         parts = list(bodies.values())
         starts = np.cumsum([0, *(part.count for part in parts)])
         slices = {
@@ -77,45 +80,29 @@ class Particles:
         tags: dict[str, Mask] = {}
         faces: dict[str, list[Face]] = {}
         for name, part in bodies.items():
-            own = dict(part.tags)
-            own[name] = ~part.ghosts
-            for tag, mask in own.items():
+            for tag, mask in {**part.tags, name: ~part.ghosts}.items():
                 tags.setdefault(tag, np.zeros(total, dtype=np.bool_))[slices[name]] |= mask
-            for face, own_face in part.faces.items():
-                moved = own_face.particles + slices[name].start
-                faces.setdefault(face, []).append(attrs.evolve(own_face, particles=moved))
+            for face, owned in part.faces.items():
+                moved = owned.particles + slices[name].start
+                faces.setdefault(face, []).append(attrs.evolve(owned, particles=moved))
         return cls(
-            positions=_joined([part.positions for part in parts]),
-            volumes=_joined([part.volumes for part in parts]),
-            spacings=_joined([part.spacings for part in parts]),
-            area_vectors=_joined([part.area_vectors for part in parts]),
-            ghosts=_joined([part.ghosts for part in parts]),
-            images=_joined([part.images for part in parts]),
+            **{name: _joined([getattr(part, name) for part in parts]) for name in _ARRAYS},
             tags=tags,
             bodies=slices,
             faces={
                 face: Face(
-                    np.concatenate([one.particles for one in several]),
-                    np.concatenate([one.area_vectors for one in several]),
-                    np.concatenate([one.areas for one in several]),
+                    np.concatenate([piece.particles for piece in pieces]),
+                    np.concatenate([piece.area_vectors for piece in pieces]),
+                    np.concatenate([piece.areas for piece in pieces]),
                 )
-                for face, several in faces.items()
+                for face, pieces in faces.items()
             },
-            cells=_joined([part.cells for part in parts]),
         )
 
     def read_only(self) -> Particles:
-        """The same particles for those who look at them: the same memory, shut."""
-        return attrs.evolve(
-            self,
-            positions=shut(self.positions),
-            volumes=shut(self.volumes),
-            spacings=shut(self.spacings),
-            area_vectors=shut(self.area_vectors),
-            ghosts=shut(self.ghosts),
-            images=shut(self.images),
-            cells=shut(self.cells),
-        )
+        """The same particles for observers: read-only views of the same memory."""
+        views: dict[str, Any] = {name: locked(getattr(self, name)) for name in _ARRAYS}
+        return attrs.evolve(self, **views)
 
     def tagged(self, name: str) -> Indices:
         """Indices of the particles in the named set.
@@ -130,20 +117,20 @@ class Particles:
 
 
 def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    """Arrays one behind the other; reference data are never written, so one alone is shared."""
+    """The arrays in sequence; a single one is shared, since reference data are never changed."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 @attrs.frozen(eq=False)
 class State:
-    """All that evolves. An integrator takes one and returns the next; arrays are never shared."""
+    """All evolving data. An integrator takes a state and returns the next; they share no array."""
 
     time: float  # t [s]
     step: int  # completed steps
     positions: Array  # (n, d) current positions x [m]
     velocities: Array  # (n, d) v [m/s]
     accelerations: Array  # (n, d) a [m/s^2], belonging to these positions
-    memory: Mapping[str, Array] = attrs.field(factory=dict)  # what a part remembers, by its name
+    memory: Mapping[str, Array] = attrs.field(factory=dict)  # of parts with history, by name
     applied: Mapping[str, Array] = attrs.field(factory=dict)  # force of each account, (n, d) [N]
     work: Mapping[str, float] = attrs.field(factory=dict)  # work done by each account so far [J]
 
@@ -154,7 +141,7 @@ class State:
         applied: Mapping[str, Array],
         memory: Mapping[str, Array] | None = None,
     ) -> State:
-        """The first state of a run, all its energy accounts at zero."""
+        """The first state of a run, with all energy accounts at zero."""
         return attrs.evolve(
             self,
             accelerations=accelerations,
@@ -173,10 +160,10 @@ class State:
         applied: Mapping[str, Array],
         memory: Mapping[str, Array],
     ) -> State:
-        """The state one step on; the energy accounts are settled by the trapezoidal rule."""
+        """The state one step later; energy accounts follow by the trapezoidal rule."""
         path = positions - self.positions
-        # Not by `vdot`: from 10000 numbers on it wakes the threads of a linear algebra library,
-        # which costs more than the rest of a step, and several times that where cores are busy.
+        # Not by `vdot`: from 10000 numbers on it uses the threads of a linear algebra library,
+        # which costs more than the rest of a step, and several times that on busy cores.
         work = {
             name: self.work[name]
             + 0.5 * float(np.einsum("ij,ij->", self.applied[name] + force, path))
@@ -195,20 +182,20 @@ class State:
 
 
 def read_only(state: State) -> State:
-    """The same state for those who look at it: the same memory, which they cannot write to."""
+    """The same state for observers: read-only views of the same memory."""
     return attrs.evolve(
         state,
-        positions=shut(state.positions),
-        velocities=shut(state.velocities),
-        accelerations=shut(state.accelerations),
-        memory={name: shut(values) for name, values in state.memory.items()},
-        applied={name: shut(values) for name, values in state.applied.items()},
+        positions=locked(state.positions),
+        velocities=locked(state.velocities),
+        accelerations=locked(state.accelerations),
+        memory={name: locked(values) for name, values in state.memory.items()},
+        applied={name: locked(values) for name, values in state.applied.items()},
         work=dict(state.work),
     )
 
 
-def shut(values: NDArray[Any]) -> NDArray[Any]:
-    """A view that cannot be written to."""
+def locked(values: NDArray[Any]) -> NDArray[Any]:
+    """A read-only view."""
     view = values.view()
     view.flags.writeable = False
     return view

@@ -1,4 +1,4 @@
-"""Where: which particles a boundary, an effect or an initial value is meant for."""
+"""Regions: the particles to which a boundary, an effect or an initial value applies."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ Where: TypeAlias = str | Callable[[Array], Mask]
 AXES = ("X", "Y", "Z")
 
 EVERYWHERE = "all"
-"""The tag that every particle but the ghosts carries."""
+"""The tag of every particle except the ghosts."""
 
-# Tags that every body has, even if none of its particles carries them.
+# Tags of every body, even if no particle has them.
 _OF_EVERY_BODY = (EVERYWHERE, "surface", "interior", "ghosts")
 
 _HYPHENATED = re.compile(r"(?<![\w.])[A-Za-z]\w*(?:-\w+)+")
@@ -35,7 +35,7 @@ def select(particles: Particles, where: Where) -> Indices:
     """Indices of the particles at `where`, in rising order.
 
     Raises:
-        SceneError: no particle is there, or `where` cannot be understood.
+        SceneError: no particle matches, or `where` cannot be understood.
     """
     mask = holds(particles, where, lambda tag: _tagged(particles, tag))
     if not mask.any():
@@ -53,13 +53,13 @@ def holds(
 ) -> Mask:
     """Whether `where` holds at each of k places, (k,).
 
-    A place may be a particle, or a piece of the surface that a particle owns.
+    A place is a particle, or a piece of the surface that a particle owns.
 
     Args:
         particles: those of all bodies.
         where: the condition.
-        tagged: the places that carry a tag, (k,).
-        owners: the particle to which each place belongs, (k,); by default the particles themselves.
+        tagged: gives the places with a tag, (k,).
+        owners: the particle of each place, (k,); by default the particles themselves.
 
     Raises:
         SceneError: `where` cannot be understood.
@@ -77,10 +77,10 @@ def holds(
     if where == EVERYWHERE or where in particles.tags:
         return tagged(where)
     tags = _by_variable(_known(particles))
-    bodies = _by_variable(particles.bodies)
+    extents, bodies = particles.bodies, _by_variable(particles.bodies)
     text = as_formula(particles, where)
     values: dict[str, Array | Mask] = {
-        f"{body}.{tag}": _inside(particles, bodies[body])[owners] & tagged(tags[tag])
+        f"{body}.{tag}": _mask(particles, extents[bodies[body]])[owners] & tagged(tags[tag])
         for body, tag in _of_bodies(particles, where, text, bodies, tags)
     }
     if text not in tags and text not in values and not any(mark in where for mark in "<>=() "):
@@ -112,21 +112,21 @@ def _of_bodies(
     bodies: Mapping[str, str],
     tags: Mapping[str, str],
 ) -> list[tuple[str, str]]:
-    """Each body and tag of it that a formula names, as variables; what is no body is left out."""
+    """Bodies and their tags that a formula names, as variables; names of no body are skipped."""
     for body, tag in _LIKE_OF_A_BODY.findall(text):
         if body in bodies:
             _check_of_body(particles, where, bodies[body], tags.get(tag, tag))
     return [(body, tag) for body, tag in _OF_A_BODY.findall(text) if body in bodies]
 
 
-def _inside(particles: Particles, body: str) -> Mask:
+def _mask(particles: Particles, members: Indices | slice) -> Mask:
     mask = np.zeros(particles.count, dtype=np.bool_)
-    mask[particles.bodies[body]] = True
+    mask[members] = True
     return mask
 
 
 def names_used(particles: Particles, where: str) -> frozenset[str]:
-    """What a condition that can be read names: coordinates, tags, and tags of a body."""
+    """Names in a valid condition: coordinates, tags, and tags of a body."""
     text = as_formula(particles, where)
     dotted = {f"{body}.{tag}" for body, tag in _OF_A_BODY.findall(text)}
     tags = _by_variable(_known(particles))
@@ -134,17 +134,17 @@ def names_used(particles: Particles, where: str) -> frozenset[str]:
 
 
 def variable(name: str) -> str:
-    """How a condition writes the name of a tag or a body: with underscores for hyphens."""
+    """The name of a tag or a body in a condition: with underscores for hyphens."""
     return name.replace("-", "_")
 
 
 def as_formula(particles: Particles, where: str) -> str:
     """`where` with underscores for the hyphens in names of tags and bodies.
 
-    "plate-1 and X < 9" is about the tag plate-1 and no difference; in X-1, X is the coordinate.
+    In "plate-1 and X < 9", plate-1 is a tag and not a difference; in X-1, X is the coordinate.
 
     Raises:
-        SceneError: a word begins like a tag, and is none.
+        SceneError: a word begins like a tag, and is not one.
     """
 
     def renamed(found: re.Match[str]) -> str:
@@ -156,10 +156,10 @@ def as_formula(particles: Particles, where: str) -> str:
             if name in particles.tags or name in particles.bodies or name in particles.faces:
                 return "-".join([variable(name), *parts[count:]])
         if parts[0] in particles.tags:
-            raise _no_tag(particles, where, found.group())  # no difference of sets is meant
+            raise _no_tag(particles, where, found.group())  # sets have no difference
         return found.group()
 
-    # The part behind the dot of "two.edge-0" is looked at by itself.
+    # The part behind the dot of "two.edge-0" is treated by itself.
     return ".".join(_HYPHENATED.sub(renamed, part) for part in where.strip().split("."))
 
 
@@ -182,13 +182,11 @@ def _tagged(particles: Particles, tag: str) -> Mask:
         return ~particles.ghosts
     if tag in particles.tags:
         return particles.tags[tag]
-    mask = np.zeros(particles.count, dtype=np.bool_)
-    mask[particles.faces[tag].particles] = True
-    return mask
+    return _mask(particles, particles.faces[tag].particles)
 
 
 def _check_names(particles: Particles, where: str) -> None:
-    """Raise SceneError if what cannot be read is the name of no body, or of no tag."""
+    """Raise SceneError if a condition that cannot be read names an unknown body or tag."""
     for body, tag in _LIKE_OF_A_BODY.findall(where):
         _check_of_body(particles, where, body, tag)
     if not any(mark in where for mark in "<>=() "):
@@ -209,10 +207,10 @@ def _check_of_body(particles: Particles, where: str, body: str, tag: str) -> Non
         near = difflib.get_close_matches(body, particles.bodies, 1)
         hint = f"did you mean {near[0]!r}?" if near else f"bodies: {_some(particles.bodies)}"
         raise SceneError(f"where = {where!r}: there is no body {body!r}; {hint}")
-    own = list(_of_body(particles, body))
-    if tag not in own:
-        near = difflib.get_close_matches(tag, own, 1)
-        hint = f"did you mean '{body}.{near[0]}'?" if near else f"it has {_some(own)}"
+    tags = list(_of_body(particles, body))
+    if tag not in tags:
+        near = difflib.get_close_matches(tag, tags, 1)
+        hint = f"did you mean '{body}.{near[0]}'?" if near else f"it has {_some(tags)}"
         raise SceneError(f"where = {where!r}: body {body!r} has no {tag!r}; {hint}")
 
 

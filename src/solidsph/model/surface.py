@@ -1,8 +1,8 @@
-"""Which part of a body's surface is meant by a `where`.
+"""The part of a body's surface at a `where`.
 
-A particle at an edge owns some of each face that meets there. So a condition on a surface is asked
-of *pieces* and not of particles: what one particle owns of one face. The name of a face holds on
-the pieces of that face only; all else holds where it does for the particle that owns the piece.
+A particle at an edge owns some of each face that meets there. So a condition on a surface is
+evaluated for *pieces* and not for particles; a piece is what one particle owns of one face. The
+name of a face holds on the pieces of that face only, everything else where it holds for the owner.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from solidsph.model.particles import Face, Particles
 from solidsph.model.regions import EVERYWHERE, Where, holds
 
 Conditions: TypeAlias = Mapping[str, Sequence[tuple[slice, Where]]]
-"""What the tags that a scene adds say, by tag: the condition of each body that adds it."""
+"""Conditions of the tags that a scene adds, by tag: that of each body that adds it."""
 
 
 @attrs.frozen(eq=False, slots=False)
@@ -37,18 +37,18 @@ class Pieces:
 
     @classmethod
     def of(cls, particles: Particles, conditions: Conditions) -> Pieces:
-        """Those of the surface of `particles`, on which the scene's tags are asked anew."""
-        found = list(particles.faces.values())
-        counts = [face.particles.size for face in found]
+        """The pieces of the surface of `particles`; the scene's tags are evaluated for pieces."""
+        faces = list(particles.faces.values())
+        counts = [face.particles.size for face in faces]
         d = particles.dimension
         return cls(
             particles=particles,
             conditions=conditions,
-            owners=np.concatenate([np.zeros(0, np.intp), *(face.particles for face in found)]),
-            faces=np.repeat(np.arange(len(found)), counts),
+            owners=np.concatenate([np.zeros(0, np.intp), *(face.particles for face in faces)]),
+            faces=np.repeat(np.arange(len(faces)), counts),
             names=tuple(particles.faces),
-            area_vectors=np.concatenate([np.zeros((0, d)), *(face.area_vectors for face in found)]),
-            areas=np.concatenate([np.zeros(0), *(face.areas for face in found)]),
+            area_vectors=np.concatenate([np.zeros((0, d)), *(face.area_vectors for face in faces)]),
+            areas=np.concatenate([np.zeros(0), *(face.areas for face in faces)]),
         )
 
     def at(self, where: Where) -> Mask:
@@ -60,11 +60,11 @@ class Pieces:
         return holds(self.particles, where, self._tagged, self.owners)
 
     def unnamed(self, where: Where) -> Mask:
-        """Those at `where` whatever their face is called, (m,): they were met, and not named."""
+        """The pieces at `where` that match it without the names of faces too, (m,)."""
         return self.at(where) & holds(self.particles, where, self._tagged_faceless, self.owners)
 
     def owned(self, chosen: Mask) -> Face:
-        """What each particle owns of the chosen pieces (m,), in rising order of particles."""
+        """The chosen pieces (m,) as a face, with its particles in rising order."""
         particles, which = np.unique(self.owners[chosen], return_inverse=True)
         area_vectors = np.zeros((particles.size, self.area_vectors.shape[1]))
         np.add.at(area_vectors, which, self.area_vectors[chosen])

@@ -1,4 +1,4 @@
-"""From names and numbers, as scenes hold them, to parts, and back."""
+"""Parts from names and numbers, as scenes hold them, and back."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from solidsph.registry.parameters import as_number
 
 
 def construct(kind: str, wanted: object) -> Any:
-    """A part from its name, from a table with its `type` and parameters, or as it is.
+    """A part from its name or from a table with its `type` and parameters; a part is returned.
 
     Raises:
         SceneError: an unknown name, an unknown or missing parameter, or a bad value.
@@ -42,7 +42,7 @@ def construct(kind: str, wanted: object) -> Any:
     label = f"{registry.singular(kind)} {name!r}"
     fields = _fields(cls, label)
     wrong: list[str] = []
-    meant: set[str] = set()  # what a mistyped key was meant for is not missing too
+    meant: set[str] = set()  # a parameter whose name is mistyped is not reported as missing too
     for key in [key for key in parameters if key not in fields]:
         near = difflib.get_close_matches(key, fields, 1)
         meant.update(near)
@@ -61,7 +61,7 @@ def construct(kind: str, wanted: object) -> Any:
             nested = fields[key].metadata.get("part")
             if nested is not None:
                 parameters[key] = _nested(nested, value, fields[key].type, f"{label}: {key}")
-            elif wrong:  # the part cannot be made, but what it was given can be looked at
+            elif wrong:  # the part cannot be made, but its values can be checked
                 _check_value(fields[key], value)
         except SolidsphError as cause:
             wrong.append(str(cause))
@@ -80,7 +80,7 @@ def construct(kind: str, wanted: object) -> Any:
 
 
 def _check_value(field: attrs.Attribute[Any], value: object) -> None:
-    """What the field itself asks of a value; what the whole part asks must wait until it is made.
+    """Check a value by itself, without the checks of the whole part.
 
     Raises:
         SceneError: it is of the wrong type.
@@ -96,8 +96,8 @@ def describe(kind: str, part: object) -> dict[str, Any]:
     """The table that `construct` would turn into `part`.
 
     Raises:
-        SceneError: it holds something that a file cannot, such as a Python function, or its class
-            is registered under no name.
+        SceneError: it holds something that a file cannot hold, such as a Python function, or its
+            class is not registered.
     """
     entry = registry.entry_of(kind, part)
     if not entry.name:
@@ -119,27 +119,29 @@ def describe(kind: str, part: object) -> dict[str, Any]:
 
 def _fields(cls: type[Any], label: str) -> dict[str, attrs.Attribute[Any]]:
     if not attrs.has(cls):
-        raise PluginError(f"{label}: {cls.__qualname__} is not an attrs class; decorate it so")
+        raise PluginError(
+            f"{label}: {cls.__qualname__} is not an attrs class; decorate it with attrs.frozen"
+        )
     return {field.alias or field.name: field for field in attrs.fields(cls) if field.init}
 
 
 def _nested(kind: str, value: object, several: object, label: str) -> Any:
     if isinstance(value, (list, tuple)):
-        # Annotations are text here; a field of several parts is a tuple or a sequence of them.
+        # Annotations are text; a field of several parts is a tuple or a sequence of them.
         if not re.search(r"tuple|Sequence", str(several)):
             raise SceneError(f"{label} must be one {registry.singular(kind)}, got {value!r}")
-        return tuple(construct(kind, one) for one in value)
+        return tuple(construct(kind, item) for item in value)
     return construct(kind, value)
 
 
 def _described(kind: str, value: object) -> Any:
     if isinstance(value, (list, tuple)):
-        return [describe(kind, one) for one in value]
+        return [describe(kind, item) for item in value]
     return describe(kind, value)
 
 
 def _plain(value: Any, what: str) -> Any:
-    """Numbers, text, lists and tables as TOML knows them."""
+    """A value as TOML's numbers, text, lists and tables."""
     if isinstance(value, (bool, int, float, str)):
         return value
     if hasattr(value, "tolist"):

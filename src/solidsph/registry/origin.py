@@ -1,4 +1,4 @@
-"""Blame: which part an error that nobody foresaw came from, by name and distribution."""
+"""Origin of an error: the part whose code raised it, by name and distribution."""
 
 from __future__ import annotations
 
@@ -18,39 +18,45 @@ def described(entry: Entry) -> str:
 
 
 def is_foreign(entry: Entry) -> bool:
-    """Whether the part is none of our own, which tests hold to their promises."""
+    """True if the part is not built in, so that no test of solidsph checks it."""
     return entry.distribution != _BUILT_IN
 
 
-def culprit(cause: BaseException, entries: Iterable[Entry]) -> str:
-    """The part among `entries` whose code raised, as a message names it; nothing if none did."""
-    own = list(entries)
+def failing_part(cause: BaseException, entries: Iterable[Entry]) -> str:
+    """The part among `entries` whose code raised, as a message names it; "" if none did."""
+    parts = list(entries)
     for frame, _ in reversed(list(walk_tb(cause.__traceback__))):
-        near = [e for e in own if e.target.partition(":")[0] == frame.f_globals.get("__name__")]
+        near = [e for e in parts if e.target.partition(":")[0] == frame.f_globals.get("__name__")]
         if not near:
             continue
         place = frame.f_code.co_qualname
         exact = [e for e in near if place.startswith(e.target.partition(":")[2] + ".")]
         label = getattr(frame.f_locals.get("self"), "label", None)
-        if not exact and isinstance(label, str):  # a condition: of an effect or a boundary
+        if not exact and isinstance(label, str):  # a term: of an effect or a boundary
             exact = [e for e in near if e.kind in ("effects", "boundaries")]
-        elif not exact and "self" in frame.f_locals:  # something else of that module
+        elif not exact and "self" in frame.f_locals:  # another object of that module
             continue
-        found = described((exact or near)[0])
-        return f"{found}, label {label!r}" if isinstance(label, str) else found
+        part = described((exact or near)[0])
+        return f"{part}, label {label!r}" if isinstance(label, str) else part
     return ""
 
 
-def suspects(entries: Iterable[Entry]) -> str:
-    """Those among `entries` that no test of ours holds to its promises, as a message names them."""
+def foreign_parts(entries: Iterable[Entry]) -> str:
+    """The parts among `entries` that are not built in, as a message names them."""
     return " or ".join(described(entry) for entry in entries if is_foreign(entry))
 
 
-def told(cause: BaseException, entries: Iterable[Entry], otherwise: str) -> str:
-    """What failed and how, where a part is at fault; `otherwise` names it if no part's code did."""
-    own = list(entries)
-    who = culprit(cause, own) or suspects(own) or otherwise
+def failure(cause: BaseException, entries: Iterable[Entry], otherwise: str) -> str:
+    """A message about an unexpected error: which part failed, and how.
+
+    Args:
+        cause: the error.
+        entries: the parts in use.
+        otherwise: what to name if no part raised and none is foreign.
+    """
+    parts = list(entries)
+    who = failing_part(cause, parts) or foreign_parts(parts) or otherwise
     return (
-        f"{who} failed: {type(cause).__name__}: {cause}; this is a fault of that part, which "
-        "should explain what it was given (solidsph check tests it alone)"
+        f"{who} failed: {type(cause).__name__}: {cause}; this is an error in that part, which "
+        "should explain what is wrong with its input (solidsph check tests it alone)"
     )

@@ -12,7 +12,7 @@ from solidsph.errors import SceneError
 
 
 def as_number(value: Any, field: attrs.Attribute[Any]) -> float:
-    """`value` as a float; ValueError if it is no number."""
+    """`value` as a float; raises ValueError if it is not a number."""
     if isinstance(value, bool) or not isinstance(value, Real):
         raise ValueError(f"{field.name} must be a number, got {value!r}")
     try:
@@ -22,12 +22,12 @@ def as_number(value: Any, field: attrs.Attribute[Any]) -> float:
 
 
 def number(**options: Any) -> Any:
-    """An attrs field that holds a float, and takes no text and no true or false for one."""
+    """An attrs field that holds a float and refuses text, true and false."""
     return attrs.field(converter=attrs.Converter(as_number, takes_field=True), **options)
 
 
 def optional_number(**options: Any) -> Any:
-    """The same, or None, which is the default."""
+    """An attrs field that holds a float or None, the default."""
 
     def converted(value: Any, field: attrs.Attribute[Any]) -> float | None:
         return None if value is None else as_number(value, field)

@@ -1,4 +1,4 @@
-"""Problems: everything that is wrong with a scene, found before any of it is reported."""
+"""Problems of a scene, collected so that all are reported together."""
 
 from __future__ import annotations
 
@@ -8,25 +8,23 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import TypeVar
 
 from solidsph.errors import BuildError, PluginError, SolidsphError
-from solidsph.registry.origin import told
+from solidsph.registry.origin import failure
 from solidsph.registry.registry import Entry
 
 T = TypeVar("T")
 
-
 _MEMORY = "there is not enough memory for so many particles or pairs; use a larger spacing"
 
-
-# A scene of a thousand bodies can be wrong in one way a thousand times.
+# A scene of a thousand bodies can have the same problem a thousand times.
 MOST_OF_A_KIND = 10
 _MOST_CHARACTERS = 1500
 
-# What differs between problems of one kind: names and numbers.
+# Names and numbers, by which problems of one kind differ.
 _PARTICULAR = re.compile(r"'[^']*'|\"[^\"]*\"|[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
 
 def summarised(problems: Iterable[str]) -> list[str]:
-    """Each problem once and at a length that can be read; of a kind the first ten and a count."""
+    """Each problem once, shortened; of each kind the first ten and a count of the others."""
     seen: Counter[str] = Counter()
     shown: dict[str, str] = {}
     for problem in dict.fromkeys(problems):
@@ -44,7 +42,7 @@ def summarised(problems: Iterable[str]) -> list[str]:
 
 
 def listed(origin: str, problems: Sequence[str]) -> str:
-    """One message of several problems of what `origin` names."""
+    """One message of several problems of `origin`."""
     if len(problems) == 1:
         return f"{origin}: {problems[0]}"
     return "\n  - ".join([f"{origin}: {len(problems)} problems:", *problems])
@@ -58,23 +56,23 @@ def _shortened(problem: str) -> str:
 
 
 class Problems:
-    """Collects problems, each with its remedy, until it makes no sense to look further."""
+    """Problems found so far, each with its remedy."""
 
     def __init__(self, used: Collection[Entry] = ()) -> None:
         self._found: list[str] = []
-        self._used = used  # plugins that may be at fault; it may grow
+        self._used = used  # parts that may be the cause of an error; may grow
 
     @property
     def found(self) -> Sequence[str]:
-        """All that were noted so far; each once, and of many of one kind the first."""
+        """All problems so far, each once, and of many of one kind the first."""
         return summarised(self._found)
 
     def add(self, problems: Iterable[str]) -> None:
-        """Note some problems."""
+        """Add problems."""
         self._found += problems
 
     def attempt(self, make: Callable[..., T], *arguments: object) -> T | None:
-        """The value of `make(*arguments)`, or None with its problem noted."""
+        """The value of `make(*arguments)`, or None if it fails; its problem is added."""
         try:
             return make(*arguments)
         except BuildError as cause:
@@ -83,22 +81,22 @@ class Problems:
             self.add([str(cause)])
         except MemoryError:
             self.add([_MEMORY])
-        except Warning:  # where the user has asked for warnings to be errors
+        except Warning:  # if the user has turned warnings into errors
             raise
         except Exception as cause:  # a plugin's code may fail in any way
             owner = type(getattr(make, "__self__", make))
             otherwise = f"{owner.__module__}.{owner.__qualname__}"
-            raise PluginError(told(cause, self._used, otherwise)) from cause
+            raise PluginError(failure(cause, self._used, otherwise)) from cause
         return None
 
     def stop_if_any(self) -> None:
-        """Raise BuildError with all problems noted so far, if there are any."""
+        """Raise BuildError with all problems so far, if there are any."""
         if self._found:
             raise BuildError(self.found)
 
     def settled(self, value: T | None) -> T:
-        """A value that an attempt has made; raises BuildError with its problems if it has not."""
+        """The value of an attempt; raises BuildError with all problems if it failed."""
         if value is None:
             self.stop_if_any()
-            raise AssertionError("an attempt gave no value and noted no problem")
+            raise AssertionError("an attempt gave no value and added no problem")
         return value

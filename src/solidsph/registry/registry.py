@@ -21,8 +21,8 @@ from solidsph.errors import PluginError, SceneError
 
 PREFIX = "solidsph."
 
-# Kind of part -> (module, name) of the interface that its implementations keep. Named, not
-# imported, so that listing what is installed stays free.
+# Kind of part -> (module, name) of its interface. Named and not imported, so that listing installed
+# parts imports nothing.
 INTERFACES: Mapping[str, tuple[str, str]] = {
     "kernels": ("solidsph.interfaces.kernel", "Kernel"),
     "shapes": ("solidsph.interfaces.shape", "Shape"),
@@ -41,7 +41,7 @@ INTERFACES: Mapping[str, tuple[str, str]] = {
 HOOKS = "hooks"
 
 RESTRICT = "SOLIDSPH_PLUGINS"
-"""Environment variable: if set, only the distributions it lists (comma separated) are seen."""
+"""Environment variable: if set, only the distributions it lists (comma separated) are used."""
 
 
 @attrs.frozen(order=True)
@@ -61,7 +61,7 @@ def singular(kind: str) -> str:
 
 
 def available(kind: str) -> tuple[Entry, ...]:
-    """Every part of a kind that is installed, by name; imports none of them."""
+    """All installed parts of a kind, sorted by name; imports none of them."""
     return _entries(*_key(kind))
 
 
@@ -74,7 +74,7 @@ def find(kind: str, name: str) -> Entry:
     """The part of that kind and name.
 
     Raises:
-        SceneError: there is none; the message has the nearest match.
+        SceneError: there is none; the message suggests the nearest match.
         PluginError: two distributions claim the name.
     """
     claims = sorted({entry for entry in available(kind) if entry.name == name})
@@ -98,7 +98,7 @@ def load(kind: str, name: str) -> type[Any]:
 
     Raises:
         SceneError: there is no such part.
-        PluginError: it cannot be imported, or is not of its kind; with target and distribution.
+        PluginError: it cannot be imported, or does not implement its interface.
     """
     entry = find(kind, name)
     where = f"{singular(kind)} {name!r} ({entry.target}, from {entry.distribution} {entry.version})"
@@ -132,7 +132,7 @@ def interface(kind: str) -> type[Any]:
 
 
 def entry_of(kind: str, part: object) -> Entry:
-    """The registry's entry for an object, or one that says where its class comes from."""
+    """The registry's entry for an object, or a nameless one with its class as target."""
     cls = type(part)
     target = f"{cls.__module__}:{cls.__qualname__}"
     for entry in available(kind):
@@ -151,7 +151,7 @@ def _points(kind: str) -> tuple[EntryPoint, ...]:
 
 
 def _key(kind: str) -> tuple[Any, ...]:
-    """All that what is installed depends on: a scan of it takes milliseconds, a scene many."""
+    """Key of a scan for parts, which is cached: it takes milliseconds, and a scene needs many."""
     places = tuple((place, _modified(place)) for place in sys.path)
     return entry_points, kind, os.environ.get(RESTRICT), places
 
@@ -192,6 +192,6 @@ def _entry(kind: str, point: EntryPoint) -> Entry:
 
 @lru_cache(maxsize=32)
 def _named(distribution: Distribution) -> tuple[str, str]:
-    """Name and version, for which the file of its metadata is parsed, the README in it too."""
+    """Name and version, cached since the whole metadata file, README included, is parsed."""
     metadata = distribution.metadata
     return metadata["Name"], metadata["Version"]

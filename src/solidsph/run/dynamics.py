@@ -19,7 +19,7 @@ from solidsph.interfaces.terms import (
     Observation,
 )
 from solidsph.maths.arrays import Array, Mask
-from solidsph.model.particles import Particles, State, shut
+from solidsph.model.particles import Particles, State, locked
 
 
 @final
@@ -40,7 +40,7 @@ class Dynamics(EquationOfMotion):
 
     @shown_masses.default
     def _masses_to_look_at(self) -> Array:
-        return shut(self.masses)
+        return locked(self.masses)
 
     @held.default
     def _held_by_each(self) -> Sequence[Mask]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from solidsph.errors import PluginError, SolidsphError, UnsoundError
 from solidsph.interfaces.time_loop import StepError, TimeLoop
-from solidsph.registry.origin import culprit
+from solidsph.registry.origin import failing_part
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.hooks import heard_by
 from solidsph.run.outcome import Result
@@ -86,7 +86,7 @@ def run_motion(
     except (SolidsphError, OSError, MemoryError, Warning):
         raise
     except Exception as cause:
-        who = culprit(cause, simulation.parts) or heard_by(cause, simulation.manager)
+        who = failing_part(cause, simulation.parts) or heard_by(cause, simulation.manager)
         if not who:
             raise
         raise PluginError(

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 from scipy.optimize import minimize
 
+from solidsph.conformance.ellipticity import acoustic_tensors, least_stiffness
 from solidsph.errors import SceneError
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import components_first, particles_first
-from solidsph.promises.ellipticity import acoustic_tensors, least_stiffness
 from solidsph.simulation import Simulation
 from solidsph.studies.dispersion import LatticeResponse, check_uniform, lattice_response
 from solidsph.studies.scheme import Scheme, deformation, stretched

@@ -1,10 +1,10 @@
-"""Conformance kits: what every part of a kind must keep, for plugin authors and `solidsph check`.
+"""Conformance kits: checks of every kind of part, for plugin authors and `solidsph check`.
 
-`solidsph.testing.strategies` is imported by itself: it needs Hypothesis, nothing here does.
+`solidsph.testing.strategies` is a separate import: it needs Hypothesis, which nothing here does.
 """
 
-from solidsph.promises.check import Check, CheckResult
-from solidsph.promises.kernel import MASS_TOLERANCE, smoothed_mass
+from solidsph.conformance.check import Check, CheckResult
+from solidsph.conformance.kernel import MASS_TOLERANCE, smoothed_mass
 from solidsph.testing.examples import example_part
 from solidsph.testing.kits import checks, conformance, kits
 

@@ -8,14 +8,14 @@ from typing import final
 import attrs
 import numpy as np
 
+from solidsph.conformance.check import Broken, Kit, Verdict, at_most, worst
+from solidsph.conformance.samples import kept_for_last
 from solidsph.engines.matrix import MatrixEngine
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import Engine, InternalForces
 from solidsph.interfaces.plan import BodySize
 from solidsph.interfaces.terms import Observation, StressTerm
 from solidsph.maths.arrays import Array
-from solidsph.promises.check import Check, Verdict, at_most, check, worst
-from solidsph.promises.samples import made_once, seeded
 from solidsph.simulation import Simulation
 
 _SPACING = 0.1  # [m]
@@ -30,6 +30,8 @@ _FORMS = (
     (2, {"type": "updated-lagrangian"}),
     (3, {"type": "total-lagrangian"}),
 )
+
+KIT = Kit()
 
 
 @attrs.frozen(eq=False)
@@ -49,12 +51,12 @@ class _Sample:
     def agree(self, own: Array, reference: Array) -> Verdict:
         """Whether both are the same but for rounding."""
         if np.shape(own) != np.shape(reference):
-            return Verdict(False, f"shape {np.shape(own)}, {np.shape(reference)} is expected")
+            raise Broken(f"shape {np.shape(own)}, {np.shape(reference)} is expected")
         error = float(np.abs(own - reference).max() / np.abs(reference).max())
         return at_most(error, _ROUNDING * self.own.precision)
 
 
-@made_once
+@kept_for_last
 def _samples(engine: Engine) -> list[_Sample]:
     return list(_prepared(engine))
 
@@ -77,11 +79,13 @@ def _prepared(engine: Engine) -> Iterator[_Sample]:
             simulation=simulation,
             own=engine.prepare(bodies, ()),
             reference=simulation.dynamics.internal,
-            displacements=0.02 * _SPACING * seeded().normal(size=(simulation.particles.count, d)),
+            displacements=0.02
+            * _SPACING
+            * np.random.default_rng(0).normal(size=(simulation.particles.count, d)),
         )
 
 
-@check
+@KIT.check
 def forces(engine: Engine) -> Verdict:
     """Forces are those of sparse matrices, to the rounding of the engine's own precision."""
     return worst(
@@ -94,7 +98,7 @@ def forces(engine: Engine) -> Verdict:
     )
 
 
-@check
+@KIT.check
 def fields(engine: Engine) -> Verdict:
     """Deformation gradients, stresses and energies are those of sparse matrices."""
     names = ("deformation_gradients", "stresses", "energy_densities")
@@ -110,20 +114,20 @@ def fields(engine: Engine) -> Verdict:
     )
 
 
-@check
+@KIT.check
 def passes(engine: Engine) -> Verdict:
     """The gradient of a displacement, and the forces of a stress, are those of sparse matrices."""
     verdicts = []
     for one in _samples(engine):
         u, (n, d) = one.displacements, one.displacements.shape
         verdicts.append(one.agree(one.own.gradients(u), one.reference.gradients(u)))
-        stress = seeded().normal(size=(d, d, n))
+        stress = np.random.default_rng(0).normal(size=(d, d, n))
         own, reference = (each.spread(u, stress.copy()) for each in (one.own, one.reference))
         verdicts.append(one.agree(own, reference))
     return worst(verdicts)
 
 
-@check
+@KIT.check
 def stress_terms(engine: Engine) -> Verdict:
     """A stress term changes the stress between the law and the forces."""
     verdicts = []
@@ -136,7 +140,7 @@ def stress_terms(engine: Engine) -> Verdict:
     return worst(verdicts)
 
 
-@check
+@KIT.check
 def plan(engine: Engine) -> Verdict:
     """What it plans has counts from 0 on, also for bodies that are not built."""
     for one in _samples(engine):
@@ -147,13 +151,10 @@ def plan(engine: Engine) -> Verdict:
         for operations in (*planned.engine, *expected.engine):
             counts = (operations.pairs, operations.particles, operations.touched, operations.held)
             if min(counts) < 0:
-                return Verdict(False, f"{operations}")
+                raise Broken(f"{operations}")
         if one.own.pair_count < 1 or not any(o.pairs for o in expected.engine):
-            return Verdict(False, "no pairs")
+            raise Broken("no pairs")
     return Verdict(True, "as required")
-
-
-CHECKS: tuple[Check, ...] = (forces, fields, passes, stress_terms, plan)
 
 
 @final

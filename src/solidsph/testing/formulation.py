@@ -1,42 +1,44 @@
-"""What every formulation must keep, with its gradient and divergence, in 1, 2 and 3D.
+"""Checks of a formulation, with its gradient and divergence, in 1, 2 and 3D.
 
-What a formulation promises follows from what its parts declare: a gradient exact for linear
-fields sees rigid motions, a divergence that conserves momentum balances the forces of a free body.
+The promises of a formulation follow from what its parts declare: a gradient exact for linear
+fields represents rigid motions, a divergence that conserves momentum balances the forces of a free
+body.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
 
 import attrs
 import numpy as np
 
-from solidsph.interfaces.body import Body
-from solidsph.interfaces.engine import InternalForces, StressFields
-from solidsph.interfaces.formulation import Configuration, Formulation
-from solidsph.maths.arrays import Array
-from solidsph.promises.check import Check, Verdict, at_most, check, not_promised
-from solidsph.promises.samples import (
+from solidsph.conformance.check import Kit, NotPromised
+from solidsph.conformance.samples import (
     ANGLES,
     central_difference,
     random_deformation_gradients,
     rotation,
     seeded,
+    stiffness,
 )
+from solidsph.interfaces.body import Body
+from solidsph.interfaces.engine import InternalForces
+from solidsph.interfaces.formulation import Configuration, Formulation
+from solidsph.maths.arrays import Array
 from solidsph.simulation import Simulation
+from solidsph.testing.bodies import SPACING, box, scene, smooth
 
 _CELLS = {1: (12,), 2: (7, 6), 3: (5, 4, 4)}
-_SPACING = 0.1  # [m]
 _COVER = 3.5  # a particle in a corner has neighbours enough for second derivatives
-_MATERIAL = {"youngs_modulus": 1e6, "poissons_ratio": 0.3, "density": 1000.0}
 
 # Sums of some hundred terms, and small linear systems in the gradient, lose three digits of 1e-16.
 _ROUNDING = 1e-12
 
 # Of sums that cancel pair by pair, relative to their terms, only 1e-16 remains, a hundredfold.
 _CANCELLATION = 1e-14
+
+KIT = Kit()
 
 
 @attrs.frozen(eq=False)
@@ -62,208 +64,144 @@ class _Sample:
     def internal(self) -> InternalForces:
         return self.simulation.dynamics.internal
 
-    @property
-    def stiffness(self) -> float:
-        """lambda + 2 mu, the scale of stresses [Pa]."""
-        lam, mu = self.body.material.lame_parameters
-        return lam + 2.0 * mu
-
-    @property
-    def force(self) -> float:
-        """The scale of forces: that stress on a face of a particle [N]."""
-        return self.stiffness * _SPACING ** (self.dimension - 1)
-
     def smooth(self) -> Array:
-        """A displacement (n, d) of one wave or so, with random directions and phases [m]."""
-        d = self.dimension
-        length = max(_CELLS[d]) * _SPACING
-        waves, phases = self.rng.normal(size=(d, d)), self.rng.uniform(0.0, 2.0 * np.pi, d)
+        """A smooth displacement (n, d) [m]."""
         # Strains of up to about 0.2: large, and far from turning inside out.
-        return np.asarray(0.05 * length * np.sin(self.positions @ waves * 3.0 / length + phases))
+        return smooth(self.rng, self.positions, max(_CELLS[self.dimension]) * SPACING, 0.05)
+
+    def error(self, displacements: Array, F: Array) -> float:
+        """Largest difference from F, or force in units of the stiffness on a particle's face."""
+        fields = self.internal.fields(displacements)
+        forces = self.internal.forces(0.0, displacements)
+        scale = stiffness(self.body.material) * SPACING ** (self.dimension - 1)
+        return max(
+            float(np.abs(fields.deformation_gradients - F).max()),
+            float(np.abs(forces).max()) / scale,
+        )
+
+    def strain_energy(self, displacements: Array) -> Array:
+        densities = self.internal.fields(displacements).energy_densities
+        return np.asarray(densities @ self.body.particles.volumes)
 
 
 def _samples(formulation: Formulation) -> Iterator[_Sample]:
     for d, rng in seeded():
-        shape: dict[str, Any] = {
-            "type": "box",
-            "lengths": [_SPACING * count for count in _CELLS[d]],
-        }
-        simulation = (
-            Simulation.builder()
-            .body(
-                "body",
-                shape=shape,
-                spacing=_SPACING,
-                discretisation={"type": "jittered-lattice", "amplitude": 0.2, "seed": d},
-            )
-            .kernel("modified-mollifier", cover=_COVER)
-            .material("neo-hookean", **_MATERIAL)
-            .formulation(formulation)
-            .duration(1.0)
-            .build()
+        scattered = {"type": "jittered-lattice", "amplitude": 0.2, "seed": d}
+        builder = scene(_COVER).body(
+            "body", shape=box(_CELLS[d]), spacing=SPACING, discretisation=scattered
         )
-        yield _Sample(simulation, rng)
+        yield _Sample(builder.formulation(formulation).duration(1.0).build(), rng)
 
 
-@check
-def rest(formulation: Formulation) -> Verdict:
+@KIT.errors(_ROUNDING)
+def rest(formulation: Formulation) -> Iterator[float]:
     """An undeformed body has F = I and no force."""
-    errors = []
     for sample in _samples(formulation):
-        u = np.zeros_like(sample.positions)
-        errors.append(_largest(sample, u, np.eye(sample.dimension)))
-    return at_most(max(errors), _ROUNDING)
+        yield sample.error(np.zeros_like(sample.positions), np.eye(sample.dimension))
 
 
-@check
-def translation(formulation: Formulation) -> Verdict:
-    """A body moved as a whole has F = I and no force, if the gradient of a constant is zero."""
-    if formulation.gradient.exact_degree < 0:
-        return _not_exact(formulation)
-    errors = []
+@KIT.errors(_ROUNDING)
+def translation(formulation: Formulation) -> Iterator[float]:
+    """A translated body has F = I and no force, if the gradient of a constant is zero."""
+    _needs_exact(formulation, 0)
     for sample in _samples(formulation):
-        u = np.ones_like(sample.positions) * 0.3
-        errors.append(_largest(sample, u, np.eye(sample.dimension)))
-    return at_most(max(errors), _ROUNDING)
+        yield sample.error(np.ones_like(sample.positions) * 0.3, np.eye(sample.dimension))
 
 
-@check
-def rigid_motion(formulation: Formulation) -> Verdict:
-    """A body turned and moved has F = R, no stress and no force, if linear gradients are exact."""
-    if formulation.gradient.exact_degree < 1:
-        return _not_exact(formulation)
-    errors = []
+@KIT.errors(_ROUNDING)
+def rigid_motion(formulation: Formulation) -> Iterator[float]:
+    """A body rotated and translated has F = R, no stress and no force, if linear gradients are
+    exact."""
+    _needs_exact(formulation, 1)
     for sample in _samples(formulation):
         d = sample.dimension
         R = rotation(d, [1.0, 0.7, -0.4][: ANGLES[d]])
         u = sample.positions @ (R - np.eye(d)).T + 0.3
-        errors.append(_largest(sample, u, R))
-        fields = sample.internal.fields(u)
-        errors.append(float(np.abs(fields.stresses).max()) / sample.stiffness)
-    return at_most(max(errors), _ROUNDING)
+        yield sample.error(u, R)
+        stresses = sample.internal.fields(u).stresses
+        yield float(np.abs(stresses).max()) / stiffness(sample.body.material)
 
 
-@check
-def linear_patch(formulation: Formulation) -> Verdict:
+@KIT.errors(_ROUNDING)
+def linear_patch(formulation: Formulation) -> Iterator[float]:
     """A uniform F is found at every particle, free surfaces included, if linear gradients are
     exact."""
-    if formulation.gradient.exact_degree < 1:
-        return _not_exact(formulation)
-    errors = []
+    _needs_exact(formulation, 1)
     for sample in _samples(formulation):
         d = sample.dimension
         F = random_deformation_gradients(sample.rng, d, 1)[:, :, 0]
         fields = sample.internal.fields(sample.positions @ (F - np.eye(d)).T)
-        errors.append(float(np.abs(fields.deformation_gradients - F).max()))
-    return at_most(max(errors), _ROUNDING)
+        yield float(np.abs(fields.deformation_gradients - F).max())
 
 
-@check
-def linear_momentum(formulation: Formulation) -> Verdict:
+@KIT.errors(_CANCELLATION)
+def linear_momentum(formulation: Formulation) -> Iterator[float]:
     """The forces of a free body add up to zero, if the divergence conserves momentum."""
-    if not formulation.divergence.conserves_momentum:
-        return _not_conserving(formulation)
-    if formulation.gradient.exact_degree < 0:
-        return _not_exact(formulation)
-    errors = []
+    _needs_conservation(formulation)
+    _needs_exact(formulation, 0)
     for sample in _samples(formulation):
         f = sample.internal.forces(0.0, sample.smooth())
-        errors.append(float(np.abs(f.sum(axis=0)).max() / np.abs(f).sum()))
-    return at_most(max(errors), _CANCELLATION)
+        yield float(np.abs(f.sum(axis=0)).max() / np.abs(f).sum())
 
 
-@check
-def angular_momentum(formulation: Formulation) -> Verdict:
+@KIT.errors(_CANCELLATION)
+def angular_momentum(formulation: Formulation) -> Iterator[float]:
     """The moments of these forces add up to zero, if linear gradients are exact as well."""
     # The moments are the skew part of the sum of V_q T_q (sum over p of x_p g_qp)^T. Linear
     # exactness makes the inner sum F_q in the reference configuration, where T = P, and I in the
     # current one, where T is the Cauchy stress: both products are symmetric.
-    if not formulation.divergence.conserves_momentum:
-        return _not_conserving(formulation)
-    if formulation.gradient.exact_degree < 1:
-        return _not_exact(formulation)
-    errors = []
+    _needs_conservation(formulation)
+    _needs_exact(formulation, 1)
     for sample in _samples(formulation):
         u = sample.smooth()
         x, f = sample.positions + u, sample.internal.forces(0.0, u)
         moments = x.T @ f
         scale = (np.abs(x).T @ np.abs(f)).max()
-        errors.append(float(np.abs(moments - moments.T).max() / scale))
-    return at_most(max(errors), _CANCELLATION)
+        yield float(np.abs(moments - moments.T).max() / scale)
 
 
-@check
-def adjoint(formulation: Formulation) -> Verdict:
+# A product or two, whatever their order.
+@KIT.errors(1e-15)
+def adjoint(formulation: Formulation) -> Iterator[float]:
     """The divergence's weights are -V_q g_qp, if it declares itself the adjoint."""
-    if not formulation.divergence.adjoint:
-        return _not_adjoint(formulation)
-    errors = []
+    _needs_adjoint(formulation)
     for sample in _samples(formulation):
         pairs, volumes = sample.body.pairs(), sample.body.particles.volumes
         slopes = sample.body.smoothing.gradient(pairs.offsets, pairs.distances)
         g = formulation.gradient.weights(pairs, slopes, volumes)
         expected = -volumes[pairs.columns, None] * g[pairs.reversed_order()]
-        found = formulation.divergence.weights(pairs, g, volumes)
-        errors.append(float(np.abs(found - expected).max() / np.abs(expected).max()))
-    # A product or two, whatever their order.
-    return at_most(max(errors), 1e-15)
+        weights = formulation.divergence.weights(pairs, g, volumes)
+        yield float(np.abs(weights - expected).max() / np.abs(expected).max())
 
 
-@check
-def energy_gradient(formulation: Formulation) -> Verdict:
+# The energy's rounding, 1e-16, over the step, 1e-3 spacings, a hundredfold.
+@KIT.errors(1e-11)
+def energy_gradient(formulation: Formulation) -> Iterator[float]:
     """Forces are minus the derivative of the strain energy, in the reference configuration with an
     adjoint divergence."""
     if formulation.configuration is not Configuration.REFERENCE:
-        return not_promised("the volumes and weights move with the particles")
-    if not formulation.divergence.adjoint:
-        return _not_adjoint(formulation)
-    errors = []
+        raise NotPromised("the volumes and weights move with the particles")
+    _needs_adjoint(formulation)
     for sample in _samples(formulation):
         u = sample.smooth()
-        du = sample.rng.normal(size=u.shape) * _SPACING
-        power = -float(np.vdot(sample.internal.forces(0.0, u), du))
-        found = central_difference(partial(_strain_energy, sample), u, du, 1e-3)
-        scale = float(np.abs(sample.internal.forces(0.0, u) * du).sum())
-        errors.append(abs(float(found) - power) / scale)
-    # The energy's rounding, 1e-16, over the step, 1e-3 spacings, a hundredfold.
-    return at_most(max(errors), 1e-11)
+        du = sample.rng.normal(size=u.shape) * SPACING
+        f = sample.internal.forces(0.0, u)
+        change = central_difference(partial(_Sample.strain_energy, sample), u, du, 1e-3)
+        yield abs(float(change) + float(np.vdot(f, du))) / float(np.abs(f * du).sum())
 
 
-CHECKS: tuple[Check, ...] = (
-    rest,
-    translation,
-    rigid_motion,
-    linear_patch,
-    linear_momentum,
-    angular_momentum,
-    adjoint,
-    energy_gradient,
-)
-
-
-def _largest(sample: _Sample, displacements: Array, F: Array) -> float:
-    """How far from F and from no force, each on its own scale."""
-    fields: StressFields = sample.internal.fields(displacements)
-    forces = sample.internal.forces(0.0, displacements)
-    return max(
-        float(np.abs(fields.deformation_gradients - F).max()),
-        float(np.abs(forces).max()) / sample.force,
-    )
-
-
-def _strain_energy(sample: _Sample, displacements: Array) -> Array:
-    densities = sample.internal.fields(displacements).energy_densities
-    return np.asarray(densities @ sample.body.particles.volumes)
-
-
-def _not_exact(formulation: Formulation) -> Verdict:
+def _needs_exact(formulation: Formulation, degree: int) -> None:
     gradient = formulation.gradient
-    return not_promised(f"{type(gradient).__name__} declares exact_degree {gradient.exact_degree}")
+    if gradient.exact_degree < degree:
+        name = type(gradient).__name__
+        raise NotPromised(f"{name} declares exact_degree {gradient.exact_degree}")
 
 
-def _not_conserving(formulation: Formulation) -> Verdict:
-    return not_promised(f"{type(formulation.divergence).__name__} does not conserve momentum")
+def _needs_conservation(formulation: Formulation) -> None:
+    if not formulation.divergence.conserves_momentum:
+        raise NotPromised(f"{type(formulation.divergence).__name__} does not conserve momentum")
 
 
-def _not_adjoint(formulation: Formulation) -> Verdict:
-    return not_promised(f"{type(formulation.divergence).__name__} is not the adjoint")
+def _needs_adjoint(formulation: Formulation) -> None:
+    if not formulation.divergence.adjoint:
+        raise NotPromised(f"{type(formulation.divergence).__name__} is not the adjoint")

@@ -1,20 +1,21 @@
-"""Which kinds of part have a kit, and how to run one."""
+"""The kits of all kinds of part, and how to run one."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
+from solidsph.conformance.check import Check, CheckResult
+from solidsph.conformance.kits import KITS
 from solidsph.errors import SceneError
-from solidsph.promises.check import Check, CheckResult
-from solidsph.promises.kits import KITS
 from solidsph.registry.construct import construct
-from solidsph.testing import boundary, effect, formulation
+from solidsph.testing import boundary, effect, engine, formulation
 
-_KITS: Mapping[str, tuple[Check, ...]] = {
+_KITS: Mapping[str, Sequence[Check]] = {
     **KITS,
-    "boundaries": boundary.CHECKS,
-    "formulations": formulation.CHECKS,
-    "effects": effect.CHECKS,
+    "boundaries": boundary.KIT.checks,
+    "formulations": formulation.KIT.checks,
+    "engines": engine.KIT.checks,
+    "effects": effect.KIT.checks,
 }
 
 
@@ -31,7 +32,7 @@ def checks(kind: str) -> tuple[Check, ...]:
     """
     if kind not in _KITS:
         raise SceneError(f"there is no conformance kit for {kind!r}; kits: {', '.join(_KITS)}")
-    return _KITS[kind]
+    return tuple(_KITS[kind])
 
 
 def conformance(kind: str, part: object) -> list[CheckResult]:
@@ -41,4 +42,4 @@ def conformance(kind: str, part: object) -> list[CheckResult]:
         SceneError: there is no kit for that kind, or `part` is not of it.
     """
     made = construct(kind, part)
-    return [one(made) for one in checks(kind)]
+    return [check(made) for check in checks(kind)]

@@ -1,4 +1,4 @@
-"""Hypothesis strategies for the numbers that parts are given.
+"""Hypothesis strategies for the input of parts.
 
 They need Hypothesis, which `pip install "solidsph[testing]"` brings.
 
@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
+from solidsph.conformance.samples import ANGLES, DIMENSIONS, deformation_gradient, rotation
 from solidsph.maths.arrays import Array
-from solidsph.promises.samples import ANGLES, DIMENSIONS, deformation_gradient, rotation
 
 
 def dimensions() -> st.SearchStrategy[int]:
@@ -43,8 +43,8 @@ def deformation_gradients(
 
     Args:
         volume_ratios: least and largest J = det F [-], with 1 between them.
-        distortion: largest ratio of a principal stretch to J^(1/d), but for one of them, which is
-            what J demands [-].
+        distortion: largest ratio of a principal stretch to J^(1/d), except for the last stretch,
+            which follows from J [-].
     """
     rounding = 1e-12  # keeps a product of rounded stretches within the bounds
     least, largest = volume_ratios

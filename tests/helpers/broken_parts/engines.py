@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 
@@ -13,16 +13,6 @@ from solidsph.interfaces.engine import Engine, InternalForces, StressFields
 from solidsph.interfaces.plan import BodySize, Operations, Plan, Way
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array
-
-
-@attrs.frozen
-class GoodEngine(Engine):
-    """The reference under another name."""
-
-    def prepare(
-        self, bodies: Sequence[Body], conditions: Sequence[StressTerm], evaluations: int = 1
-    ) -> InternalForces:
-        return MatrixEngine().prepare(bodies, conditions, evaluations)
 
 
 @attrs.frozen(eq=False)
@@ -68,13 +58,31 @@ class SpreadBackwards(Wrapped):
 
 
 @attrs.frozen
-class WrappingEngine(Engine):
-    kind: Any = Wrapped
+class GoodEngine(Engine):
+    """The reference under another name."""
+
+    kind: ClassVar[Any] = Wrapped
 
     def prepare(
         self, bodies: Sequence[Body], conditions: Sequence[StressTerm], evaluations: int = 1
     ) -> InternalForces:
         return self.kind(MatrixEngine().prepare(bodies, conditions, evaluations))
+
+
+class Weakens(GoodEngine):
+    kind: ClassVar[Any] = WeakForces
+
+
+class LosesEnergy(GoodEngine):
+    kind: ClassVar[Any] = HalfTheEnergy
+
+
+class Transposes(GoodEngine):
+    kind: ClassVar[Any] = TransposedGradients
+
+
+class Reverses(GoodEngine):
+    kind: ClassVar[Any] = SpreadBackwards
 
 
 class DeafToStressTerms(GoodEngine):
@@ -89,4 +97,11 @@ class PlansLessThanNothing(GoodEngine):
         return Plan(False, (Operations(Way.UNKNOWN, -1, 0, 0, 0),))
 
 
-GOOD = [GoodEngine(), WrappingEngine()]
+ENGINES = [
+    (Weakens, {"forces"}),
+    (LosesEnergy, {"fields"}),
+    (Transposes, {"passes"}),
+    (Reverses, {"passes"}),
+    (DeafToStressTerms, {"stress terms"}),
+    (PlansLessThanNothing, {"plan"}),
+]

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from solidsph.conformance.kernel import MASS_TOLERANCE, smoothed_mass
 from solidsph.interfaces.smoothing_kernel import smoothing_kernel
-from solidsph.promises.kernel import MASS_TOLERANCE, smoothed_mass
 from solidsph.registry import registry
 from solidsph.testing import Check, checks, example_part
 from solidsph.testing.strategies import dimensions, support_radii

@@ -224,7 +224,7 @@ def test_a_run_without_history_has_no_column_and_no_memory_of_it(tmp_path: Path)
 @pytest.mark.parametrize(
     ("prony", "said"),
     [
-        ([], "give one element at least"),
+        ([], "give at least one element"),
         ([{"share": 0.6, "time": 1.0}, {"share": 0.5, "time": 2.0}], "keep them below 1"),
         ([{"share": 0.6}], "got the element"),
         ([{"share": -0.1, "time": 1.0}], "both are numbers above 0"),

@@ -1,9 +1,9 @@
-"""Whether a stretched material still carries waves in every direction.
+"""Loss of ellipticity: whether a stretched material still carries waves in every direction.
 
 A small plane wave a f(N . X - c t) about a uniform deformation F obeys rho_0 c^2 a = A(N) a with
-the acoustic tensor A(N) a = (dP/dF : a (x) N) N. Where an eigenvalue of A is negative for some
-direction N, ellipticity is lost: the deformation localises, and the finer it is resolved the
-faster. This belongs to the material; no discretisation may hide it.
+the acoustic tensor A(N) a = (dP/dF : a (x) N) N. If an eigenvalue of A is negative for some
+direction N, ellipticity is lost: the deformation localises, the faster the finer it is resolved.
+This is a property of the material; no discretisation may hide it.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from solidsph.interfaces.material import Material
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import components_first, particles_first
 
-# Directions are looked for on a grid of angles, then on finer ones in the plane across the best,
-# which know no pole: the eigenvalue is off by the square of the last grid's spacing, 8e-6.
+# Directions are searched on a grid of angles, then on finer grids in the plane normal to the best,
+# which have no pole: the error of the eigenvalue is the square of the last grid's spacing, 8e-6.
 _POINTS = 41
 _FINER = 0.1  # two spacings of the grid before
 _GRIDS = 5
@@ -77,11 +77,13 @@ def losses_of_ellipticity(
     *,
     samples: int = 100,
 ) -> list[float]:
-    """Where along `path` the least stiffness changes its sign, rising.
+    """Parameters at which the least stiffness changes its sign along `path`, in rising order.
 
     Args:
         path: F (d, d) at a value of the path's parameter, such as a stretch.
-        samples: values looked at; two changes between neighbouring ones go unseen.
+        start: first parameter.
+        end: last parameter.
+        samples: number of values tried; two changes between adjacent values are missed.
 
     Raises:
         SolidsphError: the material is not elliptic at the start.
@@ -108,14 +110,14 @@ def _grid(dimension: int, width: float) -> Array:
 
 
 def _around(direction: Array, offsets: Array) -> Array:
-    """Unit vectors (m, d) by offsets (m, d - 1) in the plane across a direction."""
+    """Unit vectors (m, d) by offsets (m, d - 1) in the plane normal to a direction."""
     _, _, basis = np.linalg.svd(direction[None, :])
-    found = direction + offsets @ basis[1:]
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+    vectors = direction + offsets @ basis[1:]
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
 def _directions(angles: Array) -> Array:
-    """Unit vectors (m, d) from d - 1 angles each: none, the polar one, both of a sphere."""
+    """Unit vectors (m, d) from d - 1 angles each: none, the polar angle, or both of a sphere."""
     if angles.shape[1] == 0:
         return np.ones((len(angles), 1))
     if angles.shape[1] == 1:

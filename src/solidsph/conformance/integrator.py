@@ -1,21 +1,22 @@
-"""What every integrator must keep, on one mass and one spring."""
+"""Checks of an integrator, on one mass and one spring."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from math import atan2, cos, exp, hypot, log, sin, sqrt
 from typing import final
 
 import attrs
 import numpy as np
 
+from solidsph.conformance.check import Broken, Kit, Verdict, at_most, more_than
+from solidsph.conformance.derived import overridden
 from solidsph.interfaces.engine import InternalForces, StressFields
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.terms import Constraint, Load, Observation
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.particles import Particles, State
-from solidsph.promises.check import Check, Verdict, at_most, check, more_than
-from solidsph.promises.derived import overridden
 from solidsph.run.dynamics import Dynamics
 
 _MASS = 2.0  # [kg]
@@ -31,6 +32,8 @@ _DURATION = 2.0 * np.pi / _FREQUENCY * 5.0 / 6.0  # [s]
 # A fitted slope differs from the order by about the relative size of the next term of the error,
 # (omega dt)^2 at the coarsest steps.
 _ORDER_TOLERANCE = 0.1
+
+KIT = Kit()
 
 
 @final
@@ -62,9 +65,7 @@ class _Spring(InternalForces):
 class _Damper(Load):
     """f = -c v on the first particle."""
 
-    @property
-    def label(self) -> str:
-        return "damper"
+    label: str = "damper"
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         return {}
@@ -82,9 +83,7 @@ class _Damper(Load):
 class _Shaker(Constraint):
     """u = sin t of the first particle."""
 
-    @property
-    def label(self) -> str:
-        return "shaker"
+    label: str = "shaker"
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         return {}
@@ -97,7 +96,7 @@ class _Shaker(Constraint):
         values[0] = (sin(time), cos(time), -sin(time))[derivative]
 
 
-def _dynamics(*conditions: _Damper | _Shaker) -> Dynamics:
+def _dynamics(*terms: _Damper | _Shaker) -> Dynamics:
     """One particle at X = 0."""
     origin, unit = np.zeros((1, 1)), np.ones(1)
     particles = Particles(
@@ -112,8 +111,8 @@ def _dynamics(*conditions: _Damper | _Shaker) -> Dynamics:
         particles=particles,
         masses=_MASS * unit,
         internal=_Spring(),
-        constraints=[one for one in conditions if isinstance(one, _Shaker)],
-        loads=[one for one in conditions if isinstance(one, _Damper)],
+        constraints=[term for term in terms if isinstance(term, _Shaker)],
+        loads=[term for term in terms if isinstance(term, _Damper)],
         step_size=1.0,  # no motion here is a difference over it
     )
 
@@ -128,112 +127,88 @@ def _initial(position: float = _START, velocity: float = _SPEED) -> State:
     )
 
 
-def _run(integrator: Integrator, dynamics: Dynamics, step_size: float, steps: int) -> State:
-    state = integrator.start(_initial(), dynamics, step_size)
+def _run(
+    integrator: Integrator,
+    dynamics: Dynamics,
+    step_size: float,
+    steps: int,
+    initial: State | None = None,
+) -> Iterator[State]:
+    """The states at the start and after each step."""
+    state = integrator.start(initial or _initial(), dynamics, step_size)
+    yield state
     for _ in range(steps):
         state = integrator.advance(state, dynamics, step_size)
+        yield state
+
+
+def _last(integrator: Integrator, dynamics: Dynamics, steps: int) -> State:
+    """The state after the whole duration."""
+    *_, state = _run(integrator, dynamics, _DURATION / steps, steps)
     return state
 
 
-def _fitted_order(integrator: Integrator, dynamics: Dynamics, rate: float) -> float:
-    """Slope of log error against log step for u'' + 2 g u' + omega^2 u = 0 with 2 g = rate."""
-    g = 0.5 * rate
-    omega = sqrt(_FREQUENCY**2 - g**2)
-    amplitude = hypot(_START, (_SPEED + g * _START) / omega)
-    phase = atan2((_SPEED + g * _START) / omega, _START)
-    decay = amplitude * exp(-g * _DURATION)
-    angle = omega * _DURATION - phase
-    u, v = decay * cos(angle), -decay * (g * cos(angle) + omega * sin(angle))
-    errors = []
-    for steps in _STEPS:
-        end = _run(integrator, dynamics, _DURATION / steps, steps)
-        position, velocity = end.positions[0, 0], end.velocities[0, 0]
-        errors.append(log(hypot(position - u, (velocity - v) / _FREQUENCY)))
-    return float(np.polyfit(-np.log(_STEPS), errors, 1)[0])
+@KIT.check
+def derived(integrator: Integrator) -> Verdict:
+    """What two formulas define is not overridden by a method, which a compiled loop would not
+    call."""
+    problem = overridden(integrator)
+    return Verdict(not problem, problem or "nothing is overridden")
 
 
-def _order(integrator: Integrator, dynamics: Dynamics, rate: float) -> Verdict:
-    found = _fitted_order(integrator, dynamics, rate)
-    passed = abs(found - integrator.order) <= _ORDER_TOLERANCE
-    return Verdict(passed, f"{found:.3f} (declared {integrator.order})")
-
-
-@check
+@KIT.check
 def order(integrator: Integrator) -> Verdict:
-    """On a free oscillation the error falls with the declared order."""
+    """In a free oscillation the error falls with the declared order."""
     return _order(integrator, _dynamics(), 0.0)
 
 
-@check
+@KIT.check
 def order_with_damping(integrator: Integrator) -> Verdict:
     """With a force that depends on velocity the error falls with the declared order too."""
     return _order(integrator, _dynamics(_Damper()), _RATE)
 
 
-def _largest(integrator: Integrator, product: float) -> float:
-    """Largest |u| over 2000 steps with omega dt = `product`, up to a million."""
-    step_size = product / _FREQUENCY
-    dynamics = _dynamics()
-    state = integrator.start(_initial(), dynamics, step_size)
-    largest = 0.0
-    for _ in range(2000):
-        state = integrator.advance(state, dynamics, step_size)
-        largest = max(largest, float(abs(state.positions[0, 0])))
-        if not largest < 1e6:
-            break
-    return largest
-
-
-@check
+@KIT.check
 def stable_below_limit(integrator: Integrator) -> Verdict:
     """At 0.99 of the declared stability limit, which is positive, an oscillation stays bounded."""
     if not integrator.stability_limit > 0.0:
-        return Verdict(False, f"declares stability_limit = {integrator.stability_limit}")
+        raise Broken(f"declares stability_limit = {integrator.stability_limit}")
     # So near the limit an amplitude grows by 1 / sqrt(1 - 0.99^2) = 7 before it turns.
     return at_most(_largest(integrator, 0.99 * integrator.stability_limit), 100.0)
 
 
-@check
+@KIT.check
 def unstable_above_limit(integrator: Integrator) -> Verdict:
-    """At 1.01 of the declared stability limit it grows: the limit is not too modest."""
+    """At 1.01 of the declared stability limit it grows: the limit is not too low."""
     return more_than(_largest(integrator, 1.01 * integrator.stability_limit), 1e5)
 
 
-@check
-def imposed_motion(integrator: Integrator) -> Verdict:
+# They are overwritten, so nothing but the sum X + u may round.
+@KIT.errors(1e-15)
+def imposed_motion(integrator: Integrator) -> Iterator[float]:
     """A particle whose motion is imposed follows it, in position and velocity."""
-    dynamics, step_size = _dynamics(_Shaker()), 0.01
-    state = integrator.start(_initial(0.0, 1.0), dynamics, step_size)
-    error = 0.0
-    for _ in range(100):
-        state = integrator.advance(state, dynamics, step_size)
-        error = max(
-            error,
-            abs(state.positions[0, 0] - sin(state.time)),
-            abs(state.velocities[0, 0] - cos(state.time)),
-        )
-    # They are overwritten, so nothing but the sum X + u may round.
-    return at_most(error, 1e-15)
+    _, *after = _run(integrator, _dynamics(_Shaker()), 0.01, 100, _initial(0.0, 1.0))
+    for state in after:
+        yield abs(state.positions[0, 0] - sin(state.time))
+        yield abs(state.velocities[0, 0] - cos(state.time))
 
 
-@check
-def work_of_loads(integrator: Integrator) -> Verdict:
+# The trapezoidal rule and a scheme of the first order leave omega dt = 1e-3 of the energy.
+@KIT.errors(5e-3)
+def work_of_loads(integrator: Integrator) -> Iterator[float]:
     """The work of a load is accounted for: the energy that a damper takes is the energy lost."""
-    steps = 4000
-    state = _run(integrator, _dynamics(_Damper()), _DURATION / steps, steps)
+    state = _last(integrator, _dynamics(_Damper()), 4000)
     before = _energy(_initial())
-    lost = before - _energy(state)
-    # The trapezoidal rule and a scheme of the first order leave omega dt = 1e-3 of the energy.
-    return at_most(abs(lost + state.work["damper"]) / before, 5e-3)
+    yield abs(before - _energy(state) + state.work["damper"]) / before
 
 
-@check
+@KIT.check
 def bookkeeping(integrator: Integrator) -> Verdict:
-    """A step adds 1 to the count and its size to the time, and leaves the old state as it was."""
+    """A step adds 1 to the count and its size to the time, and does not change the old state."""
     dynamics, step_size = _dynamics(), 0.01
     first = _initial()
     started = integrator.start(first, dynamics, step_size)
-    untouched = _copied(started)
+    untouched = deepcopy(started)
     after = integrator.advance(started, dynamics, step_size)
     again = integrator.advance(started, dynamics, step_size)
     problems = {
@@ -248,24 +223,37 @@ def bookkeeping(integrator: Integrator) -> Verdict:
     return Verdict(not found, "; ".join(found) or "as required")
 
 
-@check
-def derived(integrator: Integrator) -> Verdict:
-    """What two formulas say of a step is not said otherwise by a method, which a compiled loop does
-    not call."""
-    problem = overridden(integrator)
-    return Verdict(not problem, problem or "nothing is overridden")
+def _fitted_order(integrator: Integrator, dynamics: Dynamics, rate: float) -> float:
+    """Slope of log error against log step for u'' + 2 g u' + omega^2 u = 0 with 2 g = rate."""
+    g = 0.5 * rate
+    omega = sqrt(_FREQUENCY**2 - g**2)
+    amplitude = hypot(_START, (_SPEED + g * _START) / omega)
+    phase = atan2((_SPEED + g * _START) / omega, _START)
+    decay = amplitude * exp(-g * _DURATION)
+    angle = omega * _DURATION - phase
+    u, v = decay * cos(angle), -decay * (g * cos(angle) + omega * sin(angle))
+    errors = []
+    for steps in _STEPS:
+        end = _last(integrator, dynamics, steps)
+        position, velocity = end.positions[0, 0], end.velocities[0, 0]
+        errors.append(log(hypot(position - u, (velocity - v) / _FREQUENCY)))
+    return float(np.polyfit(-np.log(_STEPS), errors, 1)[0])
 
 
-CHECKS: tuple[Check, ...] = (
-    derived,
-    order,
-    order_with_damping,
-    stable_below_limit,
-    unstable_above_limit,
-    imposed_motion,
-    work_of_loads,
-    bookkeeping,
-)
+def _order(integrator: Integrator, dynamics: Dynamics, rate: float) -> Verdict:
+    fitted = _fitted_order(integrator, dynamics, rate)
+    passed = abs(fitted - integrator.order) <= _ORDER_TOLERANCE
+    return Verdict(passed, f"{fitted:.3f} (declared {integrator.order})")
+
+
+def _largest(integrator: Integrator, product: float) -> float:
+    """Largest |u| over 2000 steps with omega dt = `product`, up to a million."""
+    largest = 0.0
+    for state in _run(integrator, _dynamics(), product / _FREQUENCY, 2000):
+        largest = max(largest, float(abs(state.positions[0, 0])))
+        if not largest < 1e6:
+            break
+    return largest
 
 
 def _energy(state: State) -> float:
@@ -283,17 +271,6 @@ def _arrays(state: State) -> list[Array]:
     ]
 
 
-def _copied(state: State) -> State:
-    return attrs.evolve(
-        state,
-        positions=state.positions.copy(),
-        velocities=state.velocities.copy(),
-        accelerations=state.accelerations.copy(),
-        memory={name: array.copy() for name, array in state.memory.items()},
-        applied={name: array.copy() for name, array in state.applied.items()},
-    )
-
-
-def _same(one: State, other: State) -> bool:
-    pairs = zip(_arrays(one), _arrays(other), strict=True)
+def _same(first: State, second: State) -> bool:
+    pairs = zip(_arrays(first), _arrays(second), strict=True)
     return all(np.array_equal(a, b) for a, b in pairs)

@@ -1,7 +1,7 @@
-"""What a declared kind derives from arrays and a formula, and an implementation must leave alone.
+"""Methods that a compilable kind derives from its formula, and that a part must not override.
 
-A compiled loop takes the arrays and the formula, the step by step loop calls the method: where that
-is overridden, the two carry out different physics.
+A compiled loop uses the arrays and the formula, the step by step loop calls the method. If the
+method is overridden, the two compute different physics.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _DERIVED: Mapping[type, tuple[str, ...]] = {
 
 
 def overridden(part: object) -> str:
-    """What `part` overrides of what its declared kind derives; nothing if all is well."""
+    """The first derived method that `part` overrides, as a message; "" if there is none."""
     for kind, names in _DERIVED.items():
         if not isinstance(part, kind):
             continue

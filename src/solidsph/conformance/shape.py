@@ -1,18 +1,20 @@
-"""What every shape must keep: its distance, its boundary and its volume belong together.
+"""Checks of a shape: its distance, its boundary and its volume must agree.
 
-Whether a point is inside is told by the solid angle under which it sees the sampled boundary, a
-route on which the distance is not used.
+A point is inside if it sees the sampled boundary under the full solid angle. That does not use the
+distance, so it can check its sign.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.spatial import cKDTree
 
+from solidsph.conformance.check import Broken, Kit, NotPromised, Verdict, at_most
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.interfaces.smoothing_kernel import UNIT_SPHERE
 from solidsph.maths.arrays import Array
-from solidsph.promises.check import Check, Verdict, at_most, check, not_promised
 
 # Samples along the longest side: their spacing is the error that a sampled boundary may have.
 _ALONG = {1: 20, 2: 200, 3: 40}
@@ -23,8 +25,10 @@ _POINTS = {1: 2000, 2: 300, 3: 60}
 # A boundary sampled exactly, at whatever spacing: sums over some thousand samples.
 _ROUNDING = 1e-12
 
-# Of the spacing: on the boundary, though rounding and a solver's tolerance put it beside.
+# Of the spacing: the error of a point on the boundary by rounding and a solver's tolerance.
 _ON_BOUNDARY = 1e-6
+
+KIT = Kit()
 
 
 def _size(shape: Shape) -> float:
@@ -44,12 +48,12 @@ def _areas(surface: Surface) -> Array:
     return np.asarray(np.linalg.norm(surface.area_vectors, axis=1))
 
 
-@check
+@KIT.check
 def arrays(shape: Shape) -> Verdict:
     """Bounds, distances and samples are finite arrays in the declared dimension, 1 to 3."""
     d = shape.dimension
     if d not in (1, 2, 3):
-        return Verdict(False, f"declares dimension {d}")
+        raise Broken(f"declares dimension {d}")
     lower, upper = shape.bounds()
     surface = _sampled(shape)
     count = len(surface.points)
@@ -62,34 +66,34 @@ def arrays(shape: Shape) -> Verdict:
     }
     for name, (array, wanted) in expected.items():
         if np.shape(array) != wanted or not np.all(np.isfinite(array)):
-            return Verdict(False, f"{name} {np.shape(array)}, not {wanted}, or not finite")
+            raise Broken(f"{name} {np.shape(array)}, not {wanted}, or not finite")
     return Verdict(bool(np.all(upper > lower)), f"{d}D, {count} samples")
 
 
-@check
+@KIT.check
 def bounds(shape: Shape) -> Verdict:
     """The bounds hold the whole boundary, and no point outside them is inside the shape."""
     lower, upper = shape.bounds()
     points = _sampled(shape).points
     beyond = max(float((lower - points).max()), float((points - upper).max())) / _size(shape)
     if beyond > _ROUNDING:
-        return Verdict(False, f"the boundary passes them by {beyond:.1e} of the size")
+        raise Broken(f"the boundary exceeds them by {beyond:.1e} of the size")
     probes = _around(shape)
     outside = np.any((probes < lower) | (probes > upper), axis=1)
     inside = int(np.sum(shape.signed_distance(probes[outside]) < 0.0))
     return Verdict(inside == 0, f"{inside} of {int(outside.sum())} points outside are inside")
 
 
-@check
+@KIT.check
 def closed_boundary(shape: Shape) -> Verdict:
     """The boundary is closed: its area vectors add up to zero, up to a sample where two parts of a
     composite shape cross."""
     surface = _sampled(shape)
     error = float(np.abs(surface.area_vectors.sum(axis=0)).max() / _areas(surface).sum())
-    return at_most(error, _ROUNDING if shape.volume() is not None else _crossing(shape))
+    return at_most(error, _of_areas(shape))
 
 
-@check
+@KIT.check
 def volume(shape: Shape) -> Verdict:
     """The volume is what the boundary encloses by the divergence theorem; where no closed form is
     known, that of the points inside."""
@@ -106,117 +110,94 @@ def volume(shape: Shape) -> Verdict:
     return at_most(abs(flux / known - 1.0), limit)
 
 
-@check
-def on_boundary(shape: Shape) -> Verdict:
+@KIT.errors(_ON_BOUNDARY)
+def on_boundary(shape: Shape) -> Iterator[float]:
     """The distance of the samples of the boundary is zero."""
     distances = np.abs(shape.signed_distance(_sampled(shape).points))
-    return at_most(float(distances.max()) / _spacing(shape), _ON_BOUNDARY)
+    yield float(distances.max()) / _spacing(shape)
 
 
-@check
-def distance_near_boundary(shape: Shape) -> Verdict:
+# A curved face bends away by the square of the step.
+@KIT.errors(1e-2)
+def distance_near_boundary(shape: Shape) -> Iterator[float]:
     """A small step along the outward normal changes the distance by the step, away from corners:
     for nine samples in ten."""
     surface = _sampled(shape)
     step = 1e-3 * _spacing(shape)
     normals = surface.area_vectors / _areas(surface)[:, None]
     errors = [
-        np.abs(shape.signed_distance(surface.points + way * step * normals) / (way * step) - 1.0)
-        for way in (-1.0, 1.0)
+        np.abs(shape.signed_distance(surface.points + sign * step * normals) / (sign * step) - 1.0)
+        for sign in (-1.0, 1.0)
     ]
-    # A curved face bends away by the square of the step.
-    return at_most(float(np.quantile(np.maximum(*errors), 0.9)), 1e-2)
+    yield float(np.quantile(np.maximum(*errors), 0.9))
 
 
-@check
-def distance_elsewhere(shape: Shape) -> Verdict:
+@KIT.errors(_ROUNDING)
+def distance_elsewhere(shape: Shape) -> Iterator[float]:
     """Nowhere is the distance larger than that to the nearest sample of the boundary."""
     probes, points = _around(shape), _sampled(shape).points
     nearest = np.asarray(cKDTree(points).query(probes)[0])
-    beyond = np.abs(shape.signed_distance(probes)) - nearest
-    return at_most(float(beyond.max()) / _size(shape), _ROUNDING)
+    yield float((np.abs(shape.signed_distance(probes)) - nearest).max()) / _size(shape)
 
 
-@check
+@KIT.check
 def sign(shape: Shape) -> Verdict:
     """The distance is negative inside and positive outside, everywhere."""
     probes, h = _around(shape), _spacing(shape)
     surface = _sampled(shape)
     d = shape.dimension
     distances = shape.signed_distance(probes)
-    wrong = told = 0
+    wrong = known = 0
     for probe, distance in zip(probes, distances, strict=True):
         offsets = surface.points - probe
         r = np.linalg.norm(offsets, axis=1)
-        if r.min() < 2.0 * h:  # so near, the samples are seen one by one
+        if r.min() < 2.0 * h:  # so near, the samples do not add up to a surface
             continue
         angle = float(np.sum(np.sum(surface.area_vectors * offsets, axis=1) / r**d))
-        told += 1
+        known += 1
         wrong += (angle / UNIT_SPHERE[d] > 0.5) != (distance < 0.0)
-    return Verdict(wrong == 0 and told > 0, f"{wrong} of {told} points on the wrong side")
+    return Verdict(wrong == 0 and known > 0, f"{wrong} of {known} points on the wrong side")
 
 
-@check
-def distance_bound(shape: Shape) -> Verdict:
-    """A distance is never more than there is: from a point to another it changes by no more than
-    the way between them."""
+@KIT.errors(_ROUNDING)
+def distance_bound(shape: Shape) -> Iterator[float]:
+    """Between two points the distance changes by no more than their distance from each other."""
     probes = _around(shape)
     distances = shape.signed_distance(probes)
     apart = np.linalg.norm(probes[:, None] - probes[None], axis=2)
     excess = float((np.abs(distances[:, None] - distances[None]) - apart).max())
-    return at_most(max(0.0, excess) / _size(shape), _ROUNDING)
+    yield max(0.0, excess) / _size(shape)
 
 
-@check
-def convex_lines(shape: Shape) -> Verdict:
-    """What declares to be convex is: no line between two points inside leaves the shape."""
+@KIT.errors(_ROUNDING)
+def convex_lines(shape: Shape) -> Iterator[float]:
+    """In a shape declared as convex, no line between two points inside leaves it."""
     if not shape.convex:
-        return not_promised("it does not declare to be convex")
+        raise NotPromised("it is not declared as convex")
     probes = _around(shape)
     inside = probes[shape.signed_distance(probes) < 0.0]
     between = [t * inside[:, None] + (1.0 - t) * inside[None] for t in (0.25, 0.5)]
     points = np.concatenate(between).reshape(-1, shape.dimension)
-    return at_most(float(shape.signed_distance(points).max()) / _size(shape), _ROUNDING)
+    yield float(shape.signed_distance(points).max()) / _size(shape)
 
 
-@check
-def sampling(shape: Shape) -> Verdict:
-    """Samples are at most the asked spacing apart: none stands for more than spacing^(d-1)."""
+@KIT.errors(1.0 + _ROUNDING)
+def sampling(shape: Shape) -> Iterator[float]:
+    """Samples are at most the given spacing apart: none has an area above spacing^(d-1)."""
     # In 1D the boundary is points, of area 1 each.
-    largest = [
-        float(_areas(shape.surface(h)).max()) / h ** (shape.dimension - 1)
-        for h in (_spacing(shape), 3.0 * _spacing(shape))
-    ]
-    return at_most(max(largest), 1.0 + _ROUNDING)
+    for h in (_spacing(shape), 3.0 * _spacing(shape)):
+        yield float(_areas(shape.surface(h)).max()) / h ** (shape.dimension - 1)
 
 
-@check
+@KIT.check
 def named_faces(shape: Shape) -> Verdict:
     """Each sample lies on a named face; the names and the areas of faces do not depend on the
     spacing of the samples."""
     first, second = (_faces(shape.surface(k * _spacing(shape))) for k in (1.0, 2.0))
     if set(first) != set(second) or not all(isinstance(n, str) and n for n in first):
-        return Verdict(False, f"{sorted(first)} and {sorted(second)}")
-    total = sum(first.values())
-    # Where two parts of a composite shape cross, a sample belongs to the one or the other.
-    limit = _ROUNDING if shape.volume() is not None else _crossing(shape)
-    return at_most(max(abs(first[name] - second[name]) for name in first) / total, limit)
-
-
-CHECKS: tuple[Check, ...] = (
-    arrays,
-    bounds,
-    closed_boundary,
-    volume,
-    on_boundary,
-    distance_near_boundary,
-    distance_elsewhere,
-    sign,
-    distance_bound,
-    convex_lines,
-    sampling,
-    named_faces,
-)
+        raise Broken(f"{sorted(first)} and {sorted(second)}")
+    error = max(abs(first[name] - second[name]) for name in first) / sum(first.values())
+    return at_most(error, _of_areas(shape))
 
 
 def _counted(shape: Shape) -> float:
@@ -226,14 +207,15 @@ def _counted(shape: Shape) -> float:
     axes = [
         a + (np.arange(count) + 0.5) / count * (b - a) for a, b in zip(lower, upper, strict=True)
     ]
-    points = np.stack([one.ravel() for one in np.meshgrid(*axes, indexing="ij")], axis=1)
+    points = np.stack([grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")], axis=1)
     inside = np.mean(shape.signed_distance(points) < 0.0)
     return float(inside * np.prod(upper - lower))
 
 
-def _crossing(shape: Shape) -> float:
-    """Part of the boundary that samples beside a crossing may be: two on either side."""
-    return 4.0 / _ALONG[shape.dimension]
+def _of_areas(shape: Shape) -> float:
+    """Tolerance of sums of areas, over the whole area."""
+    # Where two parts of a composite shape cross, two samples on either side belong to either part.
+    return _ROUNDING if shape.volume() is not None else 4.0 / _ALONG[shape.dimension]
 
 
 def _around(shape: Shape) -> Array:
