@@ -11,7 +11,13 @@ from solidsph.testing import conformance, example_part, kits
 @pytest.mark.parametrize(
     ("kind", "name"),
     # Materials are put to their checks one by one, in materials/test_materials.py.
-    [(kind, name) for kind in kits() if kind != "materials" for name in registry.names(kind)],
+    [
+        # To compile takes half a minute each; tests/engines hold them to the same.
+        pytest.param(kind, name, marks=pytest.mark.validation if "compiled" in name else ())
+        for kind in kits()
+        if kind != "materials"
+        for name in registry.names(kind)
+    ],
     ids=lambda value: value,
 )
 def test_every_installed_part_conforms(kind: str, name: str) -> None:

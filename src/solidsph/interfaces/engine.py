@@ -14,6 +14,7 @@ from solidsph.interfaces.body import Body
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.law import Law
+from solidsph.interfaces.part import Part
 from solidsph.interfaces.plan import BodySize, Compilation, Operations, Piece, Plan, Way
 from solidsph.interfaces.terms import StressTerm
 from solidsph.interfaces.time_loop import TimeLoop
@@ -146,7 +147,7 @@ class InternalForces(ABC):
         return None
 
 
-class Engine(ABC):
+class Engine(Part):
     """Prepares bodies for fast evaluation; owns whatever arrays that takes."""
 
     @abstractmethod

@@ -67,7 +67,7 @@ def _prepared(engine: Engine) -> Iterator[_Sample]:
         for name, origin in (("one", 0.0), ("other", 1.0)):
             shape = {
                 "type": "interval" if d == 1 else "box",
-                **({"length": 0.8, "start": origin} if d == 1 else {}),
+                **({"length": 0.8, "origin": origin} if d == 1 else {}),
                 **({"lengths": [0.5] * d, "origin": [origin] * d} if d > 1 else {}),
             }
             jittered = {"type": "jittered-lattice", "amplitude": 0.1, "seed": number}
