@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from solidsph import SceneError
 from solidsph.studies.case import Case, Measurement
 from solidsph.studies.point import Point
-from solidsph.studies.search import Accuracy, Goal, Within, search
+from solidsph.studies.search import Accuracy, Goal, TimeLimit, search
 
 SCHEMES = ("a", "b", "c", "d", "e")
 LEVELS = (4, 6, 8, 12, 16, 24)
@@ -103,13 +103,13 @@ def test_the_cheapest_for_an_accuracy_is_found_by_few_runs(law: Law, error: floa
 @settings(max_examples=200)
 @given(law=laws, time=st.floats(1.0, 60.0))
 def test_the_nearest_for_a_time_is_found(law: Law, time: float) -> None:
-    goal = Within(time)
+    goal = TimeLimit(time)
     found = search(Lawful(), AXES, goal, law)
     assert found.point is not None
     assert found.point.time <= time
     # Times are predicted by powers of the spacing, to some ten per cent, so that the finest level
     # that just fits may be missed.
-    assert found.point.error <= 1.5 * least(Within(0.7 * time), grid(law))
+    assert found.point.error <= 1.5 * least(TimeLimit(0.7 * time), grid(law))
 
 
 def test_a_fifth_of_the_time_of_the_grid_is_enough() -> None:
@@ -140,7 +140,7 @@ def test_what_cannot_be_reached_is_said() -> None:
     def failing(chosen: Mapping[str, Any]) -> Point:
         return Point(dict(chosen), inf, outcome="diverged")
 
-    assert search(Lawful(), AXES, Within(10.0), failing).point is None
+    assert search(Lawful(), AXES, TimeLimit(10.0), failing).point is None
     with pytest.raises(SceneError, match="no axis"):
         search(Lawful(), {}, Accuracy(0.1), failing)
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from solidsph.commands.certified import (
+from solidsph.commands.console import say, show_json, show_table
+from solidsph.commands.scheme_options import (
     SchemeOptions,
     confirmations,
     facts,
@@ -16,7 +17,6 @@ from solidsph.commands.certified import (
     show_certificate,
     stretch_of,
 )
-from solidsph.commands.console import say, show_json, show_table
 from solidsph.commands.target import parameters
 from solidsph.errors import SceneError
 from solidsph.registry import registry

@@ -21,7 +21,7 @@ from solidsph.run.hooks import implementation
 if TYPE_CHECKING:
     from solidsph.interfaces.terms import Observation
     from solidsph.simulation import Simulation
-    from solidsph.studies.sweep import Standing, Watch
+    from solidsph.studies.sweep import StatusCallback, SweepStatus
 
 
 class _Console(Console):
@@ -108,7 +108,7 @@ class ProgressObserver:
 
 
 @contextmanager
-def sweep_progress(description: str, shown: bool) -> Iterator[Watch]:
+def sweep_progress(description: str, shown: bool) -> Iterator[StatusCallback]:
     """Shows how far a sweep is, on the standard error, if it is wanted and someone watches."""
     if not (shown and err.is_terminal):
         yield lambda standing: None
@@ -125,7 +125,7 @@ class SweepObserver:
         self._display = display
         self._task = display.add_task(escape(description), total=None, note="")
 
-    def __call__(self, standing: Standing) -> None:
+    def __call__(self, standing: SweepStatus) -> None:
         point = standing.point
         if point is not None and not point.finished:
             self._display.console.print(escape(f"{point.label()}: {point.outcome}"))

@@ -18,10 +18,10 @@ from solidsph.errors import SceneError
 from solidsph.studies.case import Case
 
 if TYPE_CHECKING:
-    from solidsph.studies.cost import Axes, Means
+    from solidsph.studies.cost import Axes, SweepSetup
     from solidsph.studies.frontier import Frontier
     from solidsph.studies.point import Point
-    from solidsph.studies.search import Found
+    from solidsph.studies.search import SearchResult
 
 
 @click.command()
@@ -85,7 +85,7 @@ def cost(
 ) -> None:
     """Show what accuracy costs in time for a case. What has run is kept: the same command goes on
     where another was ended."""
-    from solidsph.studies.cost import Means
+    from solidsph.studies.cost import SweepSetup
     from solidsph.studies.processes import Processes
 
     case = resolve(target, settings)
@@ -110,7 +110,7 @@ def cost(
     folder = output or Path("results") / "cost" / target
     axes = _axes(wanted_axes, case)
     with sweep_progress(target, not (as_json or quiet)) as watch:
-        means = Means(runner, folder, repeats, watch)
+        means = SweepSetup(runner, folder, repeats, watch)
         goal = _goal(accuracy, time_wanted)
         if goal is None:
             _sweep(target, case, axes, means, folder, report, as_json)
@@ -122,18 +122,18 @@ def _sweep(
     target: str,
     case: Case,
     axes: Axes,
-    means: Means,
+    means: SweepSetup,
     folder: Path,
     report: bool,
     as_json: bool,
 ) -> None:
-    from solidsph.studies.cost import frontier, own_settings
+    from solidsph.studies.cost import default_settings, frontier
     from solidsph.studies.frontier_picture import draw_frontier
     from solidsph.studies.report import write_report
 
     made = frontier(case, axes, means)
     rows = list(made)
-    own = own_settings(case.priced(), axes)
+    own = default_settings(case.priced(), axes)
     default = next((point for point in made.points if point.settings == own), None)
     picture, table = folder / f"{target}-frontier.png", folder / f"{target}-points.csv"
     if made.finished():
@@ -227,7 +227,7 @@ def _default(made: Frontier, point: Point) -> Mapping[str, Any]:
 
 def _bars(made: Frontier) -> Sequence[Mapping[str, Any]]:
     """Of every scheme on the front of which there are three points: its error bar."""
-    from solidsph.studies.richardson import extrapolated
+    from solidsph.studies.richardson import extrapolate
 
     bars = []
     on_front = {made.scheme(point) for point in made.front()}
@@ -237,7 +237,7 @@ def _bars(made: Frontier) -> Sequence[Mapping[str, Any]]:
             continue
         if points[-1].reference is None:
             continue  # its value is the error itself
-        found = extrapolated([point.spacing for point in points], values)
+        found = extrapolate([point.spacing for point in points], values)
         bars.append(
             {
                 "scheme": scheme,
@@ -257,14 +257,14 @@ def _search(
     case: Case,
     goal: Any,
     axes: Axes,
-    means: Means,
+    means: SweepSetup,
     folder: Path,
     longest: float,
     as_json: bool,
 ) -> None:
-    from solidsph.studies.cost import found as find
+    from solidsph.studies.cost import find_best
 
-    found = find(case, goal, axes, means, longest=longest)
+    found = find_best(case, goal, axes, means, longest=longest)
     scenes = [] if found.point is None else _scenes(target, case, found, folder)
     if as_json:
         show_json(
@@ -302,14 +302,14 @@ def _search(
         raise SystemExit(1)
 
 
-def _scenes(target: str, case: Case, found: Found, folder: Path) -> Sequence[Path]:
+def _scenes(target: str, case: Case, found: SearchResult, folder: Path) -> Sequence[Path]:
     """The scenes of what was found, each a file with its evidence at the top."""
-    from solidsph.studies.varied import varied
+    from solidsph.studies.variant import with_settings
 
     point = found.point
     assert point is not None
     paths = []
-    scenes = varied(case.priced(), point.settings).scenes()
+    scenes = with_settings(case.priced(), point.settings).scenes()
     for name, scene in scenes.items():
         path = folder / (f"{target}.toml" if len(scenes) == 1 else f"{target}-{name}.toml")
         evidence = (
@@ -352,9 +352,13 @@ def _brief(point: Point) -> str:
 
 
 def _scheme(settings: Mapping[str, Any]) -> str:
-    from solidsph.studies.point import shown
 
-    return ", ".join(f"{name} {shown(value)}" for name, value in settings.items()) or "as it is"
+    from solidsph.studies.point import format_setting
+
+    return (
+        ", ".join(f"{name} {format_setting(value)}" for name, value in settings.items())
+        or "as it is"
+    )
 
 
 def _axes(wanted: Sequence[str], case: Case) -> Axes:
@@ -386,11 +390,11 @@ def _axis(text: str) -> tuple[str, Sequence[Any]]:
 
 
 def _goal(accuracy: str | None, time: str | None) -> Any:
-    from solidsph.studies.search import Accuracy, Within
+    from solidsph.studies.search import Accuracy, TimeLimit
 
     if accuracy is not None:
         return Accuracy(_part(accuracy))
-    return None if time is None else Within(seconds(time, "--time"))
+    return None if time is None else TimeLimit(seconds(time, "--time"))
 
 
 def _part(text: str) -> float:

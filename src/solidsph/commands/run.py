@@ -185,7 +185,7 @@ def _run_scene(
 ) -> None:
     from solidsph.advice import advised
     from solidsph.commands import prediction as told
-    from solidsph.commands.receipted import of_scene, show_receipts
+    from solidsph.commands.receipt_tables import of_scene, show_receipts
     from solidsph.commands.warned import warn
     from solidsph.costs.process import peak_memory
 
@@ -287,7 +287,7 @@ def _run_case(
 ) -> None:
     from solidsph.advice import Advice, advised
     from solidsph.commands import prediction as told
-    from solidsph.commands.receipted import of_case, show_case_receipts
+    from solidsph.commands.receipt_tables import of_case, show_case_receipts
     from solidsph.commands.warned import warn
     from solidsph.studies.case_run import run_case
 

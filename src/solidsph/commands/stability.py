@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from solidsph.commands.certified import SchemeOptions, scheme_options
 from solidsph.commands.console import progress, say, show_json, show_table
+from solidsph.commands.scheme_options import SchemeOptions, scheme_options
 from solidsph.errors import SceneError
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def _run(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    from solidsph.studies.suite import judged, trials
+    from solidsph.studies.suite import run_trial, trials
     from solidsph.studies.suite_picture import draw_suite
 
     words = _words(chosen)
@@ -87,7 +87,7 @@ def _run(
             if display is not None and task is not None:
                 display.update(task, description=f"{name}: {label}", completed=number)
             place = Path(folder) / str(number)
-            verdicts.append(judged(name, label, case, trial, place, words=words, brief=brief))
+            verdicts.append(run_trial(name, label, case, trial, place, words=words, brief=brief))
     picture = output / "suite.png"
     title = "Hard cases" + (f": {', '.join(f'{k} {v}' for k, v in words.items())}" if words else "")
     draw_suite(verdicts, title, picture)

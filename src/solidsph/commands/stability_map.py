@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from solidsph.commands.certified import SchemeOptions
 from solidsph.commands.console import say, show_json, show_table
+from solidsph.commands.scheme_options import SchemeOptions
 
 # From strong compression to the largest stretch of the paper, past 1 without touching it, and from
 # a support that just holds the nearest neighbours to the paper's largest.

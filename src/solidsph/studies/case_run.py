@@ -86,7 +86,7 @@ def run_case(
 
 def _run_case(case: Case, folder: Path, ahead: Ahead, begin: Begin) -> CaseResult:
     runs = run_scenes(case, folder, ahead=ahead, begin=begin)
-    with opened(runs) as records:
+    with open_records(runs) as records:
         measurements = case.measure(records)
         pictures = case.draw(records, folder)
         tables = [
@@ -140,7 +140,7 @@ def run_scenes(
 
 
 @contextmanager
-def opened(runs: Sequence[SceneRun]) -> Iterator[Mapping[str, Record]]:
+def open_records(runs: Sequence[SceneRun]) -> Iterator[Mapping[str, Record]]:
     """The records of `runs`, by scene."""
     with ExitStack() as stack:
         yield {run.name: stack.enter_context(Record(run.record)) for run in runs}

@@ -14,10 +14,10 @@ import attrs
 
 from solidsph.errors import SceneError
 from solidsph.studies.fresh_process import FreshProcess
-from solidsph.studies.packing import heard, packed, told
 from solidsph.studies.point import Point
 from solidsph.studies.runner import Lost, Outcomes, Runner
 from solidsph.studies.task import Task
+from solidsph.studies.task_lines import decode_outcome, encode_outcome, encode_task
 
 _LOOK = 0.5  # how often a worker looks whether a task is still wanted [s]
 
@@ -36,7 +36,7 @@ class Cluster(Runner):
 
     def run(self, tasks: Sequence[Task]) -> Outcomes:
         distributed = _distributed()
-        lines = [packed(task) for task in tasks]  # refused before any begins
+        lines = [encode_task(task) for task in tasks]  # refused before any begins
         client = self._client(distributed)
         try:
             # A name of its own each time: nobody else's task is taken for ours.
@@ -102,7 +102,7 @@ def _distributed() -> Any:
 
 def _outcome(future: Any, task: Task) -> Point | Lost:
     if future.status == "finished":
-        return heard(future.result(), task)
+        return decode_outcome(future.result(), task)
     cause = future.exception()
     return Lost(f"on the cluster: {type(cause).__name__}: {cause}")
 
@@ -115,7 +115,7 @@ def _on_worker(line: str) -> str:
             ready.register(process, selectors.EVENT_READ)
             while not (ready.select(_LOOK) and process.is_over()):
                 if not _is_wanted():
-                    return told(Lost("nobody waits for it any more"))
+                    return encode_outcome(Lost("nobody waits for it any more"))
         return process.reply()
     finally:
         process.close()

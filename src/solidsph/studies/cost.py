@@ -19,10 +19,10 @@ from solidsph.studies.journal import Journal
 from solidsph.studies.point import Point
 from solidsph.studies.processes import Processes
 from solidsph.studies.runner import Runner
-from solidsph.studies.search import Found, Goal, Settings, search
-from solidsph.studies.sweep import Watch, sweep, unwatched
+from solidsph.studies.search import Goal, SearchResult, Settings, search
+from solidsph.studies.sweep import StatusCallback, ignore_status, sweep
 from solidsph.studies.task import Task
-from solidsph.studies.varied import varied
+from solidsph.studies.variant import with_settings
 
 Axes = Mapping[str, Sequence[Any]]
 
@@ -30,13 +30,13 @@ JOURNAL = "points.jsonl"
 
 
 @attrs.frozen
-class Means:
+class SweepSetup:
     """Where and how often configurations are run, and where what came of them is kept."""
 
     runner: Runner = attrs.field(factory=lambda: Processes(1))
     folder: Path | None = None  # of the journal; None keeps nothing
     repeats: int = 1  # of every configuration: times are medians
-    watch: Watch = unwatched
+    watch: StatusCallback = ignore_status
 
     def points(self, case: Case, several: Sequence[Settings]) -> Sequence[Point]:
         """Of `case` with these settings, in their order; from the journal where it has them."""
@@ -46,7 +46,9 @@ class Means:
             return sweep(tasks, self.runner, Journal(folder / JOURNAL), self.watch)
 
 
-def frontier(case: Case | str, axes: Axes | None = None, means: Means | None = None) -> Frontier:
+def frontier(
+    case: Case | str, axes: Axes | None = None, means: SweepSetup | None = None
+) -> Frontier:
     """Run `case` at every combination of the values of `axes`, and at its own parameters.
 
     Args:
@@ -59,33 +61,33 @@ def frontier(case: Case | str, axes: Axes | None = None, means: Means | None = N
         SceneError: there is no such axis, or nothing to sweep.
     """
     priced = _priced(case)
-    axes = checked(priced, axes or sweep_of(priced))
+    axes = check_axes(priced, axes or sweep_of(priced))
     grid: list[Settings] = [
         dict(zip(axes, values, strict=True)) for values in product(*axes.values())
     ]
-    own = own_settings(priced, axes)
+    own = default_settings(priced, axes)
     if own is not None and own not in grid:
         grid.append(own)
-    points = (means or Means()).points(priced, grid)
+    points = (means or SweepSetup()).points(priced, grid)
     return Frontier(points, next(iter(axes)))
 
 
-def found(
+def find_best(
     case: Case | str,
     goal: Goal,
     axes: Axes | None = None,
-    means: Means | None = None,
+    means: SweepSetup | None = None,
     *,
     longest: float = 600.0,
-) -> Found:
+) -> SearchResult:
     """The best configuration for `goal`, by few runs; see `search`."""
-    priced, how = _priced(case), means or Means()
+    priced, how = _priced(case), means or SweepSetup()
 
     def run(settings: Settings) -> Point:
         (point,) = how.points(priced, [settings])
         return point
 
-    return search(priced, checked(priced, axes or sweep_of(priced)), goal, run, longest=longest)
+    return search(priced, check_axes(priced, axes or sweep_of(priced)), goal, run, longest=longest)
 
 
 def sweep_of(case: Case) -> Axes:
@@ -102,7 +104,7 @@ def sweep_of(case: Case) -> Axes:
     return case.sweep
 
 
-def checked(case: Case, axes: Axes) -> Axes:
+def check_axes(case: Case, axes: Axes) -> Axes:
     """The same `axes`, of which the case takes every value by itself.
 
     Raises:
@@ -112,11 +114,11 @@ def checked(case: Case, axes: Axes) -> Axes:
         if not values:
             raise SceneError(f"axis {axis!r} has no values; give some")
         for value in values:
-            varied(case, {axis: value}).scenes()
+            with_settings(case, {axis: value}).scenes()
     return axes
 
 
-def own_settings(case: Case, axes: Axes) -> Settings | None:
+def default_settings(case: Case, axes: Axes) -> Settings | None:
     """The case's own values on these axes; None if it has no parameter for one of them."""
     missing = object()
     own = {axis: getattr(case, axis, missing) for axis in axes}

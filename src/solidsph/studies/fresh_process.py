@@ -9,9 +9,9 @@ import tempfile
 from contextlib import suppress
 from typing import IO
 
-from solidsph.studies.packing import told
 from solidsph.studies.runner import Lost
-from solidsph.studies.scratch import Scratch
+from solidsph.studies.scratch_folder import ScratchFolder
+from solidsph.studies.task_lines import encode_outcome
 
 _CHUNK = 65536
 
@@ -22,10 +22,10 @@ class FreshProcess:
     def __init__(self, line: str) -> None:
         self._answer = b""
         self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  # closed by close()
-        self._scratch = Scratch()  # for records, which a run that is killed leaves behind
+        self._scratch = ScratchFolder()  # for records, which a run that is killed leaves behind
         self._process = subprocess.Popen(
             # -P: no module of the current folder stands in for one that is installed.
-            [sys.executable, "-P", "-m", "solidsph.studies.one_point"],
+            [sys.executable, "-P", "-m", "solidsph.studies.run_task"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
@@ -58,7 +58,7 @@ class FreshProcess:
         code = self._process.wait()
         if self._answer.endswith(b"\n"):
             return self._answer.decode("ascii")
-        return told(Lost(_ended(code, self._last_words())))
+        return encode_outcome(Lost(_ended(code, self._last_words())))
 
     def close(self) -> None:
         """End it if it still runs, and remove whatever it leaves."""

@@ -116,15 +116,17 @@ class Frontier:
         errors = [point.error for point in points]
         return Orders(
             settings,
-            in_spacing=power([point.spacing for point in points], errors),
-            in_time=-power([point.time for point in points], errors),
+            in_spacing=fitted_exponent([point.spacing for point in points], errors),
+            in_time=-fitted_exponent([point.time for point in points], errors),
             crosses=any(fine > coarse for coarse, fine in pairwise(errors)),
         )
 
     def next_digit(self) -> float:
         """How many times the time a tenth of the error takes, along the front."""
         front = self.front()
-        falls = -power([point.time for point in front], [self.trusted(point) for point in front])
+        falls = -fitted_exponent(
+            [point.time for point in front], [self.trusted(point) for point in front]
+        )
         return 10.0 ** (1.0 / falls) if falls > 0.0 else inf
 
     def cheapest(self, accuracy: float) -> Point | None:
@@ -173,7 +175,7 @@ class Frontier:
         return "; ".join(parts) + "."
 
 
-def power(costs: Sequence[float], errors: Sequence[float]) -> float:
+def fitted_exponent(costs: Sequence[float], errors: Sequence[float]) -> float:
     """The exponent p of errors ~ costs^p by least squares of logarithms; nan if there is none."""
     pairs = [
         (log(cost), log(error))

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from solidsph.studies.frontier import Frontier
-from solidsph.studies.point import Point, shown
+from solidsph.studies.point import Point, format_setting
 
 _MARKERS = "osD^vP*X<>"
 
@@ -39,7 +39,7 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
         _points(by_time, frontier, mine, marker, "black", scheme)
     for point in front:
         by_time.annotate(
-            shown(point.settings.get(frontier.refining, "")),
+            format_setting(point.settings.get(frontier.refining, "")),
             (point.time, 100.0 * frontier.trusted(point)),
             xytext=(6, 5),
             textcoords="offset points",

@@ -15,8 +15,8 @@ import attrs
 from solidsph.costs.process import peak_memory
 from solidsph.errors import SolidsphError
 from solidsph.studies.case import Case
-from solidsph.studies.case_run import FINISHED, opened, run_scenes
-from solidsph.studies.varied import varied
+from solidsph.studies.case_run import FINISHED, open_records, run_scenes
+from solidsph.studies.variant import with_settings
 
 
 @attrs.frozen
@@ -49,21 +49,21 @@ class Point:
 
     def label(self) -> str:
         """Its settings in one line."""
-        return ", ".join(f"{name} {shown(value)}" for name, value in self.settings.items())
+        return ", ".join(f"{name} {format_setting(value)}" for name, value in self.settings.items())
 
 
-def measured(case: Case, settings: Mapping[str, Any]) -> Point:
+def run_point(case: Case, settings: Mapping[str, Any]) -> Point:
     """Run `case` with these settings once, in this process, in a folder that is then removed.
 
     A run that goes wrong is a point too: its error is infinite.
     """
     begun = clock.perf_counter()
     try:
-        wanted = varied(case, settings)
+        wanted = with_settings(case, settings)
         with TemporaryDirectory() as folder:
             runs = run_scenes(wanted, Path(folder))
             seconds = clock.perf_counter() - begun
-            with opened(runs) as records:
+            with open_records(runs) as records:
                 headline = wanted.accuracy(wanted.measure(records))
             if not runs:  # then to measure is all there is to do
                 seconds = clock.perf_counter() - begun
@@ -87,7 +87,7 @@ def measured(case: Case, settings: Mapping[str, Any]) -> Point:
         return Point(dict(settings), inf, outcome=str(cause))
 
 
-def together(repeats: Sequence[Point]) -> Point:
+def merge_repeats(repeats: Sequence[Point]) -> Point:
     """One point of several runs of one configuration, which differ in time and memory only."""
     return attrs.evolve(
         repeats[0],
@@ -96,6 +96,6 @@ def together(repeats: Sequence[Point]) -> Point:
     )
 
 
-def shown(value: Any) -> str:
+def format_setting(value: Any) -> str:
     """A setting as a person would write it."""
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -11,9 +11,9 @@ import attrs
 
 from solidsph.errors import SceneError
 from solidsph.studies.fresh_process import FreshProcess
-from solidsph.studies.packing import heard, packed
 from solidsph.studies.runner import Outcomes, Runner
 from solidsph.studies.task import Task
+from solidsph.studies.task_lines import decode_outcome, encode_task
 
 
 @final
@@ -28,7 +28,7 @@ class Processes(Runner):
             raise SceneError(f"workers must be at least 1, got {self.workers}")
 
     def run(self, tasks: Sequence[Task]) -> Outcomes:
-        waiting = deque([(task, packed(task)) for task in tasks])  # refused before any begins
+        waiting = deque([(task, encode_task(task)) for task in tasks])  # refused before any begins
         running: dict[FreshProcess, Task] = {}
         with selectors.DefaultSelector() as ready:
             try:
@@ -46,7 +46,7 @@ class Processes(Runner):
                             reply = process.reply()
                             process.close()
                             del running[process]
-                            yield task, heard(reply, task)
+                            yield task, decode_outcome(reply, task)
             finally:
                 for process in running:
                     process.close()

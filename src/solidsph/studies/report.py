@@ -19,9 +19,9 @@ from solidsph.errors import SolidsphError
 from solidsph.studies.case import Case
 from solidsph.studies.case_run import FINISHED
 from solidsph.studies.frontier import Frontier
-from solidsph.studies.point import Point, shown
+from solidsph.studies.point import Point, format_setting
 from solidsph.studies.report_figures import EXPENSES, TIME, Figures, drawable, library
-from solidsph.studies.varied import varied
+from solidsph.studies.variant import with_settings
 
 
 def write_report(made: Frontier, case: Case, path: Path, *, title: str | None = None) -> None:
@@ -67,7 +67,7 @@ class Cell:
     def of(cls, value: Any, form: str = ".3g") -> Cell:
         """A number in this form, none if it is not finite, or else words."""
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            return cls(shown(value))
+            return cls(format_setting(value))
         if not isfinite(value):
             return cls("")
         return cls(str(value) if isinstance(value, int) else format(value, form), float(value))
@@ -131,7 +131,7 @@ class _Page:
     def _scenes(self, number: int, point: Point) -> Mapping[str, Any]:
         """Of one point: texts of TOML with names for files; or why there is none."""
         try:
-            scenes = varied(self.case, point.settings).scenes()
+            scenes = with_settings(self.case, point.settings).scenes()
         except SolidsphError as cause:
             return {"scenes": [], "note": f"There is no scene: {cause}"}
         if not scenes:
@@ -281,7 +281,10 @@ def _places(point: Point) -> Mapping[str, Any] | None:
 
 
 def _scheme(settings: Mapping[str, Any]) -> str:
-    return ", ".join(f"{name} {shown(value)}" for name, value in settings.items()) or "as it is"
+    return (
+        ", ".join(f"{name} {format_setting(value)}" for name, value in settings.items())
+        or "as it is"
+    )
 
 
 def _order(value: float) -> str:

@@ -17,7 +17,7 @@ import attrs
 
 from solidsph.errors import SceneError
 from solidsph.studies.frontier import Cost, Frontier
-from solidsph.studies.point import Point, shown
+from solidsph.studies.point import Point, format_setting
 
 # Told apart without colour, and by shape before fill.
 _SYMBOLS = (
@@ -173,7 +173,8 @@ class Figures:
             "mode": "markers",
             "name": name,
             "text": [
-                _words(shown(point.settings.get(self.frontier.refining, ""))) for point in points
+                _words(format_setting(point.settings.get(self.frontier.refining, "")))
+                for point in points
             ],
             **look,
             **({"error_x": _repeats(points, look["marker"]["color"])} if bars else {}),
@@ -232,7 +233,7 @@ _CHOSEN: Mapping[str, Any] = {
 
 def spoken(point: Point) -> str:
     """All that is known of a point, a line each, as Plotly's labels take it."""
-    lines = [f"{name}: {shown(value)}" for name, value in point.settings.items()]
+    lines = [f"{name}: {format_setting(value)}" for name, value in point.settings.items()]
     lines += [
         f"error: {100.0 * point.error:.3g} % of {point.quantity or 'the result'}",
         f"wall time: {_range(point)}",

@@ -30,7 +30,7 @@ class Extrapolation:
         return not self.warning
 
 
-def extrapolated(spacings: Sequence[float], values: Sequence[float]) -> Extrapolation:
+def extrapolate(spacings: Sequence[float], values: Sequence[float]) -> Extrapolation:
     """Of the three finest of some results. Celik et al. (2008), J. Fluids Eng. 130, 078001.
 
     With four or more results the order of the coarser three is compared with it.

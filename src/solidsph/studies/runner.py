@@ -9,7 +9,7 @@ from typing import TypeAlias, final
 
 import attrs
 
-from solidsph.studies.point import Point, measured
+from solidsph.studies.point import Point, run_point
 from solidsph.studies.task import Task
 
 
@@ -43,12 +43,12 @@ class Inline(Runner):
 
     def run(self, tasks: Sequence[Task]) -> Outcomes:
         for task in tasks:
-            yield task, tried(task)
+            yield task, run_task(task)
 
 
-def tried(task: Task) -> Point | Lost:
+def run_task(task: Task) -> Point | Lost:
     """Run the task in this process; an error that is no result of a run is told, not raised."""
     try:
-        return measured(task.case, task.settings)
+        return run_point(task.case, task.settings)
     except Exception as cause:
         return Lost(f"{type(cause).__name__}: {cause}")

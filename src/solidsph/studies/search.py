@@ -14,7 +14,7 @@ import attrs
 from solidsph.errors import SceneError
 from solidsph.studies.case import Case
 from solidsph.studies.point import Point
-from solidsph.studies.varied import varied
+from solidsph.studies.variant import with_settings
 
 Settings = Mapping[str, Any]
 Axes = Mapping[str, Sequence[Any]]
@@ -87,7 +87,7 @@ class Accuracy(Goal):
 
 @final
 @attrs.frozen
-class Within(Goal):
+class TimeLimit(Goal):
     """At most a wall time; then the smaller the error the better."""
 
     time: float  # [s]
@@ -109,7 +109,7 @@ class Within(Goal):
 
 
 @attrs.frozen
-class Found:
+class SearchResult:
     """What a search came to."""
 
     point: Point | None  # the best that meets the goal; None if none does
@@ -129,7 +129,7 @@ def search(
     run: Callable[[Settings], Point],
     *,
     longest: float = 600.0,
-) -> Found:
+) -> SearchResult:
     """Look for `goal` among the values of `axes`, and beyond the finest if need be.
 
     A scheme is a choice of all but the refining axis. The one in the middle, and those that differ
@@ -152,7 +152,7 @@ def search(
             break
         book.note(wanted, run(book.settings(wanted)))
     best = book.best(goal)
-    return Found(best, list(book.points.values()), book.sure(goal, best))
+    return SearchResult(best, list(book.points.values()), book.sure(goal, best))
 
 
 @attrs.define(eq=False)
@@ -252,7 +252,7 @@ class _Book:
     def spacing(self, level: int) -> float:
         value = self.levels[level]
         if value not in self._spacings:
-            self._spacings[value] = varied(self.case, {self.refining: value}).resolution
+            self._spacings[value] = with_settings(self.case, {self.refining: value}).resolution
         return self._spacings[value]
 
     def predicted(self, scheme: int, level: int) -> tuple[float, float]:
@@ -376,10 +376,10 @@ def _prolonged(case: Case, name: str, levels: Sequence[Any]) -> Any:
         guesses = [last * last / before]
     else:
         return None
-    finest = varied(case, {name: last}).resolution
+    finest = with_settings(case, {name: last}).resolution
     for guess in guesses:
         try:
-            if varied(case, {name: guess}).resolution < finest:
+            if with_settings(case, {name: guess}).resolution < finest:
                 return guess
         except SceneError:
             continue

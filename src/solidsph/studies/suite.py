@@ -19,8 +19,8 @@ from solidsph.registry.construct import construct
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Measurement, Trial
-from solidsph.studies.case_run import FINISHED, SceneRun, opened, run_scenes
-from solidsph.studies.varied import varied
+from solidsph.studies.case_run import FINISHED, SceneRun, open_records, run_scenes
+from solidsph.studies.variant import with_settings
 
 # Of the energy in play: beyond it energy comes from nowhere.
 RESIDUAL = 1e-3
@@ -67,7 +67,7 @@ def trials(names: Sequence[str] = ()) -> Iterator[tuple[str, str, Case, Trial]]:
             yield name, label, cls(), trial
 
 
-def judged(
+def run_trial(
     name: str,
     label: str,
     case: Case,
@@ -80,7 +80,7 @@ def judged(
     """Run one trial and grade it.
 
     Args:
-        words: other words of its scenes, as `varied` takes them, such as another kernel.
+        words: other words of its scenes, as `with_settings` takes them, such as another kernel.
         brief: whether its short form is enough.
     """
     begun = clock.perf_counter()
@@ -89,10 +89,10 @@ def judged(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # hard cases are what warnings are for
-            wanted = varied(case, _understood(case, settings))
+            wanted = with_settings(case, _understood(case, settings))
             runs = run_scenes(wanted, folder)
         conservative = {name for name, scene in wanted.scenes().items() if _has_energy(scene)}
-        with opened(runs) as records:
+        with open_records(runs) as records:
             residuals = [energy_residual(records[name]) for name in conservative]
             residual = max((one for one in residuals if isfinite(one)), default=residual)
             grade, reason = _graded(runs, wanted.measure(records), residual)

@@ -8,15 +8,15 @@ from contextlib import closing
 
 import attrs
 
-from solidsph.studies.estimate import Estimate
 from solidsph.studies.journal import Journal
-from solidsph.studies.point import Point, together
+from solidsph.studies.point import Point, merge_repeats
+from solidsph.studies.remaining_time import RemainingTime
 from solidsph.studies.runner import Lost, Runner
 from solidsph.studies.task import Task
 
 
 @attrs.frozen
-class Standing:
+class SweepStatus:
     """How far a sweep is."""
 
     total: int  # tasks asked for
@@ -39,16 +39,16 @@ class Standing:
         return self.outcome
 
 
-Watch = Callable[[Standing], None]
+StatusCallback = Callable[[SweepStatus], None]
 """Called before the first task begins, and whenever one has ended."""
 
 
-def unwatched(standing: Standing) -> None:
+def ignore_status(standing: SweepStatus) -> None:
     pass
 
 
 def sweep(
-    tasks: Sequence[Task], runner: Runner, journal: Journal, watch: Watch = unwatched
+    tasks: Sequence[Task], runner: Runner, journal: Journal, watch: StatusCallback = ignore_status
 ) -> Sequence[Point]:
     """Carry out `tasks`, but for those that the journal holds, and write each down as it ends.
 
@@ -68,11 +68,11 @@ def sweep(
         points = dict(journal.points(tasks))
         kept = len(points)
         remaining = {key: task for key, task in wanted.items() if key not in points}
-        estimate = Estimate.of(tasks)
+        estimate = RemainingTime.of(tasks)
         for key, point in points.items():
             estimate.learn(wanted[key], point)
         done: list[Task] = []
-        watch(Standing(len(wanted), kept, 0, estimate.left(0.0, done, list(remaining.values()))))
+        watch(SweepStatus(len(wanted), kept, 0, estimate.left(0.0, done, list(remaining.values()))))
         begun = clock.perf_counter()
         with closing(runner.run(list(remaining.values()))) as outcomes:
             for task, outcome in outcomes:
@@ -86,7 +86,7 @@ def sweep(
                 del remaining[task.key]
                 elapsed = clock.perf_counter() - begun
                 left = estimate.left(elapsed, done, list(remaining.values()))
-                watch(Standing(len(wanted), kept, len(done), left, task, outcome))
+                watch(SweepStatus(len(wanted), kept, len(done), left, task, outcome))
     return _merged(list(wanted.values()), points, lost)
 
 
@@ -98,7 +98,7 @@ def _merged(
         repeats.setdefault(task.configuration, []).append(task)
     return [
         # A repeat that was lost is missing, as long as another was not.
-        together([points[task.key] for task in same if task.key in points])
+        merge_repeats([points[task.key] for task in same if task.key in points])
         if any(task.key in points for task in same)
         else lost[same[0].key].point(same[0])
         for same in repeats.values()

@@ -19,7 +19,7 @@ import numpy as np
 from solidsph.errors import SceneError, SolidsphError
 from solidsph.registry import registry
 from solidsph.studies.case import Case
-from solidsph.studies.varied import varied
+from solidsph.studies.variant import with_settings
 
 
 @final
@@ -28,7 +28,7 @@ class Task:
     """A case to be run with these settings, and which of its repeats it is."""
 
     case: Case
-    settings: Mapping[str, Any] = attrs.field(factory=dict)  # as `varied` takes them
+    settings: Mapping[str, Any] = attrs.field(factory=dict)  # as `with_settings` takes them
     repeat: int = 0
 
     @cached_property
@@ -44,7 +44,7 @@ class Task:
         """
         described = {"case": plain(self.case), "settings": plain(self.settings)}
         with suppress(SolidsphError):  # of refused settings, or scenes with functions in them
-            described["scenes"] = plain(varied(self.case, self.settings).scenes())
+            described["scenes"] = plain(with_settings(self.case, self.settings).scenes())
         described["versions"] = _versions(set(_texts(described)))
         return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()[:32]
 

@@ -17,8 +17,8 @@ from solidsph.studies.runner import Lost
 from solidsph.studies.task import Task
 
 
-def packed(task: Task) -> str:
-    """One line that `unpacked` makes the task of, in any process with the same software.
+def encode_task(task: Task) -> str:
+    """One line that `decode_task` makes the task of, in any process with the same software.
 
     A registered case goes by its name and parameters; any other is pickled, with the places where
     this process looks for modules.
@@ -29,7 +29,7 @@ def packed(task: Task) -> str:
     return json.dumps({"key": task.key, **(_by_name(task) or _pickled(task))})
 
 
-def unpacked(line: str | bytes) -> Task:
+def decode_task(line: str | bytes) -> Task:
     """The task of that line.
 
     Raises:
@@ -49,14 +49,14 @@ def unpacked(line: str | bytes) -> Task:
     return task
 
 
-def told(outcome: Point | Lost) -> str:
+def encode_outcome(outcome: Point | Lost) -> str:
     """One line that `heard` understands."""
     if isinstance(outcome, Lost):
         return json.dumps({"lost": outcome.cause})
     return json.dumps({"point": to_json(outcome)})
 
 
-def heard(line: str, task: Task) -> Point | Lost:
+def decode_outcome(line: str, task: Task) -> Point | Lost:
     """What came of `task`, from the line that `told` made of it."""
     table = json.loads(line)
     if "lost" in table:

@@ -13,7 +13,7 @@ _PREFIX = "solidsph-scratch-"
 _YOUNG = 60.0  # a folder may not be locked yet [s]
 
 
-class Scratch:
+class ScratchFolder:
     """A folder that is removed by `close`, or else, after a kill, by whoever makes the next one."""
 
     def __init__(self) -> None:

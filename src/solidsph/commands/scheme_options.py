@@ -181,7 +181,7 @@ def facts(found: Certificate) -> dict[str, Any]:
 
 def confirmations(found: Certificate) -> list[list[Any]]:
     """Rows of what runs give beside what is predicted."""
-    from solidsph.studies.confirm import amplification, measured_growth
+    from solidsph.studies.certificate_runs import amplification, measured_growth
 
     rows: list[list[Any]] = []
     if found.growing:

@@ -13,7 +13,7 @@ from solidsph.errors import SolidsphError
 from solidsph.studies.case_run import FINISHED
 from solidsph.studies.point import Point
 from solidsph.studies.task import Task
-from solidsph.studies.varied import varied
+from solidsph.studies.variant import with_settings
 
 # Of time with one over the spacing, as long as no two spacings have been timed: particles and
 # steps in two dimensions.
@@ -22,7 +22,7 @@ _STEEPEST = 6.0  # a fit to two noisy times may say anything
 
 
 @attrs.frozen
-class Estimate:
+class RemainingTime:
     """How long tasks take, from those that have been timed.
 
     Known of a task is its spacing; times follow a power of it, fitted to what is finished. Other
@@ -33,7 +33,7 @@ class Estimate:
     times: dict[str, list[float]] = attrs.field(factory=dict)  # of configurations [s]
 
     @classmethod
-    def of(cls, tasks: Sequence[Task]) -> Estimate:
+    def of(cls, tasks: Sequence[Task]) -> RemainingTime:
         """One that knows of no times yet."""
         first = {task.configuration: task for task in tasks}
         return cls({name: _spacing(task) for name, task in first.items()})
@@ -94,6 +94,6 @@ class Estimate:
 
 def _spacing(task: Task) -> float:
     try:
-        return varied(task.case, task.settings).resolution
+        return with_settings(task.case, task.settings).resolution
     except (SolidsphError, ValueError):
         return inf  # refused settings, or no particles

@@ -17,7 +17,7 @@ from solidsph.scene.scene_data import ImposedScene, PartLike
 from solidsph.studies.case import Case, Measurement
 
 
-def varied(case: Case, settings: Mapping[str, Any]) -> Case:
+def with_settings(case: Case, settings: Mapping[str, Any]) -> Case:
     """`case` with other values of its parameters, or of words that any scene has.
 
     Args:
@@ -44,12 +44,12 @@ def varied(case: Case, settings: Mapping[str, Any]) -> Case:
         case = cls(**{**parameters, **{k: v for k, v in settings.items() if k in own}})
     except (TypeError, ValueError) as cause:
         raise SceneError(f"{case.title!r}: {cause}") from None
-    return Varied(case, words) if words else case
+    return Variant(case, words) if words else case
 
 
 @final
 @attrs.frozen
-class Varied(Case):
+class Variant(Case):
     """A case, its scenes changed before they are run."""
 
     of: Case

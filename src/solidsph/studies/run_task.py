@@ -1,4 +1,4 @@
-"""python -m solidsph.studies.one_point: the process that carries out one task.
+"""python -m solidsph.studies.run_task: the process that carries out one task.
 
 The task is the first line of the standard input, its outcome the only line of the standard output.
 The input stays open for as long as anyone waits for the outcome.
@@ -12,9 +12,9 @@ import select
 import signal
 import sys
 
-from solidsph.studies.packing import told, unpacked
 from solidsph.studies.point import Point
-from solidsph.studies.runner import Lost, tried
+from solidsph.studies.runner import Lost, run_task
+from solidsph.studies.task_lines import decode_task, encode_outcome
 
 
 def main() -> None:
@@ -23,7 +23,7 @@ def main() -> None:
     os.dup2(2, 1)  # whatever a run prints goes elsewhere
     line = sys.stdin.buffer.readline()
     _end_with_the_other_end(0)
-    text = told(_outcome(line)).encode("ascii") + b"\n"
+    text = encode_outcome(_outcome(line)).encode("ascii") + b"\n"
     while text:
         text = text[os.write(answer, text) :]
     sys.stderr.flush()
@@ -32,10 +32,10 @@ def main() -> None:
 
 def _outcome(line: bytes) -> Point | Lost:
     try:
-        task = unpacked(line)
+        task = decode_task(line)
     except Exception as cause:
         return Lost(f"{type(cause).__name__}: {cause}")
-    return tried(task)
+    return run_task(task)
 
 
 def _end_with_the_other_end(pipe: int) -> None:
