@@ -11,7 +11,7 @@ import pandas
 import pytest
 
 from solidsph import SceneError
-from solidsph.commands.cost import seconds
+from solidsph.commands.cost_options import seconds
 from solidsph.scene.scene import Scene
 from solidsph.studies.cost import SweepSetup, default_settings, find_best, frontier
 from solidsph.studies.runner import Inline

@@ -175,7 +175,7 @@ def test_the_limit_and_order_of_a_power_law_are_found(
 
 def test_what_may_not_be_extrapolated_says_so() -> None:
     h = [4.0, 2.0, 1.0]
-    assert "swing" in extrapolate(h, [1.0, 1.2, 1.1]).warning
+    assert "oscillate" in extrapolate(h, [1.0, 1.2, 1.1]).warning
     assert "asymptotic range" in extrapolate(h, [1.0, 1.1, 1.3]).warning
     assert "asymptotic range" in extrapolate([8.0, *h], [0.0, 0.6, 0.95, 0.99]).warning
     assert "nothing can be observed" in extrapolate(h, [1.0, 1.0, 1.0]).warning

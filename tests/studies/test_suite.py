@@ -78,7 +78,9 @@ def test_a_trial_fails_without_what_it_owes_its_stability_to(
 ) -> None:
     one = named(name, label)
     assert run_trial(*one, tmp_path / "with", brief=True).grade is Grade.STABLE
-    assert run_trial(*one, tmp_path / "without", brief=True, words=words).grade is not Grade.STABLE
+    assert (
+        run_trial(*one, tmp_path / "without", brief=True, settings=words).grade is not Grade.STABLE
+    )
 
 
 @attrs.frozen
@@ -127,7 +129,7 @@ def test_the_command(tmp_path: Path) -> None:
     assert {row["expected"] for row in listed} >= {"stable", "fails"}
     brief = solidsph("stability", "inside-out", "stretched-bar", "--brief", cwd=tmp_path)
     assert brief.returncode == 0, brief.stdout
-    assert "as expected, those that must fail included" in brief.stdout
+    assert "as expected, including the trials that must fail" in brief.stdout
     assert (tmp_path / "results/stability/suite.png").exists()
     updated = ("--formulation", "updated-lagrangian", "--brief", "--json")
     surprised = solidsph("stability", "stretched-bar", *updated, cwd=tmp_path)

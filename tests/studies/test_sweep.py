@@ -667,6 +667,6 @@ def test_a_scheduler_that_goes_ends_the_sweep_and_not_what_is_finished(tmp_path:
             if standing.done == 1:
                 cluster.close()
 
-        with pytest.raises(SceneError, match="is gone; what is finished is kept"):
+        with pytest.raises(SceneError, match="is gone; finished points are kept"):
             sweep(tasks, Cluster(cluster.scheduler_address, HANG), journal, close)
     assert len(journal.points(tasks)) == 1

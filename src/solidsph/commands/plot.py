@@ -6,29 +6,26 @@ from pathlib import Path
 
 import click
 
-from solidsph.commands.console import say, show_json
+from solidsph.commands.console import present
+from solidsph.commands.options import json_option, output_option
 
 
 @click.command()
-@click.argument("result", type=click.Path(path_type=Path))
+@click.argument("result", metavar="RECORD", type=click.Path(path_type=Path))
+@output_option("Folder for the pictures.  [default: that of the record]")
 @click.option(
-    "--output", type=click.Path(path_type=Path), help="Folder.  [default: beside the record]"
+    "--field",
+    metavar="NAME",
+    help="Field that colours the body.  [default: the largest principal stress]",
 )
-@click.option(
-    "--field", metavar="NAME", help="What to colour by.  [default: the largest principal stress]"
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
+@json_option
 def plot(result: Path, output: Path | None, field: str | None, as_json: bool) -> None:
-    """Draw a record: the motion or the deformed body with its stress or another field, and the
-    energies."""
+    """Draw a record: the motion or the deformed body, coloured by a field, and the energies."""
     from solidsph.results.pictures import draw
     from solidsph.results.record import Record
 
     with Record(result) as record:
         chosen = {} if field is None else {"field": field}
-        paths = draw(record, output or result.parent, result.stem, **chosen)
-    if as_json:
-        show_json({"record": str(result), "pictures": [str(path) for path in paths]})
-        return
-    for path in paths:
-        say(f"picture: {path}")
+        paths = [str(p) for p in draw(record, output or result.parent, result.stem, **chosen)]
+    facts = {"record": str(result), "pictures": paths}
+    present(facts, [f"picture: {path}" for path in paths], as_json=as_json)

@@ -1,100 +1,86 @@
-"""Receipts as `solidsph run` shows them."""
+"""Receipts of effects as tables of `solidsph run`."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import attrs
 
-from solidsph.commands.console import say, show_table
-from solidsph.model.particles import State
+from solidsph.commands.console import Table
 from solidsph.run.energy import KINETIC, STRAIN
+from solidsph.run.outcome import FINISHED
 from solidsph.simulation import Simulation
 from solidsph.studies.case import Case
-from solidsph.studies.receipts import FINISHED, LARGEST, Receipts, case_changes, percent, receipts
+from solidsph.studies.receipts import (
+    LARGEST,
+    Receipts,
+    case_changes,
+    percent,
+    receipts,
+    short_name,
+)
+
+_TITLE = "receipts: cost, work and influence of each effect"
 
 
-def of_scene(simulation: Simulation, end: State, of: Sequence[str]) -> Receipts:
-    """Of a scene that has been run to `end`."""
-    return receipts(simulation, end=end, of=of)
-
-
-def of_case(case: Case, of: Sequence[str]) -> dict[str, Any]:
-    """Of every scene of a case that has effects, and how what it measures changes without them."""
-    scenes = {}
-    for name, scene in case.scenes().items():
-        if scene.effects:
-            scenes[name] = attrs.asdict(receipts(Simulation.builder(scene).build(), of=of))
+def case_receipts(case: Case, of: Sequence[str]) -> dict[str, Any]:
+    """Receipts of every scene of a case that has effects, and the changes of its measurements."""
+    scenes = {
+        name: attrs.asdict(receipts(Simulation.builder(scene).build(), of=of))
+        for name, scene in case.scenes().items()
+        if scene.effects
+    }
     return {"scenes": scenes, "measurements": case_changes(case)}
 
 
-def show_receipts(found: Receipts, of: Sequence[str]) -> None:
-    """A table, and a sentence for each."""
-    if not found.each:
-        say("receipts: the scene names no effect")
+def receipts_text(result: Receipts, of: Sequence[str]) -> Iterator[Table | str]:
+    """Table of the receipts of a scene, and a sentence for each."""
+    if not result.each:
+        yield "receipts: the scene names no effect"
         return
-    shown = [*of, LARGEST, KINETIC, STRAIN]
-    rows = []
-    for one in found.each:
-        rows.append(
-            [
-                one.label,
-                _share(one.share),
-                one.work,
-                *(_percent(one.changes.get(name)) for name in shown),
-                "" if one.outcome == FINISHED else one.outcome,
-            ]
-        )
-    heads = [name.partition("=" if "@" in name else " [")[0] for name in shown]
-    show_table(
-        "receipts: what each effect took, did, and changed",
-        ["effect", "of the time", "work [J]", *heads, "without it"],
-        rows,
+    quantities = [*of, LARGEST, KINETIC, STRAIN]
+    columns = ["effect", "of the time", "work [J]", *map(short_name, quantities), "without it"]
+    yield Table(_TITLE, columns, [_row(attrs.asdict(one), quantities) for one in result.each])
+    yield from (receipt.line for receipt in result.each)
+    size = "at full size" if result.coarser == 1.0 else f"at {result.coarser:g} times the spacing"
+    yield (
+        "(time: steps of this scene with and without the effect, in turns; changes and work: runs "
+        f"{size}, {result.particles} particles, {result.duration:g} s)"
     )
-    for one in found.each:
-        say(one.line)
-    size = "at full size" if found.coarser == 1.0 else f"at {found.coarser:g} times the spacing"
-    say(
-        f"(time: steps of this scene with and without it, in turns; changes and work: runs {size}, "
-        f"{found.particles} particles, {found.duration:g} s)"
-    )
-    if found.outcome != FINISHED:
-        say(f"note: at reduced size the run with all effects {found.outcome}")
+    if result.outcome != FINISHED:
+        yield f"note: at reduced size the run with all effects {result.outcome}"
 
 
-def show_case_receipts(found: dict[str, Any]) -> None:
-    """Tables: the effects of each scene, and what the case measures."""
+def case_receipts_text(facts: Mapping[str, Any]) -> Iterator[Table | str]:
+    """Tables of `case_receipts`."""
     rows = [
-        [
-            scene,
-            one["label"],
-            _share(one["share"]),
-            one["work"],
-            _percent(one["changes"].get(LARGEST)),
-            "" if one["outcome"] == FINISHED else one["outcome"],
-        ]
-        for scene, own in found["scenes"].items()
-        for one in own["each"]
+        [scene, *_row(receipt, [LARGEST])]
+        for scene, result in facts["scenes"].items()
+        for receipt in result["each"]
     ]
     if not rows:
-        say("receipts: no scene of this case names an effect")
+        yield "receipts: no scene of this case names an effect"
         return
-    heads = ["scene", "effect", "of the time", "work [J]", "largest displacement", "without it"]
-    show_table("receipts: what each effect took, did, and changed", heads, rows)
+    columns = ["effect", "of the time", "work [J]", short_name(LARGEST), "without it"]
+    yield Table(_TITLE, ["scene", *columns], rows)
     changes = [
-        [label, quantity, _percent(change)]
-        for label, own in found["measurements"].items()
-        for quantity, change in own.items()
+        [label, quantity, percent(change)]
+        for label, quantities in facts["measurements"].items()
+        for quantity, change in quantities.items()
     ]
     if changes:
-        show_table("changed without it", ["effect", "measured", "by"], changes)
+        yield Table("changed without it", ["effect", "measurement", "by"], changes)
 
 
-def _percent(part: float | None) -> str:
-    return "" if part is None else percent(part)
-
-
-def _share(part: float | None) -> str:
-    # What is less than the noise of the clock may come out below nothing.
-    return _percent(None if part is None else max(0.0, part))
+def _row(receipt: Mapping[str, Any], quantities: Sequence[str]) -> list[Any]:
+    share, outcome = receipt["share"], receipt["outcome"]
+    changes = (receipt["changes"].get(name) for name in quantities)
+    return [
+        receipt["label"],
+        # A share below the noise of the clock may be negative.
+        "" if share is None else percent(max(0.0, share)),
+        receipt["work"],
+        *("" if change is None else percent(change) for change in changes),
+        "" if outcome == FINISHED else outcome,
+    ]

@@ -3,35 +3,29 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
-from solidsph.commands.console import ProgressObserver, progress, say, show_json, show_table
+from solidsph.commands.console import Table, present, progress, progress_observers
+from solidsph.commands.options import json_option, output_option, quiet_option
 from solidsph.registry import registry
 
 
 @click.command()
 @click.argument("wanted", metavar="[FIGURE]...", nargs=-1)
-@click.option(
-    "--list", "listed", is_flag=True, help="List figures and passages, and what shows them."
-)
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path),
-    default=Path("results/reproduce"),
-    show_default=True,
-    help="Folder for pictures, data and records.",
-)
+@click.option("--list", "listed", is_flag=True, help="List figures and passages with their cases.")
+@output_option("Folder for pictures, data and records.", "results/reproduce")
 @click.option(
     "--page",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="Write a page of text and pictures to this file too.",
+    help="Also write a Markdown page of text and pictures to this file.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
-@click.option("--quiet", is_flag=True, help="Show no progress.")
+@json_option
+@quiet_option
 def reproduce(
     wanted: tuple[str, ...],
     listed: bool,
@@ -40,73 +34,57 @@ def reproduce(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Reproduce the figures of Ismail & Reddy, and answer what they ask for: all, or those named,
-    such as fig-11."""
+    """Reproduce figures of Ismail & Reddy, such as fig-11, and answer the questions that its
+    passages raise. Without names: all of them."""
     from solidsph.studies.reproduce import figures
-    from solidsph.studies.reproduce import reproduce as solve
+    from solidsph.studies.reproduce import reproduce as run_cases
 
     if listed:
-        _list(figures(), as_json)
+        known = [
+            {"figure": figure, "case": case, "what": registry.load("cases", case).title}
+            for figure, case in figures().items()
+        ]
+        columns = {"figure": "figure", "case": "case", "title": "what"}
+        present({"figures": known}, [Table.of("figures", known, columns)], as_json=as_json)
         return
     begun = clock.perf_counter()
     with progress(not (as_json or quiet)) as display:
-
-        def begin(name: str, simulation: Any) -> Sequence[object]:
-            return [ProgressObserver(display, name, simulation)] if display else []
-
-        made = solve(wanted, output, begin)
+        result = run_cases(wanted, output, partial(progress_observers, display))
     seconds = clock.perf_counter() - begun
     if page is not None:
         from solidsph.studies.gallery import write_gallery
 
-        write_gallery(made, page)
-    rows = [
-        {
-            "case": case,
-            "quantity": m.quantity,
-            "paper": m.paper,
-            "theory": m.reference,
-            "measured": m.value,
-            "unit": m.unit,
-            "error": m.error,
-            "as expected": m.passed,
-        }
-        for case, result in made.results.items()
-        for m in result.measurements
-    ]
-    tables = [path for result in made.results.values() for path in result.tables]
-    if as_json:
-        show_json(
+        write_gallery(result, page)
+    facts = {
+        "passed": result.passed,
+        "wall time [s]": seconds,
+        "measurements": [
             {
-                "passed": made.passed,
-                "wall time [s]": seconds,
-                "measurements": rows,
-                "pictures": [str(path) for path in made.pictures],
-                "tables": [str(path) for path in tables],
-                "contact sheet": None if made.sheet is None else str(made.sheet),
+                "case": case,
+                "quantity": m.quantity,
+                "paper": m.paper,
+                "theory": m.reference,
+                "measured": m.value,
+                "unit": m.unit,
+                "error": m.error,
+                "as expected": m.passed,
             }
-        )
-    else:
-        show_table(
-            "what the paper says, what theory says, what is measured",
-            ["case", "quantity", "paper", "theory", "measured", "unit", "error", "as expected"],
-            [list(row.values()) for row in rows],
-        )
-        for path in (*made.pictures, *tables):
-            say(str(path))
-        say(f"all pictures at once: {made.sheet}")
-        say(f"{len(made.results)} cases in {seconds:.0f} s")
-        say("verdict: " + ("as the sources predict" if made.passed else "NOT as predicted"))
-    if not made.passed:
-        raise SystemExit(1)
+            for case, outcome in result.results.items()
+            for m in outcome.measurements
+        ],
+        "pictures": [str(path) for path in result.pictures],
+        "tables": [str(path) for each in result.results.values() for path in each.tables],
+        "contact sheet": None if result.sheet is None else str(result.sheet),
+    }
+    text = _text(facts, len(result.results))
+    present(facts, text, as_json=as_json, passed=result.passed)
 
 
-def _list(known: Any, as_json: bool) -> None:
-    rows = [
-        {"figure": figure, "case": case, "what": registry.load("cases", case).title}
-        for figure, case in known.items()
-    ]
-    if as_json:
-        show_json({"figures": rows})
-        return
-    show_table("figures", ["figure", "case", "what"], [list(row.values()) for row in rows])
+def _text(facts: Mapping[str, Any], cases: int) -> Iterator[Table | str]:
+    rows: Sequence[Mapping[str, Any]] = facts["measurements"]
+    columns = ("case", "quantity", "paper", "theory", "measured", "unit", "error", "as expected")
+    yield Table.of("the paper, theory and measurement", rows, columns)
+    yield from (*facts["pictures"], *facts["tables"])
+    yield f"all pictures on one sheet: {facts['contact sheet']}"
+    yield f"{cases} cases in {facts['wall time [s]']:.0f} s"
+    yield "verdict: " + ("as the sources predict" if facts["passed"] else "NOT as predicted")

@@ -1,4 +1,4 @@
-"""A report: a sweep as one page of HTML that needs nothing but a browser."""
+"""Report of a sweep: one HTML page that needs only a browser."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from typing import Any, final
 import attrs
 
 from solidsph.errors import SolidsphError
+from solidsph.run.outcome import FINISHED
 from solidsph.studies.case import Case
-from solidsph.studies.case_run import FINISHED
-from solidsph.studies.frontier import Frontier
+from solidsph.studies.frontier import AS_IT_IS, Frontier
 from solidsph.studies.point import Point, format_setting
 from solidsph.studies.report_figures import EXPENSES, TIME, Figures, drawable, library
 from solidsph.studies.variant import with_settings
 
 
 def write_report(made: Frontier, case: Case, path: Path, *, title: str | None = None) -> None:
-    """Write a page with the plots, a table of all points and the scenes of each.
+    """Write a page with plots, a table of all points and the scenes of each.
 
-    It asks nothing of any network: Plotly's script is in it, about 5 MB.
+    It contains Plotly's script, about 5 MB, and needs no network.
 
     Args:
         made: a sweep over `case`.
-        case: whose scenes are shown.
-        path: of the page, an HTML file.
-        title: by default the case's.
+        case: its scenes are shown.
+        path: of the HTML file.
+        title: by default that of the case.
 
     Raises:
         SceneError: Plotly is not installed.
@@ -45,27 +45,27 @@ def write_report(made: Frontier, case: Case, path: Path, *, title: str | None = 
 
 @attrs.frozen
 class Column:
-    """Of the table: a heading, and a cell of every point."""
+    """Column of the table: a heading, and a cell for every point."""
 
     heading: str
     cells: Sequence[Cell]
 
     @property
     def numeric(self) -> bool:
-        """Whether it holds numbers only."""
+        """Whether all cells are numbers or empty."""
         return all(cell.number is not None or not cell.text for cell in self.cells)
 
 
 @attrs.frozen
 class Cell:
-    """What is read, and the number it is sorted by, if it is one."""
+    """Text of a cell, and the number that it is sorted by."""
 
     text: str
     number: float | None = None
 
     @classmethod
     def of(cls, value: Any, form: str = ".3g") -> Cell:
-        """A number in this form, none if it is not finite, or else words."""
+        """Cell of a number in this format, empty if it is not finite, or of any other value."""
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return cls(format_setting(value))
         if not isfinite(value):
@@ -84,13 +84,13 @@ class _Page:
         folder = files("solidsph.studies") / "report_page"
         parts = {name: (folder / name).read_text("utf-8") for name in ("page.css", "page.js")}
         points, finished = len(self.made), len(self.made.finished())
-        quantity = next((p.quantity for p in self.made.points if p.quantity), "")
+        quantity = self.made.quantity
         return Template((folder / "page.html").read_text("utf-8")).substitute(
             title=escape(self.title or self.case.title),
             sentence=escape(self.made.sentence()),
             facts=escape(
                 f"{points} configurations, {finished} finished"
-                + (f"; the error is that of: {quantity}" if quantity else "")
+                + (f"; error of: {quantity}" if quantity else "")
                 + f"; reference: {self.case.source}"
             ),
             version=escape(version("solidsph")),
@@ -110,7 +110,7 @@ class _Page:
         return {
             "expenses": [
                 {
-                    "front": figures.numbers(self.made.front(expense.of)),
+                    "front": self.made.numbers(self.made.front(expense.of)),
                     "figures": [figures.against(expense), figures.against_spacing(expense)],
                 }
                 if expense.fits(self.made)
@@ -119,7 +119,7 @@ class _Page:
             ],
             "points": [
                 {
-                    "label": point.label() or "as it is",
+                    "label": point.label() or AS_IT_IS,
                     "brief": _brief(point),
                     "places": _places(point),
                     **self._scenes(number, point),
@@ -129,20 +129,24 @@ class _Page:
         }
 
     def _scenes(self, number: int, point: Point) -> Mapping[str, Any]:
-        """Of one point: texts of TOML with names for files; or why there is none."""
+        """Scenes of one point as TOML with file names, or the reason why there is none."""
         try:
             scenes = with_settings(self.case, point.settings).scenes()
         except SolidsphError as cause:
             return {"scenes": [], "note": f"There is no scene: {cause}"}
         if not scenes:
-            return {"scenes": [], "note": "This case runs no scene: it computes its result itself."}
+            return {
+                "scenes": [],
+                "note": "This case runs no scene: it computes its result.",
+            }
         written = []
         for name, scene in scenes.items():
-            one = {"name": name, "file": f"{re.sub(r'[^A-Za-z0-9_-]+', '-', name)}-{number}.toml"}
+            file = f"{re.sub(r'[^A-Za-z0-9_-]+', '-', name)}-{number}.toml"
             try:
-                written.append({**one, "toml": scene.to_toml()})
+                content = {"toml": scene.to_toml()}
             except SolidsphError as cause:
-                written.append({**one, "why": f"This scene cannot be written: {cause}"})
+                content = {"why": f"This scene cannot be written: {cause}"}
+            written.append({"name": name, "file": file, **content})
         return {"scenes": written, "note": ""}
 
     def _choices(self) -> Iterator[str]:
@@ -160,8 +164,8 @@ class _Page:
         if not exact:
             return ""
         return (
-            f"<p>{len(exact)} of them have an error of exactly 0 and are in the table only: a "
-            "logarithmic axis has no place for them.</p>"
+            f"<p>{len(exact)} of them have an error of exactly 0, which a logarithmic axis cannot "
+            "show; they are only in the table.</p>"
         )
 
     def _table(self) -> str:
@@ -170,7 +174,7 @@ class _Page:
             f'<th scope="col"{_numeric(c)}><button type="button">{escape(c.heading)}</button></th>'
             for c in columns
         )
-        front = self._front()
+        front = self.made.numbers(self.made.front())
         rows = []
         for number in range(len(self.made)):
             cells = "".join(
@@ -183,7 +187,7 @@ class _Page:
         return f"<thead><tr>{headings}</tr></thead>\n<tbody>\n{body}\n</tbody>"
 
     def _columns(self) -> Sequence[Column]:
-        points, front = self.made.points, self._front()
+        points, front = self.made.points, self.made.numbers(self.made.front())
         names = dict.fromkeys(name for point in points for name in point.settings)
         several = any(len(point.seconds) > 1 for point in points)
         return [
@@ -203,19 +207,16 @@ class _Page:
             _column("outcome", [_outcome(p).splitlines()[0] for p in points]),
         ]
 
-    def _front(self) -> set[int]:
-        return set(Figures(self.made).numbers(self.made.front()))
-
     def _orders(self) -> str:
         orders = self.made.orders()
         if not orders:
             return "<p>No scheme has two spacings that finished.</p>"
         rows = "\n".join(
-            f'<tr><th scope="row">{escape(_scheme(one.settings))}</th>'
-            f'<td class="number">{_order(one.in_spacing)}</td>'
-            f'<td class="number">{_order(one.in_time)}</td>'
-            f"<td>{'no' if one.crosses else 'yes'}</td></tr>"
-            for one in orders
+            f'<tr><th scope="row">{escape(order.label)}</th>'
+            f'<td class="number">{_order(order.in_spacing)}</td>'
+            f'<td class="number">{_order(order.in_time)}</td>'
+            f"<td>{'no' if order.crosses else 'yes'}</td></tr>"
+            for order in orders
         )
         return (
             '<div class="wide" tabindex="0" role="region" aria-label="orders"><table id="orders">\n'
@@ -229,7 +230,7 @@ class _Page:
         if not failed:
             return "<p>Every configuration finished.</p>"
         items = "\n".join(
-            f"<li>{n}, {escape(p.label() or 'as it is')}: <pre>{escape(_outcome(p))}</pre></li>"
+            f"<li>{n}, {escape(p.label() or AS_IT_IS)}: <pre>{escape(_outcome(p))}</pre></li>"
             for n, p in failed
         )
         return f'<ul id="failures">\n{items}\n</ul>'
@@ -240,7 +241,7 @@ def _column(heading: str, values: Sequence[Any], form: str = ".3g") -> Column:
 
 
 def _repeats(point: Point) -> Cell:
-    """From the quickest to the slowest, sorted by the quickest."""
+    """Range of repeats, sorted by the quickest."""
     quickest, slowest = min(point.seconds), max(point.seconds)
     return Cell(f"{quickest:.3g} to {slowest:.3g}", quickest) if isfinite(slowest) else Cell("")
 
@@ -248,7 +249,7 @@ def _repeats(point: Point) -> Cell:
 def _td(column: Column, cell: Cell, number: int | None) -> str:
     sort = "" if cell.number is None else f' data-number="{cell.number!r}"'
     text = escape(cell.text)
-    if number is not None:  # what the keyboard comes to, and says whose scene it shows
+    if number is not None:  # reached by the keyboard; its label says whose scene it shows
         text = f'<button type="button" aria-label="scene of configuration {text}">{text}</button>'
     return f"<td{_numeric(column)}{sort}>{text}</td>"
 
@@ -270,7 +271,7 @@ def _brief(point: Point) -> str:
 
 
 def _places(point: Point) -> Mapping[str, Any] | None:
-    """Where a point is drawn, across for each cost; None if it is not."""
+    """Coordinates of a point for each cost; None if it is not drawn."""
     if not drawable(point):
         return None
     return {
@@ -280,18 +281,11 @@ def _places(point: Point) -> Mapping[str, Any] | None:
     }
 
 
-def _scheme(settings: Mapping[str, Any]) -> str:
-    return (
-        ", ".join(f"{name} {format_setting(value)}" for name, value in settings.items())
-        or "as it is"
-    )
-
-
 def _order(value: float) -> str:
     return f"{value:.2f}" if isfinite(value) else "none"
 
 
 def _embedded(data: Mapping[str, Any]) -> str:
-    """`data` as JSON that ends no element of HTML early, whatever texts it holds."""
+    """`data` as JSON whose texts cannot end an HTML element."""
     text = json.dumps(data, allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

@@ -1,7 +1,7 @@
-"""python -m solidsph.studies.run_task: the process that carries out one task.
+"""python -m solidsph.studies.run_task: the process of one task.
 
 The task is the first line of the standard input, its outcome the only line of the standard output.
-The input stays open for as long as anyone waits for the outcome.
+The process ends when its input is closed.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from solidsph.studies.task_lines import decode_task, encode_outcome
 
 
 def main() -> None:
-    """Carry out one task, then leave at once."""
+    """Run one task, then exit at once."""
     answer = os.dup(1)
-    os.dup2(2, 1)  # whatever a run prints goes elsewhere
+    os.dup2(2, 1)  # other output of the run goes to the standard error
     line = sys.stdin.buffer.readline()
-    _end_with_the_other_end(0)
+    _exit_when_closed(0)
     text = encode_outcome(_outcome(line)).encode("ascii") + b"\n"
     while text:
         text = text[os.write(answer, text) :]
     sys.stderr.flush()
-    os._exit(0)  # nothing that goes wrong from here on matters
+    os._exit(0)  # errors of the shutdown do not matter
 
 
 def _outcome(line: bytes) -> Point | Lost:
@@ -38,15 +38,15 @@ def _outcome(line: bytes) -> Point | Lost:
     return run_task(task)
 
 
-def _end_with_the_other_end(pipe: int) -> None:
-    """Die as soon as whoever holds the other end of `pipe` closes it, or dies.
+def _exit_when_closed(pipe: int) -> None:
+    """End this process as soon as the other end of `pipe` is closed.
 
-    By a signal, because a compiled loop lets no thread of Python run for as long as it takes.
+    A signal does it, because no thread of Python runs during a compiled loop.
     """
-    signal.signal(signal.SIGIO, signal.SIG_DFL)  # which is to end the process
+    signal.signal(signal.SIGIO, signal.SIG_DFL)  # the default is to end the process
     fcntl.fcntl(pipe, fcntl.F_SETOWN, os.getpid())
     fcntl.fcntl(pipe, fcntl.F_SETFL, fcntl.fcntl(pipe, fcntl.F_GETFL) | os.O_ASYNC)
-    if select.select([pipe], [], [], 0.0)[0]:  # it has been closed before the signal was asked for
+    if select.select([pipe], [], [], 0.0)[0]:  # closed before the signal was set up
         os._exit(1)
 
 

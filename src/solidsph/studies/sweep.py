@@ -1,4 +1,4 @@
-"""Sweeping over the configurations of a case: what is finished stays finished."""
+"""Sweeps over the configurations of a case, which keep what is finished."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from solidsph.studies.task import Task
 
 @attrs.frozen
 class SweepStatus:
-    """How far a sweep is."""
+    """Progress of a sweep."""
 
     total: int  # tasks asked for
     kept: int  # of them finished by earlier sweeps
     done: int  # of them ended in this one
-    seconds_left: float | None  # wall time [s]; None as long as nothing tells it
-    task: Task | None = None  # the one that has just ended
-    outcome: Point | Lost | None = None  # what came of it
+    seconds_left: float | None  # wall time [s]; None if unknown
+    task: Task | None = None  # that has just ended
+    outcome: Point | Lost | None = None  # of that task
 
     @property
     def remaining(self) -> int:
@@ -33,14 +33,14 @@ class SweepStatus:
 
     @property
     def point(self) -> Point | None:
-        """What came of that task as a point, a failed one if it was lost."""
+        """Point of that task; a failed one if it was lost."""
         if isinstance(self.outcome, Lost):
             return None if self.task is None else self.outcome.point(self.task)
         return self.outcome
 
 
 StatusCallback = Callable[[SweepStatus], None]
-"""Called before the first task begins, and whenever one has ended."""
+"""Called before the first task begins, and after every task."""
 
 
 def ignore_status(standing: SweepStatus) -> None:
@@ -50,17 +50,17 @@ def ignore_status(standing: SweepStatus) -> None:
 def sweep(
     tasks: Sequence[Task], runner: Runner, journal: Journal, watch: StatusCallback = ignore_status
 ) -> Sequence[Point]:
-    """Carry out `tasks`, but for those that the journal holds, and write each down as it ends.
+    """Run the `tasks` that are not in the journal, and add each to it when it ends.
 
-    It may be killed at any point: the same call goes on from there. A task that was lost, with its
-    process or by a fault of its code, is a failed point, and is tried again by the next sweep.
+    A sweep may be killed at any time; the same call continues it. A task that is lost, because its
+    process died or its code is broken, is a failed point, and is run again by the next sweep.
 
     Returns:
-        One point of all repeats of a configuration, in the order in which the tasks name them.
+        One point of all repeats of each configuration, in the order of the tasks.
 
     Raises:
         RecordError: another sweep is writing to the journal.
-        SceneError: a task cannot be handed to where the runner would carry it out.
+        SceneError: a task cannot be sent to the process that would run it.
     """
     wanted = {task.key: task for task in tasks}
     lost: dict[str, Lost] = {}
@@ -97,7 +97,7 @@ def _merged(
     for task in tasks:
         repeats.setdefault(task.configuration, []).append(task)
     return [
-        # A repeat that was lost is missing, as long as another was not.
+        # Lost repeats are left out if another finished.
         merge_repeats([points[task.key] for task in same if task.key in points])
         if any(task.key in points for task in same)
         else lost[same[0].key].point(same[0])

@@ -1,4 +1,4 @@
-"""Tasks and outcomes as lines of text, to be handed from one process to another."""
+"""Tasks and outcomes as lines of text, to be sent from one process to another."""
 
 from __future__ import annotations
 
@@ -18,22 +18,23 @@ from solidsph.studies.task import Task
 
 
 def encode_task(task: Task) -> str:
-    """One line that `decode_task` makes the task of, in any process with the same software.
+    """Line for `decode_task` in any process with the same software.
 
-    A registered case goes by its name and parameters; any other is pickled, with the places where
-    this process looks for modules.
+    A registered case is sent by name and parameters, any other is pickled, with the module path of
+    this process.
 
     Raises:
-        SceneError: the class of the case belongs to no module, so no other process can find it.
+        SceneError: no other process can import the class of the case, or a parameter of the case
+            cannot be pickled.
     """
     return json.dumps({"key": task.key, **(_by_name(task) or _pickled(task))})
 
 
 def decode_task(line: str | bytes) -> Task:
-    """The task of that line.
+    """Task from a line of `encode_task`.
 
     Raises:
-        SceneError: it is another task here, because the software is not the same.
+        SceneError: its key differs here, because the software is not the same.
     """
     table = json.loads(line)
     if "pickle" in table:
@@ -43,21 +44,21 @@ def decode_task(line: str | bytes) -> Task:
         task = _named(table["named"])
     if task.key != table["key"]:
         raise SceneError(
-            f"{task.case.title!r} is another case where it was to run: solidsph or a plugin is "
-            "there in another version; install the same on both sides"
+            f"{task.case.title!r} is a different case on the worker: solidsph or a plugin has "
+            "another version there; install the same on both sides"
         )
     return task
 
 
 def encode_outcome(outcome: Point | Lost) -> str:
-    """One line that `heard` understands."""
+    """Line for `decode_outcome`."""
     if isinstance(outcome, Lost):
         return json.dumps({"lost": outcome.cause})
     return json.dumps({"point": to_json(outcome)})
 
 
 def decode_outcome(line: str, task: Task) -> Point | Lost:
-    """What came of `task`, from the line that `told` made of it."""
+    """Outcome of `task`, from a line of `encode_outcome`."""
     table = json.loads(line)
     if "lost" in table:
         return Lost(str(table["lost"]))
@@ -65,7 +66,7 @@ def decode_outcome(line: str, task: Task) -> Point | Lost:
 
 
 def _by_name(task: Task) -> dict[str, Any] | None:
-    """None where something would come back as something else."""
+    """Table of the task by names; None if that would not give the same task."""
     try:
         table = {
             "case": describe("cases", task.case),
@@ -92,7 +93,7 @@ def _pickled(task: Task) -> dict[str, Any]:
         content = base64.b64encode(pickle.dumps(task)).decode("ascii")
     except (pickle.PicklingError, TypeError, AttributeError) as cause:
         raise SceneError(
-            f"{task.case.title!r} cannot be handed to another process: {cause}; leave such "
+            f"{task.case.title!r} cannot be sent to another process: {cause}; leave such "
             "values out of its parameters"
         ) from cause
     return {"pickle": content, "path": [place or str(Path.cwd()) for place in sys.path]}
