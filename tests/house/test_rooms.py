@@ -33,7 +33,7 @@ MAY_IMPORT = {
     "costs": "errors interfaces registry engines scene run simulation",
     "studies": "errors maths model interfaces registry scene run results promises simulation costs",
     "testing": "errors maths interfaces registry run promises build simulation",
-    "commands": "errors system model interfaces registry scene run statics results watch advice "
+    "commands": "errors system interfaces registry scene run statics results watch advice "
     "promises simulation resumption costs studies testing",
     "cli": "errors commands",
 }

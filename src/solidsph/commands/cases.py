@@ -9,14 +9,14 @@ import attrs
 import click
 
 from solidsph.commands.console import Table, present
-from solidsph.commands.options import json_option
+from solidsph.commands.options import Output, options
 from solidsph.registry import registry
 
 
 @click.command()
-@json_option
-def cases(as_json: bool) -> None:
-    """List the cases that can be run by name, with their parameters."""
+@options(Output)
+def cases(options: Output) -> None:
+    """List the cases with their parameters."""
     rows = []
     for name in registry.names("cases"):
         cls = registry.load("cases", name)
@@ -26,7 +26,7 @@ def cases(as_json: bool) -> None:
         rows.append(
             {"case": name, "title": cls.title, "source": cls.source, "parameters": parameters}
         )
-    present({"cases": rows}, _text(rows), as_json=as_json)
+    present({"cases": rows}, _text(rows), as_json=options.as_json)
 
 
 def _text(rows: Sequence[Mapping[str, Any]]) -> Iterator[Table | str]:

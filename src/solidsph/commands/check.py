@@ -5,67 +5,61 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import attrs
 import click
 
+from solidsph.commands import certificate_tables as tables
 from solidsph.commands.console import Table, present
-from solidsph.commands.options import json_option, settings_option
-from solidsph.commands.scheme_options import SchemeOptions, scheme_options
+from solidsph.commands.options import Output, flag, option, option_group, options, set_option
+from solidsph.commands.scheme_options import SchemeOptions
 from solidsph.commands.target import parameters
 from solidsph.errors import SceneError
+from solidsph.promises.check import CheckResult
 from solidsph.registry import registry
+from solidsph.studies.certificate import certificate
 
-if TYPE_CHECKING:
-    from solidsph.promises.check import CheckResult
+
+@attrs.frozen
+class _Options(Output):
+    all: bool = flag("Check every installed part, or all of a kind.")
+    kind: str | None = option("Kind of the part, where several kinds have the name.")
+    settings: tuple[str, ...] = set_option("the part, or of the case of the scheme")
+    scheme: SchemeOptions = option_group(SchemeOptions)
+    stretch: str = option(
+        "Stretch of the lattice of a scheme: 1.2, or by axis 1.2,1,1.",
+        default="1",
+        show_default=True,
+    )
+    dimension: int | None = option(
+        "Dimension of that lattice.  [default: 2]", type=click.IntRange(1, 3)
+    )
+    run: bool = flag("Confirm a scheme's certificate by runs.")
 
 
 @click.command()
 @click.argument("name", metavar="[PART]", required=False)
-@click.option(
-    "--all", "everything", is_flag=True, help="Check every installed part, or all of a kind."
-)
-@click.option("--kind", help="Kind of the part, where several kinds have the name.")
-@settings_option
-@scheme_options
-@click.option(
-    "--stretch",
-    default="1",
-    show_default=True,
-    help="Stretch of the lattice of a scheme: 1.2, or by axis 1.2,1,1.",
-)
-@click.option(
-    "--dimension", type=click.IntRange(1, 3), help="Dimension of that lattice.  [default: 2]"
-)
-@click.option("--run", "confirm", is_flag=True, help="Confirm a scheme's certificate by runs.")
-@json_option
-def check(
-    name: str | None,
-    everything: bool,
-    kind: str | None,
-    settings: tuple[str, ...],
-    stretch: str,
-    dimension: int | None,
-    confirm: bool,
-    as_json: bool,
-    **options: Any,
-) -> None:
-    """Check a part by name with the conformance kit of its kind. Or certify a scheme by the waves
-    on its lattice: zero-energy and growing waves, critical step, wave speeds."""
-    scheme = SchemeOptions(**options)
-    if everything:
-        if name is not None or scheme.given:
+@options(_Options)
+def check(name: str | None, options: _Options) -> None:
+    """Check a part, or certify a scheme.
+
+    A part is checked by the conformance kit of its kind. A scheme is certified by the waves on its
+    lattice: zero-energy and growing waves, critical step, wave speeds.
+    """
+    if options.all:
+        if name is not None or options.scheme.given:
             raise SceneError("--all checks every part; leave out the name and the scheme's options")
-        _check_all(kind, as_json)
+        _check_all(options)
     elif name is not None:
-        if scheme.given or dimension is not None:
+        if options.scheme.given or options.dimension is not None:
             raise SceneError(
                 f"{name!r} is a part, but the options name a scheme; check one at a time: leave "
                 "out the part's name, or the scheme's options"
             )
-        _check_part(name, kind, settings, as_json)
-    elif scheme.given or dimension is not None or stretch != "1":
-        _certify(scheme, settings, stretch, dimension or 2, confirm, as_json)
+        _check_part(name, options)
+    elif options.scheme.given or options.dimension is not None or options.stretch != "1":
+        _certify(options)
     else:
         raise SceneError(
             "there is nothing to check; name a part, such as `solidsph check cubic-spline`, "
@@ -74,19 +68,10 @@ def check(
         )
 
 
-def _certify(
-    options: SchemeOptions,
-    settings: Sequence[str],
-    stretch: str,
-    dimension: int,
-    confirm: bool,
-    as_json: bool,
-) -> None:
-    from solidsph.commands import certificate_tables as tables
-    from solidsph.studies.certificate import certificate
-
-    result = certificate(options.build(settings), dimension, _stretch(stretch))
-    confirmed = tables.confirmations(result) if confirm else []
+def _certify(options: _Options) -> None:
+    stretch = _stretch(options.stretch)
+    result = certificate(options.scheme.build(options.settings), options.dimension or 2, stretch)
+    confirmed = tables.confirmations(result) if options.run else []
     good = tables.passed(result) and not any(row[1] == "FAIL" for row in confirmed)
     present(
         {**tables.certificate_facts(result), "confirmed": confirmed},
@@ -94,7 +79,7 @@ def _certify(
             *tables.certificate_text(result, confirmed),
             "certified" if good else "NOT certified: see FAIL above",
         ),
-        as_json=as_json,
+        as_json=options.as_json,
         passed=good,
     )
 
@@ -110,17 +95,17 @@ def _stretch(text: str) -> float | list[float]:
     return stretches[0] if len(stretches) == 1 else stretches
 
 
-def _check_part(name: str, kind: str | None, settings: Sequence[str], as_json: bool) -> None:
+def _check_part(name: str, options: _Options) -> None:
     from solidsph.testing import conformance, example_part, kits
 
-    group = _group_of(name, kind)
+    group = _group_of(name, options.kind)
     if group not in kits():
         raise SceneError(
             f"there is no conformance kit for a {registry.singular(group)}; kits exist for "
             f"{_listed(kits())}"
         )
     try:
-        part = example_part(group, name, **parameters(settings))
+        part = example_part(group, name, **parameters(options.settings))
     except SceneError as cause:
         missing = re.search(r"missing parameter '(\w+)'", str(cause))
         if missing is None:
@@ -144,7 +129,7 @@ def _check_part(name: str, kind: str | None, settings: Sequence[str], as_json: b
         ],
     }
     text = _part_text(facts, part, results)
-    present(facts, text, as_json=as_json, passed=facts["passed"])
+    present(facts, text, as_json=options.as_json, passed=facts["passed"])
 
 
 def _part_text(
@@ -168,12 +153,15 @@ def _verdict(result: CheckResult) -> str:
     return "pass" if result.passed else "FAIL"
 
 
-def _check_all(kind: str | None, as_json: bool) -> None:
+def _check_all(options: _Options) -> None:
     """How many of its checks every part passes."""
     from solidsph.testing import conformance, example_part, kits
 
     rows: list[dict[str, Any]] = []
-    for group in kits() if kind is None else [_group(kind, kits(), "kinds with a kit")]:
+    groups = kits()
+    if options.kind is not None:
+        groups = (_group(options.kind, groups, "kinds with a kit"),)
+    for group in groups:
         for name in registry.names(group):
             results = conformance(group, example_part(group, name))
             rows.append(
@@ -201,7 +189,7 @@ def _check_all(kind: str | None, as_json: bool) -> None:
         ],
     )
     verdict = "all certified" if good else "NOT all certified"
-    present({"passed": good, "parts": rows}, [table, verdict], as_json=as_json, passed=good)
+    present({"passed": good, "parts": rows}, [table, verdict], as_json=options.as_json, passed=good)
 
 
 def _distribution(group: str, name: str) -> str:

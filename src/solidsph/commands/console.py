@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from math import isfinite
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import attrs
 import click
@@ -24,12 +24,10 @@ from rich.progress import (
 )
 from rich.table import Table as RichTable
 
+from solidsph.interfaces.terms import Observation
 from solidsph.run.hooks import implementation
-
-if TYPE_CHECKING:
-    from solidsph.interfaces.terms import Observation
-    from solidsph.simulation import Simulation
-    from solidsph.studies.sweep import StatusCallback, SweepStatus
+from solidsph.simulation import Simulation
+from solidsph.studies.sweep import StatusCallback, SweepStatus
 
 
 class _Console(Console):

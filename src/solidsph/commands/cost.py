@@ -6,153 +6,127 @@ import csv
 from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import attrs
 import click
 
 from solidsph.commands.console import Table, present, sweep_progress
 from solidsph.commands.cost_options import axes_of, goal_of, seconds
 from solidsph.commands.options import (
-    json_option,
+    ProgressOutput,
+    flag,
+    option,
+    options,
     output_option,
-    quiet_option,
-    settings_option,
+    set_option,
     verbose_option,
 )
 from solidsph.commands.target import resolve
 from solidsph.errors import SceneError
 from solidsph.studies.case import Case
+from solidsph.studies.cluster import Cluster
+from solidsph.studies.cost import Axes, SweepSetup, default_settings, find_best, frontier
+from solidsph.studies.frontier import Frontier
+from solidsph.studies.point import Point
+from solidsph.studies.processes import Processes
+from solidsph.studies.report import write_report
+from solidsph.studies.report_figures import library
+from solidsph.studies.richardson import extrapolate
+from solidsph.studies.search import Goal, SearchResult
+from solidsph.studies.variant import with_settings
 
-if TYPE_CHECKING:
-    from solidsph.studies.cost import Axes, SweepSetup
-    from solidsph.studies.frontier import Frontier
-    from solidsph.studies.point import Point
-    from solidsph.studies.runner import Runner
-    from solidsph.studies.search import Goal, SearchResult
+
+@attrs.frozen
+class _Options(ProgressOutput):
+    settings: tuple[str, ...] = set_option("the case")
+    axes: tuple[str, ...] = option(
+        "Values to try; the first axis refines, from coarse to fine.  [default: the case's own]",
+        "--axis",
+        multiple=True,
+        metavar="NAME=VALUE,VALUE...",
+    )
+    accuracy: str | None = option(
+        "Find the quickest configuration with this error, such as 1%.", metavar="PERCENT"
+    )
+    time: str | None = option(
+        "Find the most accurate configuration in this time, such as 60s.", metavar="TIME"
+    )
+    repeats: int = option(
+        "Number of runs of every configuration.",
+        type=click.IntRange(1),
+        default=1,
+        show_default=True,
+    )
+    workers: int = option(
+        "Processes at a time; with more than one, wall times are those of a shared machine.",
+        type=click.IntRange(1),
+        default=1,
+        show_default=True,
+    )
+    scheduler: str | None = option("Run on the Dask cluster at this address.", metavar="ADDRESS")
+    longest: str = option(
+        "A search runs nothing that is expected to take longer.",
+        default="10min",
+        show_default=True,
+        metavar="TIME",
+    )
+    output: Path | None = output_option(
+        "Folder for points, picture and scenes.  [default: results/cost/CASE]"
+    )
+    report: bool = flag(
+        "Also write an HTML page with interactive plots and the scene of every point."
+    )
+    verbose: bool = verbose_option()
+
+    def folder(self, target: str) -> Path:
+        """Folder of the results."""
+        return self.output or Path("results") / "cost" / target
 
 
 @click.command()
 @click.argument("target", metavar="CASE")
-@settings_option
-@click.option(
-    "--axis",
-    "axes",
-    multiple=True,
-    metavar="NAME=VALUE,VALUE...",
-    help="Values to try; the first axis refines, from coarse to fine.  [default: the case's own]",
-)
-@click.option(
-    "--accuracy", metavar="PERCENT", help="Find the cheapest configuration for this, such as 1%."
-)
-@click.option(
-    "--time", metavar="TIME", help="Find the most accurate configuration in this, such as 60s."
-)
-@click.option(
-    "--repeats",
-    type=click.IntRange(1),
-    default=1,
-    show_default=True,
-    help="Number of runs of every configuration.",
-)
-@click.option(
-    "--workers",
-    type=click.IntRange(1),
-    default=1,
-    show_default=True,
-    help="Processes at a time; with more than one, wall times are those of a shared machine.",
-)
-@click.option("--scheduler", metavar="ADDRESS", help="Run on the Dask cluster at this address.")
-@click.option(
-    "--longest",
-    default="10min",
-    show_default=True,
-    metavar="TIME",
-    help="A search runs nothing that is expected to take longer.",
-)
-@output_option("Folder for points, picture and scenes.  [default: results/cost/CASE]")
-@click.option(
-    "--report",
-    is_flag=True,
-    help="Also write an HTML page with interactive plots and the scene of every point.",
-)
-@verbose_option
-@json_option
-@quiet_option
-def cost(
-    target: str,
-    settings: tuple[str, ...],
-    axes: tuple[str, ...],
-    accuracy: str | None,
-    time: str | None,
-    repeats: int,
-    workers: int,
-    scheduler: str | None,
-    longest: str,
-    output: Path | None,
-    report: bool,
-    verbose: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    """Show the time that accuracy costs for a case. Finished points are kept: the same command
-    continues an interrupted sweep."""
-    from solidsph.studies.cost import SweepSetup
+@options(_Options)
+def cost(target: str, options: _Options) -> None:
+    """Show the time that accuracy costs for a case.
 
-    case = resolve(target, settings)
+    Finished points are kept: the same command continues an interrupted sweep.
+    """
+    goal = goal_of(options.accuracy, options.time)
+    case = resolve(target, options.settings)
     if not isinstance(case, Case):
         raise SceneError(f"{target!r} is a scene, which has no reference; give a case")
-    if accuracy is not None and time is not None:
+    if options.accuracy is not None and options.time is not None:
         raise SceneError("--accuracy and --time are two questions; ask one at a time")
-    if report and (accuracy is not None or time is not None):
+    if options.report and goal is not None:
         raise SceneError(
             "--report shows a sweep, not a search; leave out --accuracy and --time: what a search "
             "has run, the sweep takes from the journal"
         )
-    if report:
-        from solidsph.studies.report_figures import library
-
+    if options.report:
         library()  # refused before anything runs if Plotly is missing
-    folder = output or Path("results") / "cost" / target
-    chosen = axes_of(axes, case)
-    runner = _runner(workers, scheduler)
-    with sweep_progress(target, not (as_json or quiet)) as watch:
-        setup = SweepSetup(runner, folder, repeats, watch)
-        goal = goal_of(accuracy, time)
+    axes = axes_of(options.axes, case)
+    scheduler = options.scheduler
+    runner = Processes(options.workers) if scheduler is None else Cluster(scheduler)
+    with sweep_progress(target, options.progress) as watch:
+        setup = SweepSetup(runner, options.folder(target), options.repeats, watch)
         if goal is None:
-            facts, text, passed = _sweep(target, case, chosen, setup, folder, report, verbose)
+            facts, text, passed = _sweep(target, options, case, axes, setup)
         else:
-            limit = seconds(longest, "--longest")
-            facts, text, passed = _search(target, case, goal, chosen, setup, folder, limit, verbose)
-    present(facts, text, as_json=as_json, passed=passed)
+            facts, text, passed = _search(target, options, case, axes, setup, goal)
+    present(facts, text, as_json=options.as_json, passed=passed)
 
 
 Presentation = tuple[Mapping[str, Any], Iterator[Table | str], bool]
 """Facts for programs, text for people, and whether it succeeded."""
 
 
-def _runner(workers: int, scheduler: str | None) -> Runner:
-    from solidsph.studies.processes import Processes
-
-    if scheduler is None:
-        return Processes(workers)
-    from solidsph.studies.cluster import Cluster  # imports the cluster's library
-
-    return Cluster(scheduler)
-
-
 def _sweep(
-    target: str,
-    case: Case,
-    axes: Axes,
-    setup: SweepSetup,
-    folder: Path,
-    report: bool,
-    verbose: bool,
+    target: str, options: _Options, case: Case, axes: Axes, setup: SweepSetup
 ) -> Presentation:
-    from solidsph.studies.cost import default_settings, frontier
     from solidsph.studies.frontier_picture import draw_frontier
-    from solidsph.studies.report import write_report
 
+    folder = options.folder(target)
     result = frontier(case, axes, setup)
     rows = list(result)
     own = default_settings(case.priced(), axes)
@@ -164,7 +138,7 @@ def _sweep(
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
-    page = folder / f"{target}-report.html" if report else None
+    page = folder / f"{target}-report.html" if options.report else None
     if page is not None:
         write_report(result, case, page)
     facts = {
@@ -193,7 +167,7 @@ def _sweep(
         "table": str(table),
         "report": None if page is None else str(page),
     }
-    return facts, _sweep_text(facts, result, default, verbose), bool(result.finished())
+    return facts, _sweep_text(facts, result, default, options.verbose), bool(result.finished())
 
 
 def _sweep_text(
@@ -231,8 +205,6 @@ def _sweep_text(
 
 def _extrapolations(result: Frontier) -> Sequence[Mapping[str, Any]]:
     """Error bar of every scheme on the front that has three points or more."""
-    from solidsph.studies.richardson import extrapolate
-
     bars = []
     on_front = {result.scheme(point) for point in result.front()}
     for scheme, points in result.schemes().items():
@@ -257,20 +229,12 @@ def _extrapolations(result: Frontier) -> Sequence[Mapping[str, Any]]:
 
 
 def _search(
-    target: str,
-    case: Case,
-    goal: Goal,
-    axes: Axes,
-    setup: SweepSetup,
-    folder: Path,
-    longest: float,
-    verbose: bool,
+    target: str, options: _Options, case: Case, axes: Axes, setup: SweepSetup, goal: Goal
 ) -> Presentation:
-    from solidsph.studies.cost import find_best
-
+    longest = seconds(options.longest, "--longest")
     result = find_best(case, goal, axes, setup, longest=longest)
     best = result.point
-    scenes = [] if best is None else _write_scenes(target, case, best, result.sure, folder)
+    scenes = list(_write_scenes(target, options.folder(target), case, result))
     facts = {
         "case": target,
         "found": None if best is None else _facts(best),
@@ -279,7 +243,7 @@ def _search(
         "sure": result.sure,
         "scenes": [str(path) for path in scenes],
     }
-    return facts, _search_text(facts, result, verbose), best is not None
+    return facts, _search_text(facts, result, options.verbose), best is not None
 
 
 def _search_text(
@@ -294,19 +258,18 @@ def _search_text(
         yield f"found: {result.point.brief()}"
 
 
-def _write_scenes(target: str, case: Case, point: Point, sure: str, folder: Path) -> Sequence[Path]:
-    """Write the scenes of a point to files that begin with its evidence."""
-    from solidsph.studies.variant import with_settings
-
-    paths = []
+def _write_scenes(target: str, folder: Path, case: Case, result: SearchResult) -> Iterator[Path]:
+    """Write the scenes of the best point to files that begin with its evidence."""
+    point = result.point
+    if point is None:
+        return
     scenes = with_settings(case.priced(), point.settings).scenes()
-    headline = f"# {point.brief()}, of: {point.quantity}"
-    evidence = [headline, f"# {sure}", f"# solidsph cost {target}"]
+    evidence = (f"{point.brief()}, of: {point.quantity}", result.sure, f"solidsph cost {target}")
+    heading = "".join(f"# {line}\n" for line in evidence)
     for name, scene in scenes.items():
         path = folder / (f"{target}.toml" if len(scenes) == 1 else f"{target}-{name}.toml")
-        path.write_text("\n".join([*evidence, "", scene.to_toml()]), encoding="utf-8")
-        paths.append(path)
-    return paths
+        path.write_text(f"{heading}\n{scene.to_toml()}", encoding="utf-8")
+        yield path
 
 
 def _facts(point: Point) -> Mapping[str, Any]:

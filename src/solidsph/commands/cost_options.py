@@ -5,23 +5,19 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from solidsph.commands.target import parameters
 from solidsph.errors import SceneError
 from solidsph.studies.case import Case
-
-if TYPE_CHECKING:
-    from solidsph.studies.cost import Axes
-    from solidsph.studies.search import Goal
+from solidsph.studies.cost import Axes, sweep_of
+from solidsph.studies.search import Accuracy, Goal, TimeLimit
 
 _UNITS = {"": 1.0, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 def axes_of(texts: Sequence[str], case: Case) -> Axes:
     """Axes from "name=value,value", after the one that refines; the case's own if none is given."""
-    from solidsph.studies.cost import sweep_of
-
     if not texts:
         return sweep_of(case.priced())
     axes = dict(_axis(text) for text in texts)
@@ -47,8 +43,6 @@ def _axis(text: str) -> tuple[str, Sequence[Any]]:
 
 def goal_of(accuracy: str | None, time: str | None) -> Goal | None:
     """Goal of a search; None for a sweep."""
-    from solidsph.studies.search import Accuracy, TimeLimit
-
     if accuracy is not None:
         return Accuracy(_fraction(accuracy))
     return None if time is None else TimeLimit(seconds(time, "--time"))

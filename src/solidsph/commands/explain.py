@@ -10,7 +10,7 @@ import click
 
 from solidsph.advice import advised
 from solidsph.commands.console import Table, present
-from solidsph.commands.options import json_option, settings_option, verbose_option
+from solidsph.commands.options import Output, option, options, set_option, verbose_option
 from solidsph.commands.prediction import (
     INTERNALS,
     Row,
@@ -44,34 +44,30 @@ from solidsph.studies.case import Case
 Facts = dict[str, Any]
 
 
+@attrs.frozen
+class _Options(Output):
+    settings: tuple[str, ...] = set_option("the case")
+    cluster: tuple[str, ...] = option(
+        "Assumption about the cluster on which a scene larger than this machine is priced: "
+        "cores, memory [GiB], bandwidth [GB/s], network [GB/s], latency [us], storage [GB/s], "
+        "efficiency, usable.",
+        multiple=True,
+        metavar="NAME=VALUE",
+    )
+    verbose: bool = verbose_option()
+
+
 @click.command()
 @click.argument("target", metavar="SCENE|-|CASE")
-@settings_option
-@click.option(
-    "--cluster",
-    "assumed",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Assumption about the cluster on which a scene larger than this machine is priced: "
-    "cores, memory [GiB], bandwidth [GB/s], network [GB/s], latency [us], storage [GB/s], "
-    "efficiency, usable.",
-)
-@verbose_option
-@json_option
-def explain(
-    target: str,
-    settings: tuple[str, ...],
-    assumed: tuple[str, ...],
-    verbose: bool,
-    as_json: bool,
-) -> None:
-    """Show what would be simulated, why, and at what cost. Nothing is run or written.
+@options(_Options)
+def explain(target: str, options: _Options) -> None:
+    """Show what a run would simulate and cost.
 
-    Scenes are built in order to count their work. One that needs more memory than this machine has
-    is priced on paper.
+    Nothing is run or written. Scenes are built in order to count their work. One that needs more
+    memory than this machine has is priced on paper.
     """
-    wanted = resolve(target, settings)
-    cluster = _cluster(assumed)
+    wanted = resolve(target, options.settings)
+    cluster = _cluster(options.cluster)
     scenes = wanted.scenes() if isinstance(wanted, Case) else {target: wanted}
     explanations: dict[str, Facts] = {}
     machine = this_machine()
@@ -90,7 +86,7 @@ def explain(
         },
     }
     titles = {name: scene.title for name, scene in scenes.items()}
-    present(facts, _text(facts, titles, verbose=verbose), as_json=as_json)
+    present(facts, _text(facts, titles, verbose=options.verbose), as_json=options.as_json)
 
 
 def _text(facts: Facts, titles: Mapping[str, str], *, verbose: bool) -> Iterator[Table | str]:

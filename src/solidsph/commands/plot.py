@@ -4,28 +4,32 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import attrs
 import click
 
 from solidsph.commands.console import present
-from solidsph.commands.options import json_option, output_option
+from solidsph.commands.options import Output, option, options, output_option
+from solidsph.results.record import Record
+
+
+@attrs.frozen
+class _Options(Output):
+    output: Path | None = output_option("Folder for the pictures.  [default: that of the record]")
+    field: str | None = option(
+        "Field that colours the body.  [default: the largest principal stress]", metavar="NAME"
+    )
 
 
 @click.command()
 @click.argument("result", metavar="RECORD", type=click.Path(path_type=Path))
-@output_option("Folder for the pictures.  [default: that of the record]")
-@click.option(
-    "--field",
-    metavar="NAME",
-    help="Field that colours the body.  [default: the largest principal stress]",
-)
-@json_option
-def plot(result: Path, output: Path | None, field: str | None, as_json: bool) -> None:
-    """Draw a record: the motion or the deformed body, coloured by a field, and the energies."""
+@options(_Options)
+def plot(result: Path, options: _Options) -> None:
+    """Draw the pictures of a record: the deformed body, coloured by a field, and the energies."""
     from solidsph.results.pictures import draw
-    from solidsph.results.record import Record
 
+    folder = options.output or result.parent
     with Record(result) as record:
-        chosen = {} if field is None else {"field": field}
-        paths = [str(p) for p in draw(record, output or result.parent, result.stem, **chosen)]
+        chosen = {} if options.field is None else {"field": options.field}
+        paths = [str(path) for path in draw(record, folder, result.stem, **chosen)]
     facts = {"record": str(result), "pictures": paths}
-    present(facts, [f"picture: {path}" for path in paths], as_json=as_json)
+    present(facts, [f"picture: {path}" for path in paths], as_json=options.as_json)

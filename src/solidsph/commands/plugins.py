@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import attrs
 import click
 
 from solidsph.commands.console import Table, present
-from solidsph.commands.options import json_option
+from solidsph.commands.options import Output, flag, options
 from solidsph.errors import SolidsphError
 from solidsph.registry import registry
 
 
+@attrs.frozen
+class _Options(Output):
+    load: bool = flag("Import every part, and report those that fail.")
+
+
 @click.command()
-@click.option("--load", is_flag=True, help="Import every part, and report those that fail.")
-@json_option
-def plugins(load: bool, as_json: bool) -> None:
+@options(_Options)
+def plugins(options: _Options) -> None:
     """List the installed parts and where they come from. Nothing is imported without --load."""
     rows = [
         {
@@ -21,7 +26,7 @@ def plugins(load: bool, as_json: bool) -> None:
             "name": entry.name,
             "distribution": f"{entry.distribution} {entry.version}",
             "target": entry.target,
-            **({"status": _status(kind, entry.name)} if load else {}),
+            **({"status": _status(kind, entry.name)} if options.load else {}),
         }
         for kind in registry.INTERFACES
         for entry in registry.available(kind)
@@ -32,13 +37,13 @@ def plugins(load: bool, as_json: bool) -> None:
             "name": point.name,
             "distribution": f"{point.dist.name} {point.dist.version}" if point.dist else "",
             "target": point.value,
-            **({"status": "not checked"} if load else {}),
+            **({"status": "not checked"} if options.load else {}),
         }
         for point in registry.hook_points()
     ]
     columns = list(rows[0]) if rows else ["kind", "name"]
     table = Table("installed parts", columns, [list(row.values()) for row in rows])
-    present({"plugins": rows}, [table], as_json=as_json)
+    present({"plugins": rows}, [table], as_json=options.as_json)
 
 
 def _status(kind: str, name: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import time as clock
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import attrs
 import click
@@ -21,9 +21,7 @@ from solidsph.costs.work import Compilation, Work
 from solidsph.run.outcome import FINISHED
 from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
-
-if TYPE_CHECKING:
-    from solidsph.studies.case_run import SceneRun
+from solidsph.studies.case_run import SceneRun
 
 LONG = 5.0
 """Runs predicted to take longer are announced [s]."""

@@ -8,53 +8,54 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import attrs
 import click
 
 from solidsph.commands.console import Table, present, progress, progress_observers
-from solidsph.commands.options import json_option, output_option, quiet_option
+from solidsph.commands.options import FILE, ProgressOutput, flag, option, options, output_option
 from solidsph.registry import registry
+
+
+@attrs.frozen
+class _Options(ProgressOutput):
+    listed: bool = flag("List figures and passages with their cases.", "--list")
+    output: Path = output_option(
+        "Folder for pictures, data and records.", Path("results/reproduce")
+    )
+    page: Path | None = option(
+        "Also write a Markdown page of text and pictures to this file.", type=FILE
+    )
 
 
 @click.command()
 @click.argument("wanted", metavar="[FIGURE]...", nargs=-1)
-@click.option("--list", "listed", is_flag=True, help="List figures and passages with their cases.")
-@output_option("Folder for pictures, data and records.", "results/reproduce")
-@click.option(
-    "--page",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="Also write a Markdown page of text and pictures to this file.",
-)
-@json_option
-@quiet_option
-def reproduce(
-    wanted: tuple[str, ...],
-    listed: bool,
-    output: Path,
-    page: Path | None,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    """Reproduce figures of Ismail & Reddy, such as fig-11, and answer the questions that its
-    passages raise. Without names: all of them."""
+@options(_Options)
+def reproduce(wanted: tuple[str, ...], options: _Options) -> None:
+    """Reproduce figures of the paper.
+
+    The paper is Ismail & Reddy, Smoothed Particle Hydrodynamics for Nonlinear Solid Mechanics.
+    Figures have names such as fig-11; passages that raise a question have names too. Without a
+    name, all are reproduced.
+    """
     from solidsph.studies.reproduce import figures
     from solidsph.studies.reproduce import reproduce as run_cases
 
-    if listed:
+    if options.listed:
         known = [
             {"figure": figure, "case": case, "what": registry.load("cases", case).title}
             for figure, case in figures().items()
         ]
         columns = {"figure": "figure", "case": "case", "title": "what"}
-        present({"figures": known}, [Table.of("figures", known, columns)], as_json=as_json)
+        present({"figures": known}, [Table.of("figures", known, columns)], as_json=options.as_json)
         return
     begun = clock.perf_counter()
-    with progress(not (as_json or quiet)) as display:
-        result = run_cases(wanted, output, partial(progress_observers, display))
+    with progress(options.progress) as display:
+        result = run_cases(wanted, options.output, partial(progress_observers, display))
     seconds = clock.perf_counter() - begun
-    if page is not None:
+    if options.page is not None:
         from solidsph.studies.gallery import write_gallery
 
-        write_gallery(result, page)
+        write_gallery(result, options.page)
     facts = {
         "passed": result.passed,
         "wall time [s]": seconds,
@@ -77,7 +78,7 @@ def reproduce(
         "contact sheet": None if result.sheet is None else str(result.sheet),
     }
     text = _text(facts, len(result.results))
-    present(facts, text, as_json=as_json, passed=result.passed)
+    present(facts, text, as_json=options.as_json, passed=result.passed)
 
 
 def _text(facts: Mapping[str, Any], cases: int) -> Iterator[Table | str]:

@@ -3,48 +3,51 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import attrs
 import click
 
 from solidsph.commands.console import present, progress, progress_observers, say
-from solidsph.commands.options import json_option, quiet_option
+from solidsph.commands.options import ProgressOutput, flag, option, options
 from solidsph.errors import RecordError
 from solidsph.results.layout import RECORD_SUFFIXES
 from solidsph.results.record import Record
+from solidsph.resumption import Pending, pending
 from solidsph.run.outcome import UNSOUND
 
-if TYPE_CHECKING:
-    from solidsph.resumption import Pending
+
+@attrs.frozen
+class _Options(ProgressOutput):
+    until: float | None = option("Extend the run to this time [s].", type=float, metavar="T")
+    force: bool = flag("Resume even if versions, plugins or threads have changed.")
 
 
 @click.command()
 @click.argument("result", metavar="RECORD|FOLDER", type=click.Path(path_type=Path))
-@click.option("--until", type=float, metavar="T", help="Extend the run to this time [s].")
-@click.option(
-    "--force", is_flag=True, help="Resume even if versions, plugins or threads have changed."
-)
-@json_option
-@quiet_option
-def resume(result: Path, until: float | None, force: bool, as_json: bool, quiet: bool) -> None:
-    """Continue a run in its record, bit for bit; or every run in a folder."""
-    from solidsph.resumption import pending
+@options(_Options)
+def resume(result: Path, options: _Options) -> None:
+    """Continue the run of a record. The result is the same to the bit as without interruption.
 
+    A FOLDER continues every run in it.
+    """
     facts = []
     for path in _records(result):
-        run = pending(path, until=until, force=force)
+        run = pending(path, until=options.until, force=options.force)
         if run is None:
             facts.append({"record": str(path), "outcome": f"{_outcome(path)} before"})
             text = f"{path} is {_outcome(path)}; --until T extends it"
         else:
-            facts.append(_resumed(run, shown=not (as_json or quiet)))
+            facts.append(_resumed(run, shown=options.progress))
             start = f"t = {facts[-1]['from [s]']:.6g} s"
             without = "" if run.since.state is not None else ", for lack of a checkpoint"
             text = f"{path} is finished now; it was resumed at {start}{without}"
-        if not as_json:
+        if not options.as_json:
             say(text)
     unsound = any(entry["outcome"].startswith(UNSOUND) for entry in facts)
-    present({"runs": facts, "exit code": int(unsound)}, (), as_json=as_json, passed=not unsound)
+    present(
+        {"runs": facts, "exit code": int(unsound)}, (), as_json=options.as_json, passed=not unsound
+    )
 
 
 def _outcome(path: Path) -> str:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import attrs
 import click
 
+from solidsph.advice import Advice, advised
+from solidsph.commands import prediction as predictions
 from solidsph.commands.console import (
     Table,
     known_facts,
@@ -19,56 +21,70 @@ from solidsph.commands.console import (
     say,
 )
 from solidsph.commands.options import (
-    json_option,
+    FILE,
+    ProgressOutput,
+    flag,
+    option,
+    options,
     output_option,
-    quiet_option,
-    settings_option,
+    set_option,
     verbose_option,
 )
+from solidsph.commands.receipt_tables import case_receipts, case_receipts_text, receipts_text
 from solidsph.commands.target import name_of, resolve
+from solidsph.costs.fits import check_fits
+from solidsph.costs.model import Prediction
+from solidsph.costs.process import peak_memory
 from solidsph.errors import SceneError, UnsoundError
 from solidsph.results.layout import RECORD_SUFFIXES
+from solidsph.results.left import check_replaceable
+from solidsph.results.sole_writer import check_no_writer
 from solidsph.run.outcome import FINISHED
 from solidsph.scene.scene import Scene
+from solidsph.simulation import Simulation
 from solidsph.studies.case import Case
-
-if TYPE_CHECKING:
-    from solidsph.advice import Advice
-    from solidsph.costs.model import Prediction
-    from solidsph.simulation import Simulation
-    from solidsph.studies.case_run import CaseResult
-    from solidsph.watch import Finding
+from solidsph.studies.case_run import CaseResult, run_case
+from solidsph.studies.receipts import quantity, receipts
+from solidsph.watch import Finding, run_watched
 
 
 @attrs.frozen
-class _Options:
-    """Options that scenes and cases share."""
-
-    target: str
-    overwrite: bool
-    beyond_memory: bool
-    receipts_of: Sequence[str] | None  # None without receipts
-    as_json: bool
-    quiet: bool
-    verbose: bool
-
-    @property
-    def shown(self) -> bool:
-        """Whether progress is shown."""
-        return not (self.as_json or self.quiet)
+class _Options(ProgressOutput):
+    settings: tuple[str, ...] = set_option("the case")
+    output: Path | None = output_option(
+        "Folder for records and pictures, or for a scene the file of its record (.h5 or .vtkhdf).  "
+        "[default: results/NAME]"
+    )
+    overwrite: bool = flag("Replace the record of an interrupted run, which resume would continue.")
+    write: Path | None = option("Write the scene to this file instead of running it.", type=FILE)
+    watch: bool | None = option(
+        "Look for signs of failure at outputs.  [default: watch the motion of a scene]",
+        "--watch/--no-watch",
+    )
+    roll_back: int = option(
+        "On a failure, go back to the last sound output and halve the step, up to N times.",
+        type=click.IntRange(min=0),
+        default=0,
+        metavar="N",
+    )
+    receipts: bool = flag(
+        "Then report what each effect cost and changed, by runs without it at reduced size."
+    )
+    receipts_of: tuple[str, ...] = option(
+        "With --receipts: also compare this displacement, or this column of the history.",
+        multiple=True,
+        metavar="NAME=x@[X,Y]",
+    )
+    beyond_memory: bool = flag("Run even if more memory is predicted than is free.")
+    verbose: bool = verbose_option()
 
     def check_memory(self, scene: Scene) -> None:
         """Refuse a scene that needs more memory than is free, unless that is wanted."""
-        from solidsph.costs.fits import check_fits
-
         if not self.beyond_memory:
             check_fits(scene)
 
     def check_record(self, path: Path) -> None:
         """Refuse to replace a record that must stay; print which one is replaced."""
-        from solidsph.results.left import check_replaceable
-        from solidsph.results.sole_writer import check_no_writer
-
         check_no_writer(path)
         earlier = check_replaceable(path, overwrite=self.overwrite)
         if earlier is not None and earlier.count:
@@ -77,95 +93,33 @@ class _Options:
 
 @click.command()
 @click.argument("target", metavar="SCENE|-|CASE")
-@settings_option
-@output_option(
-    "Folder for records and pictures, or for a scene the file of its record (.h5 or .vtkhdf).  "
-    "[default: results/NAME]"
-)
-@click.option(
-    "--overwrite",
-    is_flag=True,
-    help="Replace the record of an interrupted run, which resume would continue.",
-)
-@click.option(
-    "--write",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="Write the scene to this file instead of running it.",
-)
-@click.option(
-    "--watch/--no-watch",
-    default=None,
-    help="Look for signs of failure at outputs.  [default: watch the motion of a scene]",
-)
-@click.option(
-    "--roll-back",
-    "roll_backs",
-    type=click.IntRange(min=0),
-    default=0,
-    metavar="N",
-    help="On a failure, go back to the last sound output and halve the step, up to N times.",
-)
-@click.option(
-    "--receipts",
-    is_flag=True,
-    help="Then report what each effect cost and changed, by runs without it at reduced size.",
-)
-@click.option(
-    "--receipts-of",
-    "receipts_of",
-    multiple=True,
-    metavar="NAME=x@[X,Y]",
-    help="With --receipts: also compare this displacement, or this column of the history.",
-)
-@click.option(
-    "--beyond-memory",
-    "beyond_memory",
-    is_flag=True,
-    help="Run even if more memory is predicted than is free.",
-)
-@verbose_option
-@json_option
-@quiet_option
-def run(
-    target: str,
-    settings: tuple[str, ...],
-    output: Path | None,
-    write: Path | None,
-    watch: bool | None,
-    roll_backs: int,
-    receipts: bool,
-    receipts_of: tuple[str, ...],
-    **flags: bool,
-) -> None:
-    """Run a scene file, a scene from the standard input (-) or a case, and record it."""
-    wanted = resolve(target, settings)
-    if write is not None:
-        _write(wanted, write, as_json=flags["as_json"])
+@options(_Options)
+def run(target: str, options: _Options) -> None:
+    """Run a scene or a case, and record it. A scene is a file, or - for the standard input."""
+    wanted = resolve(target, options.settings)
+    if options.write is not None:
+        _write(wanted, options.write, as_json=options.as_json)
         return
-    if receipts_of and not receipts:
+    if options.receipts_of and not options.receipts:
         raise SceneError("--receipts-of says what --receipts is to look at; add --receipts")
-    if receipts_of:
-        from solidsph.studies.receipts import quantity
-
-        for text in receipts_of:
-            quantity(text)  # refused before the run
-    options = _Options(target, receipts_of=receipts_of if receipts else None, **flags)
-    folder = output or Path("results") / name_of(target)
+    for text in options.receipts_of:
+        quantity(text)  # refused before the run
+    folder = options.output or Path("results") / name_of(target)
+    watch = options.watch or options.roll_back
     if isinstance(wanted, Case):
-        if watch or roll_backs:
+        if watch:
             raise SceneError(
                 "--watch is for one scene, and a case is several, some of which diverge on "
                 "purpose; write them to files (--write) and run one"
             )
-        _run_case(wanted, folder, options)
+        _run_case(target, wanted, folder, options)
         return
-    moves = wanted.statics is None
-    if roll_backs and watch is False:
+    if options.roll_back and options.watch is False:
         raise SceneError("--roll-back needs --watch, which finds the last sound output")
-    if (watch or roll_backs) and not moves:
+    if watch and wanted.statics is not None:
         raise SceneError("--watch is for motions; an equilibrium is tested by itself")
     path = folder if folder.suffix in RECORD_SUFFIXES else folder / "record.h5"
-    _run_scene(wanted, path, options, roll_backs if moves and watch is not False else None)
+    _run_scene(target, wanted, path, options)
 
 
 def _write(wanted: Scene | Case, path: Path, *, as_json: bool) -> None:
@@ -180,40 +134,31 @@ def _write(wanted: Scene | Case, path: Path, *, as_json: bool) -> None:
     present(facts, [f"wrote {file}" for file in written], as_json=as_json)
 
 
-def _run_scene(scene: Scene, path: Path, options: _Options, roll_backs: int | None) -> None:
-    """Run one scene, watched with this number of roll-backs, or not watched at all."""
-    from solidsph.advice import advised
-    from solidsph.commands import prediction as predictions
-    from solidsph.commands.receipt_tables import receipts_text
-    from solidsph.costs.process import peak_memory
-    from solidsph.studies.receipts import receipts
-
+def _run_scene(target: str, scene: Scene, path: Path, options: _Options) -> None:
     options.check_memory(scene)
     options.check_record(path)
     known = known_facts()
-    known |= {"scene": options.target, "record": str(path), "warnings": []}
+    known |= {"scene": target, "record": str(path), "warnings": []}
     simulation, build = predictions.build_timed(scene)
     advice = advised(simulation)
     known["warnings"] += [warning.line for warning in advice]
     if not options.as_json:
         _warn(advice)
     predicted = predictions.predict_run(simulation, build)
-    if options.shown and (announcement := predictions.announcement(predicted)):
+    if options.progress and (announcement := predictions.announcement(predicted)):
         say(announcement)
     unsound: UnsoundError | None = None
-    with progress(options.shown) as display:
-        observers = progress_observers(display, name_of(options.target), simulation)
+    with progress(options.progress) as display:
+        observers = progress_observers(display, name_of(target), simulation)
         try:
-            if roll_backs is None:
+            if options.watch is False or scene.statics is not None:
                 result = simulation.run(record=path, observers=observers)
             else:
-                from solidsph.watch import run_watched
-
                 watchdog = _Watchdog(known["warnings"])
                 result = run_watched(
                     simulation,
                     record=path,
-                    roll_backs=roll_backs,
+                    roll_backs=options.roll_back,
                     observers=observers,
                     told=watchdog,
                 )
@@ -236,19 +181,19 @@ def _run_scene(scene: Scene, path: Path, options: _Options, roll_backs: int | No
     # Notes and final values are not read from the file, which other processes may replace.
     known |= {**effort, "notes": list(result.notes), "final": result.final}
     of = options.receipts_of
-    found = None if of is None else receipts(simulation, end=result.state, of=of)
+    found = receipts(simulation, end=result.state, of=of) if options.receipts else None
     if found is not None:
         known["receipts"] = attrs.asdict(found)
     hidden = frozenset() if options.verbose else predictions.INTERNALS
 
     def text() -> Iterator[Table | str]:
         values = {name: value for name, value in effort.items() if name not in hidden}
-        yield Table.of_values(options.target, values)
+        yield Table.of_values(target, values)
         yield Table.of_values("at the end", result.final, "quantity")
         yield from (f"note: {note}" for note in result.notes)
         yield f"record: {path} (open it in ParaView, or with: solidsph plot {path})"
         if found is not None:
-            yield from receipts_text(found, of or ())
+            yield from receipts_text(found, of)
 
     if unsound is None or not options.as_json:
         facts = {**known, "outcome": FINISHED, "exit code": 0}
@@ -285,19 +230,14 @@ class _Watchdog:
         remark(text)
 
 
-def _run_case(case: Case, folder: Path, options: _Options) -> None:
-    from solidsph.advice import advised
-    from solidsph.commands import prediction as predictions
-    from solidsph.commands.receipt_tables import case_receipts
-    from solidsph.studies.case_run import run_case
-
+def _run_case(target: str, case: Case, folder: Path, options: _Options) -> None:
     for name in case.scenes():
         options.check_record(folder / f"{name}.h5")
     known = known_facts()
-    known |= {"case": options.target, "warnings": {}}
+    known |= {"case": target, "warnings": {}}
     predicted: dict[str, Prediction | None] = {}
     warned: set[str] = set()
-    with progress(options.shown) as display:
+    with progress(options.progress) as display:
 
         def begin(name: str, simulation: Simulation) -> Sequence[object]:
             compiled = {c for p in predicted.values() if p for c in p.work.compilations}
@@ -321,7 +261,7 @@ def _run_case(case: Case, folder: Path, options: _Options) -> None:
         "predicted": predictions.total_comparison(result.runs, seconds),
         **_case_facts(result, seconds),
     }
-    if options.receipts_of is not None:
+    if options.receipts:
         facts["receipts"] = case_receipts(case, options.receipts_of)
     text = _case_text(case, folder, facts)
     present(facts, text, as_json=options.as_json, passed=result.passed)
@@ -362,8 +302,6 @@ def _case_facts(result: CaseResult, predicted: Mapping[str, float | None]) -> di
 
 
 def _case_text(case: Case, folder: Path, facts: Mapping[str, Any]) -> Iterator[Table | str]:
-    from solidsph.commands.receipt_tables import case_receipts_text
-
     measurements, runs = facts["measurements"], facts["runs"]
     yield f"{case.title}. {case.source}."
     columns = ("reference", "unit", "error", "verdict", "as expected")

@@ -3,39 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import attrs
-import click
 
-from solidsph.commands.options import Command
+from solidsph.commands.options import option
 from solidsph.commands.target import resolve
 from solidsph.errors import SceneError
 from solidsph.registry import registry
-
-if TYPE_CHECKING:
-    from solidsph.studies.scheme import Scheme
-
-
-def _option(text: str, **settings: Any) -> Any:
-    """A field that becomes an option of its name, with this help."""
-    default = () if settings.get("multiple") else None
-    return attrs.field(default=default, metadata={"metavar": "NAME", "help": text, **settings})
+from solidsph.registry.construct import describe
+from solidsph.scene.default_cover import own_cover
+from solidsph.scene.scene import Scene
+from solidsph.studies.scheme import Scheme
 
 
 @attrs.frozen
 class SchemeOptions:
     """Values of the options; those not given come from the scene, or are the defaults."""
 
-    scheme: str | None = _option("Take the scheme of a scene or case.", metavar="SCENE|CASE")
-    kernel: str | None = _option("Its kernel.")
-    cover: float | None = _option("Its support radius.", type=float, metavar="SPACINGS")
-    formulation: str | None = _option("Its formulation.")
-    gradient: str | None = _option("The formulation's gradient.")
-    divergence: str | None = _option("The formulation's divergence.")
-    material: str | None = _option("A material, with typical parameters.")
-    effect: tuple[str, ...] = _option("Add an effect, with typical parameters.", multiple=True)
-    hourglass: float | None = _option("Add hourglass control.", type=float, metavar="STRENGTH")
+    scheme: str | None = option("Take the scheme of a scene or case.", metavar="SCENE|CASE")
+    kernel: str | None = option("Kernel of the scheme.", metavar="NAME")
+    cover: float | None = option("Support radius of the scheme.", type=float, metavar="SPACINGS")
+    formulation: str | None = option("Formulation of the scheme.", metavar="NAME")
+    gradient: str | None = option("Gradient of its formulation.", metavar="NAME")
+    divergence: str | None = option("Divergence of its formulation.", metavar="NAME")
+    material: str | None = option(
+        "Material of the scheme, with typical parameters.", metavar="NAME"
+    )
+    effect: tuple[str, ...] = option(
+        "Add an effect, with typical parameters.", multiple=True, metavar="NAME"
+    )
+    hourglass: float | None = option("Add hourglass control.", type=float, metavar="STRENGTH")
 
     @property
     def given(self) -> bool:
@@ -51,10 +49,6 @@ class SchemeOptions:
         Raises:
             SceneError: there is no such scene, case or part.
         """
-        from solidsph.registry.construct import describe
-        from solidsph.scene.default_cover import own_cover
-        from solidsph.scene.scene import Scene
-        from solidsph.studies.scheme import Scheme
         from solidsph.testing import example_part
 
         scheme = Scheme()
@@ -82,13 +76,6 @@ class SchemeOptions:
         if self.hourglass is not None:
             effects.append({"type": "hourglass-control", "strength": self.hourglass})
         return attrs.evolve(scheme, effects=(*scheme.effects, *effects), **changes)
-
-
-def scheme_options(command: Command) -> Command:
-    """Decorator that adds an option for every field of `SchemeOptions`."""
-    for field in reversed(attrs.fields(SchemeOptions)):
-        command = click.option(f"--{field.name}", **field.metadata)(command)
-    return command
 
 
 def part_name(kind: str, part: object) -> str:

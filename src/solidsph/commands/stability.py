@@ -5,66 +5,64 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import attrs
 import click
 
 from solidsph.commands.console import Table, present, progress
-from solidsph.commands.options import json_option, output_option, quiet_option
-from solidsph.commands.scheme_options import SchemeOptions, scheme_options
+from solidsph.commands.options import (
+    ProgressOutput,
+    flag,
+    option,
+    option_group,
+    options,
+    output_option,
+)
+from solidsph.commands.scheme_options import SchemeOptions
 from solidsph.errors import SceneError
+from solidsph.studies.suite import Verdict, run_trial, trials
 
-if TYPE_CHECKING:
-    from solidsph.studies.suite import Verdict
+
+@attrs.frozen
+class _Options(ProgressOutput):
+    listed: bool = flag("List the trials without running them.", "--list")
+    brief: bool = flag("Run the short form of each trial.")
+    map: bool = flag("Draw a stability map of a scheme instead.")
+    scheme: SchemeOptions = option_group(SchemeOptions)
+    points: tuple[int, int] = option(
+        "Number of stretches and of covers in the map.",
+        type=(int, int),
+        default=(39, 22),
+        show_default=True,
+        metavar="S C",
+    )
+    output: Path = output_option("Folder for the picture.", Path("results/stability"))
 
 
 @click.command()
 @click.argument("cases", metavar="[CASE]...", nargs=-1)
-@click.option("--list", "listed", is_flag=True, help="List the trials without running them.")
-@click.option("--brief", is_flag=True, help="Run the short form of each trial.")
-@click.option("--map", "as_map", is_flag=True, help="Draw a stability map of a scheme instead.")
-@scheme_options
-@click.option(
-    "--points",
-    type=(int, int),
-    default=(39, 22),
-    show_default=True,
-    metavar="S C",
-    help="Number of stretches and of covers in the map.",
-)
-@output_option("Folder for the picture.", "results/stability")
-@json_option
-@quiet_option
-def stability(
-    cases: tuple[str, ...],
-    listed: bool,
-    brief: bool,
-    as_map: bool,
-    points: tuple[int, int],
-    output: Path,
-    as_json: bool,
-    quiet: bool,
-    **options: Any,
-) -> None:
-    """Run the hard cases, all or those named, with their own scheme or with the parts given, and
-    report the outcome of each trial. Some must fail: a suite in which nothing can fail proves
-    nothing."""
-    scheme = SchemeOptions(**options)
-    if as_map:
+@options(_Options)
+def stability(cases: tuple[str, ...], options: _Options) -> None:
+    """Run the hard cases, or draw a stability map.
+
+    All cases or those named run with their own scheme, or with the parts given. Some trials must
+    fail: a suite in which nothing can fail proves nothing.
+    """
+    if options.map:
         if cases:
             raise SceneError(f"a map is of a scheme, not of cases; leave out {', '.join(cases)}")
         from solidsph.commands.stability_map import draw_map
 
-        draw_map(scheme, points, output / "map.png", as_json=as_json)
-    elif listed:
-        _list(cases, as_json=as_json)
+        picture = options.output / "map.png"
+        draw_map(options.scheme, options.points, picture, as_json=options.as_json)
+    elif options.listed:
+        _list(cases, as_json=options.as_json)
     else:
-        _run(cases, _settings(scheme), output, brief=brief, as_json=as_json, quiet=quiet)
+        _run(cases, _settings(options.scheme), options)
 
 
 def _list(cases: Sequence[str], *, as_json: bool) -> None:
-    from solidsph.studies.suite import trials
-
     rows = [
         {
             "case": name,
@@ -82,30 +80,21 @@ def _list(cases: Sequence[str], *, as_json: bool) -> None:
     present({"trials": rows}, [table], as_json=as_json)
 
 
-def _run(
-    cases: Sequence[str],
-    settings: Mapping[str, Any],
-    output: Path,
-    *,
-    brief: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    from solidsph.studies.suite import run_trial, trials
+def _run(cases: Sequence[str], settings: Mapping[str, Any], options: _Options) -> None:
     from solidsph.studies.suite_picture import draw_suite
 
     wanted = list(trials(cases))
     verdicts = []
-    with progress(not (as_json or quiet)) as display, TemporaryDirectory() as folder:
+    with progress(options.progress) as display, TemporaryDirectory() as folder:
         task = display.add_task("hard cases", total=len(wanted)) if display else None
         for number, (name, label, case, trial) in enumerate(wanted):
             if display is not None and task is not None:
                 display.update(task, description=f"{name}: {label}", completed=number)
             place = Path(folder) / str(number)
             verdicts.append(
-                run_trial(name, label, case, trial, place, settings=settings, brief=brief)
+                run_trial(name, label, case, trial, place, settings=settings, brief=options.brief)
             )
-    picture = output / "suite.png"
+    picture = options.output / "suite.png"
     changes = ", ".join(f"{name} {value}" for name, value in settings.items())
     title = f"Hard cases: {changes}" if changes else "Hard cases"
     draw_suite(verdicts, title, picture)
@@ -115,7 +104,7 @@ def _run(
         "picture": str(picture),
     }
     passed = all(verdict.as_expected for verdict in verdicts)
-    present(facts, _text(title, verdicts, facts), as_json=as_json, passed=passed)
+    present(facts, _text(title, verdicts, facts), as_json=options.as_json, passed=passed)
 
 
 def _settings(options: SchemeOptions) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from solidsph.commands.console import Table, present
 from solidsph.commands.scheme_options import SchemeOptions, scheme_name
+from solidsph.studies.stability_map import stability_map
 
 # Stretches from strong compression to the largest of the paper, never exactly 1. Covers from one
 # that just holds the nearest neighbours to the paper's largest.
@@ -32,7 +33,6 @@ def draw_map(
 
     Both formulations are compared unless the options name one.
     """
-    from solidsph.studies.stability_map import stability_map
     from solidsph.studies.stability_picture import draw_certificates
 
     forms: tuple[str, ...] = ("total-lagrangian", "updated-lagrangian")

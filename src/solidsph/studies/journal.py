@@ -13,8 +13,8 @@ import attrs
 
 from solidsph.errors import RecordError
 from solidsph.studies.point import Point
-from solidsph.studies.point_json import from_json, to_json
 from solidsph.studies.task import Task
+from solidsph.studies.task_lines import decode_point, encode_point
 
 VERSION = 1
 """Version of the format. Lines of other versions are kept and ignored."""
@@ -44,7 +44,7 @@ class Journal:
                 entry = json.loads(line)
                 if entry["journal"] == VERSION and entry["key"] in wanted:
                     key = entry["key"]
-                    found[key] = from_json(entry["point"], wanted[key].settings)
+                    found[key] = decode_point(entry["point"], wanted[key].settings)
             except (ValueError, KeyError, TypeError):
                 continue
         return found
@@ -68,7 +68,7 @@ class Journal:
                     "key": task.key,
                     "case": task.case.title,
                     "repeat": task.repeat,
-                    "point": to_json(point),
+                    "point": encode_point(point),
                 }
                 line = json.dumps(entry, allow_nan=False).encode("ascii") + b"\n"
                 _write(file, line if _is_whole(file) else b"\n" + line)

@@ -12,6 +12,7 @@ import tempfile
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
@@ -318,45 +319,35 @@ def _series(record: Record, of: Sequence[str]) -> Iterator[tuple[str, Array]]:
             yield name, column
 
 
-@attrs.frozen
-class _Displacement:
-    axis: int
-    point: tuple[float, ...]
-
-    def __call__(self, record: Record) -> Array:
-        X = record.particles.positions
-        if len(self.point) != X.shape[1] or self.axis >= X.shape[1]:
-            raise SceneError(
-                f"the point {list(self.point)} and {'xyz'[self.axis]} are not of {X.shape[1]} "
-                "dimensions; give one coordinate for each"
-            )
-        nearest = int(np.argmin(np.linalg.norm(X - self.point, axis=1)))
-        places = np.array([x[nearest, self.axis] for x in record.positions])
-        moved: Array = places - X[nearest, self.axis]
-        return moved
-
-
-@attrs.frozen
-class _Column:
-    name: str
-
-    def __call__(self, record: Record) -> Array:
-        for name, values in record.history.items():
-            if self.name in (name, name.partition(" [")[0]):
-                return np.asarray(values, dtype=np.float64)
+def _displacement(record: Record, axis: str, point: tuple[float, ...]) -> Array:
+    X = record.particles.positions
+    column = "xyz".index(axis)
+    if len(point) != X.shape[1] or column >= X.shape[1]:
         raise SceneError(
-            f"no column {self.name!r} in the history; there are {', '.join(record.history)}"
+            f"the point {list(point)} and {axis} are not of {X.shape[1]} dimensions; give one "
+            "coordinate for each"
         )
+    nearest = int(np.argmin(np.linalg.norm(X - point, axis=1)))
+    places = np.array([x[nearest, column] for x in record.positions])
+    moved: Array = places - X[nearest, column]
+    return moved
 
 
-def quantity(text: str) -> _Displacement | _Column:
+def _column(record: Record, wanted: str) -> Array:
+    for name, values in record.history.items():
+        if wanted in (name, name.partition(" [")[0]):
+            return np.asarray(values, dtype=np.float64)
+    raise SceneError(f"no column {wanted!r} in the history; there are {', '.join(record.history)}")
+
+
+def quantity(text: str) -> Callable[[Record], Array]:
     """`NAME=x@[X, Y]`, the displacement of the particle nearest to a point, or a history column.
 
     Raises:
         SceneError: the text is of neither form.
     """
     if "@" not in text:
-        return _Column(text)
+        return partial(_column, wanted=text)
     match = re.fullmatch(r"[^=]+=\s*([xyz])\s*@\s*\[([^]]*)\]", text)
     try:
         if match is None:
@@ -367,4 +358,4 @@ def quantity(text: str) -> _Displacement | _Column:
             f"--receipts-of {text!r} is not understood; write NAME=x@[0.35, 0.01], or the name of "
             "a column of the history"
         ) from None
-    return _Displacement("xyz".index(match[1]), point)
+    return partial(_displacement, axis=match[1], point=point)

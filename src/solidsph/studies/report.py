@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from importlib.metadata import version
 from importlib.resources import files
@@ -22,6 +22,8 @@ from solidsph.studies.frontier import AS_IT_IS, Frontier
 from solidsph.studies.point import Point, format_setting
 from solidsph.studies.report_figures import EXPENSES, TIME, Figures, drawable, library
 from solidsph.studies.variant import with_settings
+
+_NUMBER = "no."  # heading of the numbers of configurations
 
 
 def write_report(made: Frontier, case: Case, path: Path, *, title: str | None = None) -> None:
@@ -44,27 +46,14 @@ def write_report(made: Frontier, case: Case, path: Path, *, title: str | None = 
 
 
 @attrs.frozen
-class Column:
-    """Column of the table: a heading, and a cell for every point."""
-
-    heading: str
-    cells: Sequence[Cell]
-
-    @property
-    def numeric(self) -> bool:
-        """Whether all cells are numbers or empty."""
-        return all(cell.number is not None or not cell.text for cell in self.cells)
-
-
-@attrs.frozen
-class Cell:
+class _Cell:
     """Text of a cell, and the number that it is sorted by."""
 
     text: str
     number: float | None = None
 
     @classmethod
-    def of(cls, value: Any, form: str = ".3g") -> Cell:
+    def of(cls, value: Any, form: str) -> _Cell:
         """Cell of a number in this format, empty if it is not finite, or of any other value."""
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return cls(format_setting(value))
@@ -169,42 +158,43 @@ class _Page:
         )
 
     def _table(self) -> str:
-        columns = self._columns()
+        columns = [(heading, cells, _class(cells)) for heading, cells in self._columns()]
         headings = "".join(
-            f'<th scope="col"{_numeric(c)}><button type="button">{escape(c.heading)}</button></th>'
-            for c in columns
+            f'<th scope="col"{kind}><button type="button">{escape(heading)}</button></th>'
+            for heading, _, kind in columns
         )
         front = self.made.numbers(self.made.front())
         rows = []
         for number in range(len(self.made)):
             cells = "".join(
-                _td(column, column.cells[number], number if place == 0 else None)
-                for place, column in enumerate(columns)
+                _td(cells[number], kind, with_button=heading == _NUMBER)
+                for heading, cells, kind in columns
             )
             mark = ' class="front"' if number in front else ""
             rows.append(f'<tr data-point="{number}"{mark}>{cells}</tr>')
         body = "\n".join(rows)
         return f"<thead><tr>{headings}</tr></thead>\n<tbody>\n{body}\n</tbody>"
 
-    def _columns(self) -> Sequence[Column]:
+    def _columns(self) -> Sequence[tuple[str, Sequence[_Cell]]]:
+        """Headings, which a setting may repeat, and cells of every point."""
         points, front = self.made.points, self.made.numbers(self.made.front())
         names = dict.fromkeys(name for point in points for name in point.settings)
         several = any(len(point.seconds) > 1 for point in points)
         return [
-            _column("no.", list(range(1, len(points) + 1))),
-            _column("front", ["front" if n in front else "" for n in range(len(points))]),
-            *(_column(name, [p.settings.get(name, "") for p in points], "g") for name in names),
-            _column("error [%]", [100.0 * p.error for p in points]),
-            _column("trusted [%]", [100.0 * self.made.trusted(p) for p in points]),
-            _column("time [s]", [p.time for p in points]),
-            *([Column("repeats [s]", [_repeats(p) for p in points])] if several else []),
-            _column("spacing [m]", [p.spacing for p in points]),
-            _column("particles", [p.particles for p in points]),
-            _column("steps", [p.steps for p in points]),
-            _column("pair evaluations", [float(p.pair_evaluations) for p in points], ".4g"),
-            _column("bytes touched", [float(p.bytes_touched) for p in points], ".4g"),
-            _column("memory [MiB]", [p.peak_memory / 2**20 for p in points], ".4g"),
-            _column("outcome", [_outcome(p).splitlines()[0] for p in points]),
+            (_NUMBER, _cells(range(1, len(points) + 1))),
+            ("front", _cells("front" if n in front else "" for n in range(len(points)))),
+            *((name, _cells((p.settings.get(name, "") for p in points), "g")) for name in names),
+            ("error [%]", _cells(100.0 * p.error for p in points)),
+            ("trusted [%]", _cells(100.0 * self.made.trusted(p) for p in points)),
+            ("time [s]", _cells(p.time for p in points)),
+            *([("repeats [s]", [_repeats(p) for p in points])] if several else []),
+            ("spacing [m]", _cells(p.spacing for p in points)),
+            ("particles", _cells(p.particles for p in points)),
+            ("steps", _cells(p.steps for p in points)),
+            ("pair evaluations", _cells((float(p.pair_evaluations) for p in points), ".4g")),
+            ("bytes touched", _cells((float(p.bytes_touched) for p in points), ".4g")),
+            ("memory [MiB]", _cells((p.peak_memory / 2**20 for p in points), ".4g")),
+            ("outcome", _cells(_outcome(p).splitlines()[0] for p in points)),
         ]
 
     def _orders(self) -> str:
@@ -236,26 +226,28 @@ class _Page:
         return f'<ul id="failures">\n{items}\n</ul>'
 
 
-def _column(heading: str, values: Sequence[Any], form: str = ".3g") -> Column:
-    return Column(heading, [Cell.of(value, form) for value in values])
+def _cells(values: Iterable[Any], form: str = ".3g") -> Sequence[_Cell]:
+    return [_Cell.of(value, form) for value in values]
 
 
-def _repeats(point: Point) -> Cell:
+def _repeats(point: Point) -> _Cell:
     """Range of repeats, sorted by the quickest."""
     quickest, slowest = min(point.seconds), max(point.seconds)
-    return Cell(f"{quickest:.3g} to {slowest:.3g}", quickest) if isfinite(slowest) else Cell("")
+    return _Cell(f"{quickest:.3g} to {slowest:.3g}", quickest) if isfinite(slowest) else _Cell("")
 
 
-def _td(column: Column, cell: Cell, number: int | None) -> str:
+def _class(cells: Sequence[_Cell]) -> str:
+    """Attribute of the cells of a column: whether all are numbers or empty."""
+    numeric = all(cell.number is not None or not cell.text for cell in cells)
+    return ' class="number"' if numeric else ""
+
+
+def _td(cell: _Cell, attribute: str, *, with_button: bool) -> str:
     sort = "" if cell.number is None else f' data-number="{cell.number!r}"'
     text = escape(cell.text)
-    if number is not None:  # reached by the keyboard; its label says whose scene it shows
+    if with_button:  # reached by the keyboard; its label says whose scene it shows
         text = f'<button type="button" aria-label="scene of configuration {text}">{text}</button>'
-    return f"<td{_numeric(column)}{sort}>{text}</td>"
-
-
-def _numeric(column: Column) -> str:
-    return ' class="number"' if column.numeric else ""
+    return f"<td{attribute}{sort}>{text}</td>"
 
 
 def _outcome(point: Point) -> str:

@@ -1,4 +1,4 @@
-"""Tasks and outcomes as lines of text, to be sent from one process to another."""
+"""Tasks, points and outcomes as JSON, for other processes and for the journal."""
 
 from __future__ import annotations
 
@@ -6,15 +6,18 @@ import base64
 import json
 import pickle
 import sys
+from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 from typing import Any
+
+import attrs
 
 from solidsph.errors import SceneError, SolidsphError
 from solidsph.registry.construct import construct, describe
 from solidsph.studies.point import Point
-from solidsph.studies.point_json import from_json, to_json
 from solidsph.studies.runner import Lost
-from solidsph.studies.task import Task
+from solidsph.studies.task import Task, plain
 
 
 def encode_task(task: Task) -> str:
@@ -54,7 +57,7 @@ def encode_outcome(outcome: Point | Lost) -> str:
     """Line for `decode_outcome`."""
     if isinstance(outcome, Lost):
         return json.dumps({"lost": outcome.cause})
-    return json.dumps({"point": to_json(outcome)})
+    return json.dumps({"point": encode_point(outcome)})
 
 
 def decode_outcome(line: str, task: Task) -> Point | Lost:
@@ -62,7 +65,29 @@ def decode_outcome(line: str, task: Task) -> Point | Lost:
     table = json.loads(line)
     if "lost" in table:
         return Lost(str(table["lost"]))
-    return from_json(table["point"], task.settings)
+    return decode_point(table["point"], task.settings)
+
+
+def encode_point(point: Point) -> dict[str, Any]:
+    """`point` as an object of JSON; its settings are only for reading."""
+    table = attrs.asdict(point, recurse=False)
+    numbers = {name: _number(value) for name, value in table.items() if isinstance(value, float)}
+    seconds = [_number(value) for value in point.seconds]
+    return {**table, **numbers, "settings": plain(point.settings), "seconds": seconds}
+
+
+def decode_point(table: Mapping[str, Any], settings: Mapping[str, Any]) -> Point:
+    """Point from the table of `encode_point`, with the settings of its task.
+
+    Raises:
+        KeyError, TypeError, ValueError: the table is not that of a point.
+    """
+    values = {field.name: table[field.name] for field in attrs.fields(Point)}
+    return Point(**{**values, "settings": dict(settings)})
+
+
+def _number(value: float) -> float | str:
+    return value if isfinite(value) else str(value)  # JSON has no infinity
 
 
 def _by_name(task: Task) -> dict[str, Any] | None:
