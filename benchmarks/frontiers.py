@@ -31,7 +31,7 @@ from solidsph.studies.frontier_picture import draw_frontier
 from solidsph.studies.gallery import write_small_copy
 from solidsph.studies.point import Point, format_setting
 from solidsph.studies.processes import Processes
-from solidsph.studies.search import Accuracy, search
+from solidsph.studies.search import Goal, search
 from solidsph.studies.sweep import SweepStatus
 
 # Each with the accuracy that is searched for.
@@ -196,7 +196,7 @@ def by_search(case: Case, made: Frontier, accuracy: float) -> str:
             or SweepSetup(folder=Path("results/frontiers/beyond")).points(case, [settings])[0]
         )
 
-    found = search(case, case.sweep, Accuracy(accuracy), run)
+    found = search(case, case.sweep, Goal(error=accuracy), run)
     cheapest = made.cheapest(accuracy)
     grid, spent = (
         sum(point.time for point in points if isfinite(point.time))

@@ -15,7 +15,7 @@ from solidsph.commands.cost_options import seconds
 from solidsph.scene.scene import Scene
 from solidsph.studies.cost import SweepSetup, default_settings, find_best, frontier
 from solidsph.studies.runner import Inline
-from solidsph.studies.search import Accuracy
+from solidsph.studies.search import Goal
 from solidsph_cases.csm1 import Csm1
 from tests.commands.test_cli import solidsph
 
@@ -54,7 +54,7 @@ def test_machine_independent_columns_are_the_same_on_every_run(tmp_path: Path) -
 
 
 def test_a_search_runs_the_case(tmp_path: Path) -> None:
-    result = find_best("csm1", Accuracy(0.01), AXES, inline(tmp_path))
+    result = find_best("csm1", Goal(error=0.01), AXES, inline(tmp_path))
     assert result.point is not None
     assert result.point.error <= 0.01
     assert result.point in frontier("csm1", AXES, inline(tmp_path)).points
@@ -108,6 +108,8 @@ def test_the_command_and_what_it_leaves(tmp_path: Path) -> None:
     assert len((tmp_path / told["table"]).read_text().splitlines()) == 4
     table = solidsph("cost", "csm1", *axes, cwd=tmp_path)
     assert "the front, of 3 configurations" in table.stdout
+    assert "bytes touched" not in table.stdout
+    assert "bytes touched" in solidsph("cost", "csm1", *axes, "--verbose", cwd=tmp_path).stdout
     assert "the case's own parameters: across 5" in table.stdout
     search = solidsph("cost", "csm1", *axes, "--accuracy", "1%", cwd=tmp_path)
     assert search.returncode == 0, search.stderr

@@ -11,7 +11,7 @@ from solidsph.commands.target import parameters
 from solidsph.errors import SceneError
 from solidsph.studies.case import Case
 from solidsph.studies.cost import Axes, sweep_of
-from solidsph.studies.search import Accuracy, Goal, TimeLimit
+from solidsph.studies.search import Goal
 
 _UNITS = {"": 1.0, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 
@@ -44,8 +44,8 @@ def _axis(text: str) -> tuple[str, Sequence[Any]]:
 def goal_of(accuracy: str | None, time: str | None) -> Goal | None:
     """Goal of a search; None for a sweep."""
     if accuracy is not None:
-        return Accuracy(_fraction(accuracy))
-    return None if time is None else TimeLimit(seconds(time, "--time"))
+        return Goal(error=_fraction(accuracy))
+    return None if time is None else Goal(time=seconds(time, "--time"))
 
 
 def _fraction(text: str) -> float:

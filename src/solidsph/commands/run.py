@@ -60,6 +60,7 @@ class _Options(ProgressOutput):
     watch: bool | None = option(
         "Look for signs of failure at outputs.  [default: watch the motion of a scene]",
         "--watch/--no-watch",
+        default=None,  # click's own for a flag is False
     )
     roll_back: int = option(
         "On a failure, go back to the last sound output and halve the step, up to N times.",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import product
@@ -43,74 +42,41 @@ _MISS = 1.2
 _EXTENSIONS = 6
 
 
-class Goal(ABC):
-    """Goal of a search."""
-
-    @abstractmethod
-    def met(self, point: Point) -> bool:
-        """Whether a point is good enough."""
-
-    @abstractmethod
-    def loss(self, error: float, time: float) -> float:
-        """Quantity to minimise among points that are good enough."""
-
-    @abstractmethod
-    def promising(self, error: float, time: float) -> bool:
-        """Whether a point with this predicted error and time would be good enough."""
-
-    @abstractmethod
-    def refuted(self, finer: Point) -> bool:
-        """Whether a finer point of its scheme shows that a point was good enough by chance."""
-
-    @abstractmethod
-    def exhausted(self, error: float, time: float) -> bool:
-        """Whether no finer point than one with this error and time can be better."""
-
-
 @final
 @attrs.frozen
-class Accuracy(Goal):
-    """Least time for at most this error."""
+class Goal:
+    """Goal of a search: the least time for an error, or the least error in a time.
 
-    error: float  # relative [-]
+    Raises:
+        SceneError: neither is given, or both are.
+    """
+
+    error: float = inf  # largest, relative [-]
+    time: float = inf  # longest wall time [s]
+
+    def __attrs_post_init__(self) -> None:
+        if isfinite(self.error) == isfinite(self.time):
+            raise SceneError("a goal is an error or a time; give one of them")
 
     def met(self, point: Point) -> bool:
-        return point.finished and point.error <= self.error
+        """Whether a point is good enough."""
+        return point.finished and point.error <= self.error and point.time <= self.time
 
     def loss(self, error: float, time: float) -> float:
-        return time
+        """Quantity to minimise among points that are good enough."""
+        return time if isfinite(self.error) else error
 
     def promising(self, error: float, time: float) -> bool:
-        return error <= _MISS * self.error
+        """Whether a point with this predicted error and time would be good enough."""
+        return error <= _MISS * self.error and time <= _MISS * self.time
 
     def refuted(self, finer: Point) -> bool:
+        """Whether a finer point of its scheme shows that a point was good enough by chance."""
         return finer.error > self.error
 
     def exhausted(self, error: float, time: float) -> bool:
-        return error <= self.error
-
-
-@final
-@attrs.frozen
-class TimeLimit(Goal):
-    """Least error in at most this wall time."""
-
-    time: float  # [s]
-
-    def met(self, point: Point) -> bool:
-        return point.finished and point.time <= self.time
-
-    def loss(self, error: float, time: float) -> float:
-        return error
-
-    def promising(self, error: float, time: float) -> bool:
-        return time <= _MISS * self.time
-
-    def refuted(self, finer: Point) -> bool:
-        return False  # the smallest error counts, whatever the reason
-
-    def exhausted(self, error: float, time: float) -> bool:
-        return time > self.time
+        """Whether no finer point than one with this error and time can be better."""
+        return error <= self.error if isfinite(self.error) else time > self.time
 
 
 @attrs.frozen
