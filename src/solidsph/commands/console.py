@@ -63,11 +63,12 @@ class Table:
         cls,
         title: str,
         records: Sequence[Mapping[str, Any]],
-        columns: Mapping[str, str] | Sequence[str],
+        keys: Sequence[str],
+        headings: Mapping[str, str] | None = None,
     ) -> Table:
-        """Table of `records`: keys that are headings too, or the key of every heading."""
-        keys = list(columns.values() if isinstance(columns, Mapping) else columns)
-        return cls(title, list(columns), [[record[key] for key in keys] for record in records])
+        """Table of some keys of `records`, under headings that may differ from them."""
+        columns = [(headings or {}).get(key, key) for key in keys]
+        return cls(title, columns, [[record[key] for key in keys] for record in records])
 
     @classmethod
     def of_values(cls, title: str, values: Mapping[str, Any], name: str = "") -> Table:

@@ -96,12 +96,11 @@ def _text(facts: Facts, titles: Mapping[str, str], *, verbose: bool) -> Iterator
         for title in ("numbers", "work", "cost", "on a cluster"):
             if scene.get(title):
                 shown = [r for r in scene[title] if verbose or r["quantity"] not in INTERNALS]
-                columns = {"": "quantity", "value": "value", "why": "why"}
-                yield Table.of(title, shown, columns)
+                yield Table.of(title, shown, ("quantity", "value", "why"), {"quantity": ""})
         yield _effects_table(scene["effects"], verbose=verbose)
         if scene["warnings"]:
-            columns = {"warning": "name"} | {c: c for c in ("found", "expected", "remedy")}
-            yield Table.of("warnings", scene["warnings"], columns)
+            keys = ("name", "found", "expected", "remedy")
+            yield Table.of("warnings", scene["warnings"], keys, {"name": "warning"})
             yield 'To silence a warning: silence = ["its-name"] at the top of the scene.'
         if scene["silenced"]:
             yield f"silenced by the scene: {', '.join(scene['silenced'])}"
@@ -109,21 +108,19 @@ def _text(facts: Facts, titles: Mapping[str, str], *, verbose: bool) -> Iterator
         yield Table.of_values("all scenes, one after the other", facts["predicted"])
 
 
-def _effects_table(effects: Sequence[Mapping[str, Any]], *, verbose: bool) -> Table:
+def _effects_table(effects: Sequence[Facts], *, verbose: bool) -> Table:
+    share, step = "share of the steps", "stable step"
     shown = [
         {
             **row,
-            "share": "" if (share := row["share of the steps"]) is None else f"{100 * share:.1f} %",
-            "step": "" if (step := row["stable step"]) is None else f"times {step:.3g}",
+            share: "" if row[share] is None else f"{100.0 * row[share]:.1f} %",
+            step: "" if row[step] is None else f"times {row[step]:.3g}",
         }
         for row in effects
     ]
-    columns = {
-        **{"effect": "effect", "simulated": "simulated", "why": "why"},
-        **({"arrays": "arrays"} if verbose else {}),
-        **{"memory [bytes]": "bytes", "of the steps": "share", "stable step": "step"},
-    }
-    return Table.of("effects", shown, columns)
+    arrays = ["arrays"] if verbose else []
+    keys = ["effect", "simulated", "why", *arrays, "bytes", share, step]
+    return Table.of("effects", shown, keys, {"bytes": "memory [bytes]", share: "of the steps"})
 
 
 def _cluster(assumed: tuple[str, ...]) -> Cluster:

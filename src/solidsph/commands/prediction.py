@@ -96,7 +96,7 @@ def work_rows(work: Work) -> list[Row]:
     calls = "one a step, and one at the start"
     if work.statics is not None:
         calls = "one an iteration and one a load step, at least"
-    found = rows(
+    counts = rows(
         ("pairs", work.pairs, f"ordered pairs of neighbours, self pairs included; {how}"),
         ("pairs an evaluation visits", work.visited, "with those of loads and effects"),
         ("evaluations of the forces", work.evaluations, calls),
@@ -108,8 +108,8 @@ def work_rows(work: Work) -> list[Row]:
         ("record [MiB]", work.record_bytes / 2**20, "position, velocity, stress, volume ratio"),
     )
     if work.statics is None:
-        return found
-    return found + rows(
+        return counts
+    return counts + rows(
         ("iterations", work.statics.iterations, "of Newton's method, a guess"),
         ("entries of the factors", work.statics.fill, "by nested dissection of the box"),
     )

@@ -41,7 +41,9 @@ def receipts_text(result: Receipts, of: Sequence[str]) -> Iterator[Table | str]:
         return
     quantities = [*of, LARGEST, KINETIC, STRAIN]
     columns = ["effect", "of the time", "work [J]", *map(short_name, quantities), "without it"]
-    yield Table(_TITLE, columns, [_row(attrs.asdict(one), quantities) for one in result.each])
+    yield Table(
+        _TITLE, columns, [_row(attrs.asdict(receipt), quantities) for receipt in result.each]
+    )
     yield from (receipt.line for receipt in result.each)
     size = "at full size" if result.coarser == 1.0 else f"at {result.coarser:g} times the spacing"
     yield (

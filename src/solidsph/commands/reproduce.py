@@ -45,8 +45,8 @@ def reproduce(wanted: tuple[str, ...], options: _Options) -> None:
             {"figure": figure, "case": case, "what": registry.load("cases", case).title}
             for figure, case in figures().items()
         ]
-        columns = {"figure": "figure", "case": "case", "title": "what"}
-        present({"figures": known}, [Table.of("figures", known, columns)], as_json=options.as_json)
+        table = Table.of("figures", known, ("figure", "case", "what"), {"what": "title"})
+        present({"figures": known}, [table], as_json=options.as_json)
         return
     begun = clock.perf_counter()
     with progress(options.progress) as display:

@@ -182,9 +182,9 @@ def _run_scene(target: str, scene: Scene, path: Path, options: _Options) -> None
     # Notes and final values are not read from the file, which other processes may replace.
     known |= {**effort, "notes": list(result.notes), "final": result.final}
     of = options.receipts_of
-    found = receipts(simulation, end=result.state, of=of) if options.receipts else None
-    if found is not None:
-        known["receipts"] = attrs.asdict(found)
+    effects = receipts(simulation, end=result.state, of=of) if options.receipts else None
+    if effects is not None:
+        known["receipts"] = attrs.asdict(effects)
     hidden = frozenset() if options.verbose else predictions.INTERNALS
 
     def text() -> Iterator[Table | str]:
@@ -193,8 +193,8 @@ def _run_scene(target: str, scene: Scene, path: Path, options: _Options) -> None
         yield Table.of_values("at the end", result.final, "quantity")
         yield from (f"note: {note}" for note in result.notes)
         yield f"record: {path} (open it in ParaView, or with: solidsph plot {path})"
-        if found is not None:
-            yield from receipts_text(found, of)
+        if effects is not None:
+            yield from receipts_text(effects, of)
 
     if unsound is None or not options.as_json:
         facts = {**known, "outcome": FINISHED, "exit code": 0}
@@ -305,12 +305,10 @@ def _case_facts(result: CaseResult, predicted: Mapping[str, float | None]) -> di
 def _case_text(case: Case, folder: Path, facts: Mapping[str, Any]) -> Iterator[Table | str]:
     measurements, runs = facts["measurements"], facts["runs"]
     yield f"{case.title}. {case.source}."
-    columns = ("reference", "unit", "error", "verdict", "as expected")
-    columns_of = {"quantity": "quantity", "measured": "value", **{name: name for name in columns}}
-    yield Table.of("measurements", measurements, columns_of)
+    keys = ("quantity", "value", "reference", "unit", "error", "verdict", "as expected")
+    yield Table.of("measurements", measurements, keys, {"value": "measured"})
     if runs:
-        columns = ("scene", "outcome", "wall time [s]", "predicted wall time [s]", "steps")
-        yield Table.of("runs", runs, (*columns, "particles", "pairs"))
+        yield Table.of("runs", runs, list(runs[0])[:-1])  # all but the record
         yield Table.of_values("all runs", facts["predicted"])
     sources = sorted({row["source"] for row in measurements if row["source"]})
     yield from (f"reference: {source}" for source in sources)

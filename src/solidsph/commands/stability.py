@@ -136,11 +136,8 @@ def _text(
     title: str, verdicts: Sequence[Verdict], facts: Mapping[str, Any]
 ) -> Iterator[Table | str]:
     rows = [{**row, "why": _why(v)} for row, v in zip(facts["trials"], verdicts, strict=True)]
-    columns = {
-        **{"case": "case", "trial": "trial", "outcome": "grade", "as expected": "as expected"},
-        **{"time [s]": "time [s]", "energy residual": "energy residual", "why": "why"},
-    }
-    yield Table.of(title, rows, columns)
+    keys = ("case", "trial", "grade", "as expected", "time [s]", "energy residual", "why")
+    yield Table.of(title, rows, keys, {"grade": "outcome"})
     yield f"picture: {facts['picture']}"
     yield f"{len(verdicts)} trials in {facts['wall time [s]']:.0f} s"
     surprises = [v for v in verdicts if not v.as_expected]

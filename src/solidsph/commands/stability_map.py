@@ -17,12 +17,12 @@ from solidsph.studies.stability_map import stability_map
 # that just holds the nearest neighbours to the paper's largest.
 _STRETCHES, _COVERS = (0.3, 6.0), (1.2, 5.5)
 
-_COLUMNS = {
+_HEADINGS = {
     "formulation": "formulation",
-    "unstable part in tension [-]": "unstable_in_tension",
-    "in compression [-]": "unstable_in_compression",
-    "fastest growth [1/transit]": "fastest_growth",
-    "least stable step [CFL steps]": "least_factor",
+    "unstable_in_tension": "unstable part in tension [-]",
+    "unstable_in_compression": "in compression [-]",
+    "fastest_growth": "fastest growth [1/transit]",
+    "least_factor": "least stable step [CFL steps]",
 }
 
 
@@ -63,7 +63,7 @@ def draw_map(
 
 
 def _text(facts: Mapping[str, Any]) -> Iterator[Table | str]:
-    yield Table.of(facts["scheme"], facts["maps"], _COLUMNS)
+    yield Table.of(facts["scheme"], facts["maps"], list(_HEADINGS), _HEADINGS)
     yield f"picture: {facts['picture']}"
 
 

@@ -215,8 +215,8 @@ class _Waves:
         lengths[0] = np.inf  # the translation
         softness = (-squares.real).min(axis=1) / lengths
         softness[0] = np.inf
-        found = (softness, exponents.real.max(axis=1), np.abs(exponents.imag).max(axis=1))
-        softness, rates, frequencies = (values.reshape(grid.shape[:-1]) for values in found)
+        measures = (softness, exponents.real.max(axis=1), np.abs(exponents.imag).max(axis=1))
+        softness, rates, frequencies = (values.reshape(grid.shape[:-1]) for values in measures)
         return softness, rates, frequencies
 
     @property
@@ -266,15 +266,15 @@ class _Waves:
         minima = np.argwhere((values <= neighbourhood) & (values < below))
         order = np.argsort([values[tuple(index)] for index in minima], kind="stable")
         width = pi / _GRID[self.dimension]
-        found: list[tuple[float, Array]] = []
+        extremes: list[tuple[float, Array]] = []
         for index in minima[order[: 4 * _MOST]]:
             start = grid[tuple(index)]
             bounds = [(max(0.0, k - width), min(pi, k + width)) for k in start]
             k = _least(measure, start, bounds)
-            if all(np.abs(k - other).max() > _SAME for _, other in found):
-                found.append((measure(k), k))
-        found.sort(key=lambda minimum: minimum[0])
-        return [self.wave(k) for _, k in found[:_MOST]]
+            if all(np.abs(k - other).max() > _SAME for _, other in extremes):
+                extremes.append((measure(k), k))
+        extremes.sort(key=lambda minimum: minimum[0])
+        return [self.wave(k) for _, k in extremes[:_MOST]]
 
     def speeds(self, F: Array) -> Array:
         """Phase speeds along the first axis over the exact ones (m, d); nan where a wave grows."""
@@ -298,8 +298,10 @@ def _least(
     def finite(wave_vector: Any) -> Any:
         return min(measure(wave_vector), _LARGE)
 
-    found: Any = minimize(finite, start, method="Nelder-Mead", bounds=list(bounds), options=_SEARCH)
-    return np.asarray(found.x) if found.fun < measure(start) else start
+    result: Any = minimize(
+        finite, start, method="Nelder-Mead", bounds=list(bounds), options=_SEARCH
+    )
+    return np.asarray(result.x) if result.fun < measure(start) else start
 
 
 def _checked(dimension: int, stretch: float | Sequence[float]) -> tuple[float, ...]:
@@ -340,9 +342,9 @@ def _mean_stress(scheme: Scheme, F: Array) -> float:
 
 def _free_body(scheme: Scheme, dimension: int, rate: float) -> FreeBody:
     simulation = scheme.simulation(dimension, _FREE[dimension])
-    found = spectrum(simulation.dynamics, simulation.start())
-    exponents = found.growth_rates + 1j * found.frequencies
-    highest = found.highest_frequency
+    modes = spectrum(simulation.dynamics, simulation.start())
+    exponents = modes.growth_rates + 1j * modes.frequencies
+    highest = modes.highest_frequency
     still = int(np.sum(np.abs(exponents) < _STILL * highest))
     rigid = _free_rigid_motions(simulation, (_STILL * highest) ** 2)
     limit = scheme.integrator.stability_limit
@@ -350,7 +352,7 @@ def _free_body(scheme: Scheme, dimension: int, rate: float) -> FreeBody:
         particles=simulation.particles.count,
         rigid_modes=rigid,
         zero_modes=still - rigid,
-        growth_rate=found.growth_rate * scheme.transit,
+        growth_rate=modes.growth_rate * scheme.transit,
         highest_frequency=highest * scheme.transit,
         critical_step=limit / (highest + rate) / scheme.transit,
     )

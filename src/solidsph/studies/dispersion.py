@@ -113,22 +113,22 @@ def lattice_response(dynamics: Dynamics, state: State) -> LatticeResponse:
         blocks = _columns(dynamics, state, middle, particles.dimension)
     finite = np.all(np.isfinite(blocks), axis=(1, 2))
     answering = np.any(blocks != 0.0, axis=(1, 2)) & finite
-    found = LatticeResponse(places[answering], blocks[answering])
-    if np.any(np.abs(places[~finite]).max(axis=1, initial=0) <= found.reach):
+    response = LatticeResponse(places[answering], blocks[answering])
+    if np.any(np.abs(places[~finite]).max(axis=1, initial=0) <= response.reach):
         raise SolidsphError(
             "forces about this state are not finite; take a stretch at which the scheme and the "
             "material have a response"
         )
     depth = int(min(-places.min(axis=0).max(), places.max(axis=0).min()))
     # A particle that responds to the middle one depends on as many on its other side.
-    if 2 * found.reach >= depth:
+    if 2 * response.reach >= depth:
         row = "bar" if particles.dimension == 1 else "row"
         raise SolidsphError(
-            f"a particle responds to the {found.reach} on either side, and the {row} of "
-            f"{2 * depth + 1} ends too near its middle; take at least {4 * found.reach + 3} "
+            f"a particle responds to the {response.reach} on either side, and the {row} of "
+            f"{2 * depth + 1} ends too near its middle; take at least {4 * response.reach + 3} "
             "particles"
         )
-    return found
+    return response
 
 
 def check_uniform(dynamics: Dynamics, state: State, response: LatticeResponse) -> None:
@@ -143,9 +143,9 @@ def check_uniform(dynamics: Dynamics, state: State, response: LatticeResponse) -
     beside[0] = 1
     other = int(np.flatnonzero(np.all(places == beside, axis=1))[0])
     with np.errstate(all="ignore"):
-        found = _columns(dynamics, state, other, 1)[:, :, 0]
+        columns = _columns(dynamics, state, other, 1)[:, :, 0]
     index = {tuple(place): k for k, place in enumerate(places.tolist())}
-    shifted = found[[index[tuple(place)] for place in (response.places + beside).tolist()]]
+    shifted = columns[[index[tuple(place)] for place in (response.places + beside).tolist()]]
     expected = response.blocks[:, :, 0]
     error = float(np.abs(shifted - expected).max() / np.abs(expected).max())
     if not error <= _UNIFORM:

@@ -38,16 +38,16 @@ class Journal:
         if not self.path.exists():
             return {}
         wanted = {task.key: task for task in tasks}
-        found: dict[str, Point] = {}
+        known: dict[str, Point] = {}
         for line in self.path.read_bytes().split(b"\n"):
             try:
                 entry = json.loads(line)
                 if entry["journal"] == VERSION and entry["key"] in wanted:
                     key = entry["key"]
-                    found[key] = decode_point(entry["point"], wanted[key].settings)
+                    known[key] = decode_point(entry["point"], wanted[key].settings)
             except (ValueError, KeyError, TypeError):
                 continue
-        return found
+        return known
 
     @contextmanager
     def writer(self) -> Iterator[Append]:

@@ -40,15 +40,15 @@ def figures() -> Mapping[str, str]:
     Raises:
         SceneError: two cases claim one figure.
     """
-    found: dict[str, str] = {}
+    cases: dict[str, str] = {}
     for name in registry.names("cases"):
         for figure in registry.load("cases", name).figures:
-            if figure in found:
+            if figure in cases:
                 raise SceneError(
-                    f"cases {found[figure]!r} and {name!r} both reproduce {figure!r}; uninstall one"
+                    f"cases {cases[figure]!r} and {name!r} both reproduce {figure!r}; uninstall one"
                 )
-            found[figure] = name
-    return dict(sorted(found.items(), key=lambda pair: _place(pair[0])))
+            cases[figure] = name
+    return dict(sorted(cases.items(), key=lambda pair: _place(pair[0])))
 
 
 def reproduce(wanted: Sequence[str], folder: Path, begin: Begin) -> Reproduction:

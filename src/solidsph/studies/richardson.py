@@ -46,16 +46,16 @@ def extrapolate(spacings: Sequence[float], values: Sequence[float]) -> Extrapola
         raise ValueError(f"at least three results are needed, got {len(values)}")
     if any(fine >= coarse for coarse, fine in pairwise(spacings)):
         raise ValueError(f"spacings must fall from coarse to fine, got {list(spacings)}")
-    found = _of_three(spacings[-3:], values[-3:])
-    if found.trusted and len(spacings) > 3:
+    result = _of_three(spacings[-3:], values[-3:])
+    if result.trusted and len(spacings) > 3:
         before = _of_three(spacings[-4:-1], values[-4:-1])
-        if not before.trusted or abs(before.order - found.order) > 0.5 * found.order:
+        if not before.trusted or abs(before.order - result.order) > 0.5 * result.order:
             return attrs.evolve(
-                found,
+                result,
                 warning="not yet in the asymptotic range: the observed order changes from "
-                f"{before.order:.2g} to {found.order:.2g}; refine further",
+                f"{before.order:.2g} to {result.order:.2g}; refine further",
             )
-    return found
+    return result
 
 
 def _of_three(spacings: Sequence[float], values: Sequence[float]) -> Extrapolation:

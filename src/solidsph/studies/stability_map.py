@@ -49,12 +49,12 @@ def stability_map(
         for column, stretch in enumerate(stretches):
             uniform = stretched(simulation, [stretch])
             try:
-                found = dispersion(simulation.dynamics, uniform)
+                waves = dispersion(simulation.dynamics, uniform)
                 F = simulation.dynamics.observe(uniform).deformation_gradients
             except BuildError:  # the gradient needs neighbours
                 continue
-            rates[row, column] = found.growth_rate * scheme.transit
-            factors[row, column] = limit / max(found.highest_frequency, 1e-300)
+            rates[row, column] = waves.growth_rate * scheme.transit
+            factors[row, column] = limit / max(waves.highest_frequency, 1e-300)
             seen[row, column] = F[len(F) // 2, 0, 0]
     # In the current configuration, stretch moves neighbours out of the support.
     current = scheme.formulation.configuration is Configuration.CURRENT
