@@ -47,8 +47,8 @@ def decode_task(line: str | bytes) -> Task:
         task = _named(table["named"])
     if task.key != table["key"]:
         raise SceneError(
-            f"{task.case.title!r} is a different case on the worker: solidsph or a plugin has "
-            "another version there; install the same on both sides"
+            f"{task.case.title!r} is a different case on the worker, where solidsph or a plugin "
+            "has another version; install the same on both sides"
         )
     return task
 
