@@ -262,7 +262,11 @@ def _numbers(simulation: Simulation) -> list[Row]:
         ("dimensions", particles.dimension, "1 is uniaxial strain, 2 is plane strain"),
         ("particles", int((~particles.ghosts).sum()), "from shapes and spacings"),
         ("ghosts", int(particles.ghosts.sum()), "complete the support of those near a surface"),
-        ("neighbours", internal.pair_count / particles.count - 1.0, "average of a particle"),
+        (
+            "neighbours",
+            internal.pair_count / particles.count - 1.0,
+            "average number within the support",
+        ),
         ("cover [spacings]", cover_of(scene), f"support radius, {cover}"),
         *([gaps] if hidden else []),
         ("confined wave speed [m/s]", speed, "sqrt((lambda + 2 mu) / rho), of the fastest body"),
