@@ -23,7 +23,7 @@ from typing import Any
 from table import Table
 
 from solidsph import Simulation, SolidsphError
-from solidsph.commands import prediction as told
+from solidsph.commands.prediction import this_machine
 from solidsph.costs.shares import shares
 from solidsph.registry import registry
 from solidsph.scene.scene_builder import SceneBuilder
@@ -94,7 +94,7 @@ def both(name: str, engine: str) -> dict[str, Any]:
         return {"problem": str(cause).splitlines()[-1].strip()}
     return {
         "particles": simulation.particles.count,
-        "predicted": shares(simulation, told.calibrated())["it"].time,
+        "predicted": shares(simulation, this_machine())["it"].time,
         "measured": measured_shares(simulation)["it"],
     }
 

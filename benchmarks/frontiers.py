@@ -25,14 +25,14 @@ from table import Table
 
 from solidsph.registry import registry
 from solidsph.studies.case import Case
-from solidsph.studies.cost import Means, frontier
+from solidsph.studies.cost import SweepSetup, frontier
 from solidsph.studies.frontier import Frontier
 from solidsph.studies.frontier_picture import draw_frontier
-from solidsph.studies.gallery import copied
-from solidsph.studies.point import Point, shown
+from solidsph.studies.gallery import write_small_copy
+from solidsph.studies.point import Point, format_setting
 from solidsph.studies.processes import Processes
-from solidsph.studies.search import Accuracy, search
-from solidsph.studies.sweep import Standing
+from solidsph.studies.search import Goal, search
+from solidsph.studies.sweep import SweepStatus
 
 # Each with the accuracy that is searched for.
 CASES: Mapping[str, float] = {
@@ -114,7 +114,7 @@ def section(name: str, repeats: int, page: Path | None) -> Iterator[str]:
     case: Case = registry.load("cases", name)()
     priced = case.priced()
     folder = Path("results/frontiers") / name
-    means = Means(Processes(1), folder, repeats, watch)
+    means = SweepSetup(Processes(1), folder, repeats, watch)
     made = frontier(case, None, means)
     own = {axis: getattr(priced, axis) for axis in priced.sweep}
     default = next(point for point in made.points if point.settings == own)
@@ -124,7 +124,7 @@ def section(name: str, repeats: int, page: Path | None) -> Iterator[str]:
     if page is not None:
         kept = page.with_suffix("") / picture.name
         kept.parent.mkdir(parents=True, exist_ok=True)
-        copied(picture, kept)
+        write_small_copy(picture, kept)
         yield f"![{name}]({kept.parent.name}/{kept.name})\n"
     yield table("The front", made, default)
     yield orders(made)
@@ -161,7 +161,7 @@ def row(point: Point, default: Point) -> tuple[str, ...]:
 def orders(made: Frontier) -> str:
     rows = tuple(
         (
-            ", ".join(f"{key} {shown(value)}" for key, value in one.settings.items()),
+            ", ".join(f"{key} {format_setting(value)}" for key, value in one.settings.items()),
             f"{one.in_spacing:.2f}",
             f"{one.in_time:.2f}",
             "no" if one.crosses else "yes",
@@ -172,7 +172,7 @@ def orders(made: Frontier) -> str:
     return "#" + Table("Orders", columns, rows).markdown()
 
 
-def one_at_a_time(case: Case, default: Point, means: Means) -> str:
+def one_at_a_time(case: Case, default: Point, means: SweepSetup) -> str:
     """The case's own parameters with one choice changed."""
     rows = []
     for choice, values in CHOICES.items():
@@ -181,7 +181,7 @@ def one_at_a_time(case: Case, default: Point, means: Means) -> str:
         points = means.points(case, [{choice: value} for value in values])
         for value, point in zip(values, points, strict=True):
             mark = " (own)" if getattr(case, choice) == value else ""
-            rows.append((f"{choice} {shown(value)}{mark}", *row(point, default)[1:3]))
+            rows.append((f"{choice} {format_setting(value)}{mark}", *row(point, default)[1:3]))
     columns = ("one choice changed", "error, %", "time, s")
     return "#" + Table("One choice at a time", columns, tuple(rows)).markdown()
 
@@ -193,10 +193,10 @@ def by_search(case: Case, made: Frontier, accuracy: float) -> str:
     def run(settings: Mapping[str, Any]) -> Point:
         return (
             known.get(repr(sorted(settings.items())))
-            or Means(folder=Path("results/frontiers/beyond")).points(case, [settings])[0]
+            or SweepSetup(folder=Path("results/frontiers/beyond")).points(case, [settings])[0]
         )
 
-    found = search(case, case.sweep, Accuracy(accuracy), run)
+    found = search(case, case.sweep, Goal(error=accuracy), run)
     cheapest = made.cheapest(accuracy)
     grid, spent = (
         sum(point.time for point in points if isfinite(point.time))
@@ -216,7 +216,7 @@ def by_search(case: Case, made: Frontier, accuracy: float) -> str:
     )
 
 
-def watch(standing: Standing) -> None:
+def watch(standing: SweepStatus) -> None:
     if standing.point is not None:
         print(
             f"{standing.remaining} left: {standing.point.label()}: "

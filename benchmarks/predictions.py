@@ -26,7 +26,7 @@ from steps import bar, beam
 from table import Table
 
 from solidsph import Scene, Simulation
-from solidsph.commands import prediction as told
+from solidsph.commands.prediction import build_timed, this_machine
 from solidsph.costs.counted import counted
 from solidsph.costs.model import predicted
 from solidsph.costs.process import peak_memory
@@ -109,9 +109,9 @@ SCENES: Mapping[str, Callable[[], SceneBuilder]] = {
 def predict(file: Path) -> dict[str, Any]:
     """What `solidsph explain` expects, by the clock on the wall and by that of the processor."""
     begun = time.process_time()
-    simulation, build = told.built(Scene.read(file))
+    simulation, build = build_timed(Scene.read(file))
     spent = time.process_time() - begun
-    found = predicted(counted(simulation), told.calibrated(), built=build)
+    found = predicted(counted(simulation), this_machine(), built=build)
     return {
         "seconds": found.seconds,
         "processor": found.run_seconds + spent,
@@ -125,7 +125,7 @@ def predict(file: Path) -> dict[str, Any]:
 def measure(file: Path, record: Path) -> dict[str, Any]:
     """What `solidsph run` takes."""
     begun, spent = time.perf_counter(), time.process_time()
-    simulation, _ = told.built(Scene.read(file))
+    simulation, _ = build_timed(Scene.read(file))
     simulation.run(record=record)
     return {
         "seconds": time.perf_counter() - begun,
@@ -181,7 +181,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         os.environ["SOLIDSPH_CACHE"] = folder  # so that this machine is calibrated anew
         begun = time.perf_counter()
-        told.calibrated()
+        this_machine()
         calibrating = time.perf_counter() - begun
         for k, name in enumerate(wanted):
             file = Path(folder) / f"scene{k}.toml"

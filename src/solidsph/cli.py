@@ -27,9 +27,16 @@ TRACEBACK = "SOLIDSPH_TRACEBACK"
 
 FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
 
+# Errors of a valid run: its outcome in the JSON object.
+_OUTCOMES: Mapping[type[SolidsphError], str] = {
+    ConvergenceError: "no equilibrium",
+    DivergedError: "diverged",
+    UnsoundError: "unsound",
+}
+
 
 class _Verbs(click.Group):
-    """Loads a verb's module only when that verb, or the list of all, is asked for."""
+    """Group that imports a verb's module only when that verb, or the list of verbs, is needed."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(VERBS)
@@ -46,50 +53,21 @@ class _Verbs(click.Group):
 def cli() -> None:
     """Smoothed Particle Hydrodynamics for nonlinear solid mechanics.
 
-    Exit codes: 0 all is well, 1 the run or the check failed, 2 the input is wrong, 130 interrupted.
+    Exit codes: 0 success, 1 the run or the check failed, 2 invalid input, 130 interrupted.
     """
-
-
-def _open_closed_streams() -> None:
-    """Standard streams that the shell has closed lead nowhere.
-
-    Else the next file that is opened, a record perhaps, would take the number of one of them.
-    """
-    for number, name in enumerate(("stdin", "stdout", "stderr")):
-        if getattr(sys, name) is None:
-            nowhere = os.open(os.devnull, os.O_RDWR)
-            if nowhere != number:
-                os.dup2(nowhere, number)
-                os.close(nowhere)
-            setattr(sys, name, open(number, "r" if number == 0 else "w", closefd=False))  # noqa: SIM115 -- open as long as the process
-
-
-def _tell(
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
-) -> None:
-    """A warning as a user is told it; where it is not about the input, with path and source."""
-    told = isinstance(message, UserWarning)
-    text = f"warning: {message}\n"
-    text = text if told else warnings.formatwarning(message, category, filename, lineno, line)
-    print(text, end="", file=file or sys.stderr)
 
 
 def main() -> None:
-    """Run the command line; every error of the user's is one message, never a traceback."""
-    _open_closed_streams()
-    warnings.showwarning = _tell
+    """Run the command line. Errors of the user end in one message, without a traceback."""
+    _redirect_closed_streams()
+    warnings.showwarning = _show_warning
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal that cannot show a sign shows another
+            stream.reconfigure(errors="replace")  # for terminals that lack a character
     if threading.current_thread() is threading.main_thread():
-        # Whoever asks the process to end is heard like somebody at the keyboard.
+        # A request to terminate is handled like Ctrl-C.
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-    facts: dict[str, Any] = {}  # what a verb with --json has to tell, whatever the outcome
+    facts: dict[str, Any] = {}  # filled by a verb with --json, printed whatever the outcome
     try:
         code = cli.main(prog_name="solidsph", standalone_mode=False, obj=facts)
     except click.ClickException as cause:
@@ -98,14 +76,10 @@ def main() -> None:
             sys.exit(WRONG_INPUT)
         _end(WRONG_INPUT, "invalid input", f"error: {cause.format_message()}", facts)
     except (click.Abort, KeyboardInterrupt):
-        _end(
-            INTERRUPTED,
-            "interrupted",
-            "interrupted; what was recorded so far can be read, and gone on with: solidsph resume",
-            facts,
-        )
+        text = "interrupted; the outputs so far are readable, and solidsph resume continues the run"
+        _end(INTERRUPTED, "interrupted", text, facts)
     except SolidsphError as cause:
-        outcome = _FAILURES.get(type(cause))
+        outcome = _OUTCOMES.get(type(cause))
         problems = cause.problems if isinstance(cause, BuildError) else [str(cause)]
         code = WRONG_INPUT if outcome is None else FAILED
         _end(code, outcome or "invalid input", f"error: {cause}", facts, problems)
@@ -116,19 +90,40 @@ def main() -> None:
         if os.environ.get(TRACEBACK) == "1":
             raise
         text = (
-            f"error: {type(cause).__name__}: {cause}\nThis is a fault of solidsph or of a plugin, "
-            f"not of the input; {TRACEBACK}=1 shows where it happened"
+            f"error: {type(cause).__name__}: {cause}\nThis is a bug in solidsph or in a plugin, "
+            f"not in the input; set {TRACEBACK}=1 to see where it occurred"
         )
         _end(FAILED, "failed", text, facts)
     sys.exit(code if isinstance(code, int) else 0)
 
 
-# Errors of a run that was asked for rightly: how its outcome is called.
-_FAILURES: Mapping[type[SolidsphError], str] = {
-    ConvergenceError: "no equilibrium",
-    DivergedError: "diverged",
-    UnsoundError: "unsound",
-}
+def _redirect_closed_streams() -> None:
+    """Connect standard streams that the shell has closed to the null device.
+
+    Otherwise the next file opened, such as a record, would take the number of one of them.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            null = os.open(os.devnull, os.O_RDWR)
+            if null != number:
+                os.dup2(null, number)
+                os.close(null)
+            setattr(sys, name, open(number, "r" if number == 0 else "w", closefd=False))  # noqa: SIM115 -- open as long as the process
+
+
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Print a warning about the input in one line, any other with its path and source."""
+    text = f"warning: {message}\n"
+    if not isinstance(message, UserWarning):
+        text = warnings.formatwarning(message, category, filename, lineno, line)
+    print(text, end="", file=file or sys.stderr)
 
 
 def _as_json() -> bool:
@@ -138,20 +133,12 @@ def _as_json() -> bool:
 def _end(
     code: int, outcome: str, text: str, facts: Mapping[str, Any], problems: Sequence[str] = ()
 ) -> NoReturn:
-    """Say what went wrong; with --json also as the one object on the standard output."""
+    """Print an error and exit; with --json the standard output gets one object besides."""
     if _as_json():
         from solidsph.commands.console import show_json
 
-        told = text.removeprefix("error: ")
-        show_json(
-            {
-                **facts,
-                "outcome": outcome,
-                "exit code": code,
-                "error": told,
-                "problems": list(problems) or [told],
-            }
-        )
-        sys.stdout.flush()
+        message = text.removeprefix("error: ")
+        failure = {"outcome": outcome, "exit code": code, "error": message}
+        show_json({**facts, **failure, "problems": list(problems) or [message]})
     print(text, file=sys.stderr)
     sys.exit(code)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from solidsph import Case
-from solidsph.studies.case_run import opened, run_scenes
+from solidsph.studies.case_run import open_records, run_scenes
 from solidsph_cases.colliding_bars import CollidingBars
 from solidsph_cases.colliding_rings import CollidingRings
 from solidsph_cases.hertz import Hertz
@@ -15,7 +15,7 @@ from solidsph_cases.sliding_block import SlidingBlock
 
 
 def assert_passed(case: Case, folder: Path) -> None:
-    with opened(run_scenes(case, folder)) as records:
+    with open_records(run_scenes(case, folder)) as records:
         measurements = case.measure(records)
         drawn = case.draw(records, folder)
         assert all(case.curves(records).values())

@@ -196,7 +196,7 @@ def test_the_total_forms_waves_are_those_of_the_formula() -> None:
 def test_a_bar_whose_ends_reach_its_middle_is_refused() -> None:
     case = TensileInstability(length=0.05)
     simulation = Simulation.builder(case._scene("updated-lagrangian", 1.2, 0.0, 1e-6)).build()
-    with pytest.raises(SolidsphError, match=r"answers to the \d+ on either side.*take at least"):
+    with pytest.raises(SolidsphError, match=r"responds to the \d+ on either side.*take at least"):
         dispersion(simulation.dynamics, simulation.start())
 
 

@@ -108,6 +108,21 @@ def test_explain_runs_nothing_and_names_what_is_not_simulated(scene: Path) -> No
     assert solidsph("explain", scene.name, cwd=scene.parent).returncode == 0
 
 
+def test_internals_are_shown_on_request_only(scene: Path) -> None:
+    for verb, internals in (
+        ("explain", ("MatrixForces", "time loop", "bytes held", "bytes touched in all", "arrays")),
+        ("run", ("bytes touched",)),
+    ):
+        brief = solidsph(verb, scene.name, cwd=scene.parent)
+        verbose = solidsph(verb, scene.name, "--verbose", cwd=scene.parent)
+        assert brief.returncode == verbose.returncode == 0, brief.stderr + verbose.stderr
+        facts = solidsph(verb, scene.name, "--json", cwd=scene.parent).stdout
+        for word in internals:
+            assert word not in brief.stdout
+            assert word in verbose.stdout
+            assert word in facts
+
+
 def test_cases_and_plugins(tmp_path: Path) -> None:
     cases = json.loads(solidsph("cases", "--json", cwd=tmp_path).stdout)["cases"]
     assert "tensile-instability" in [case["case"] for case in cases]
@@ -163,6 +178,7 @@ def test_check_takes_a_cases_scheme_with_hourglass_control_added(tmp_path: Path)
     done = solidsph(*case, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "cover 3," in done.stdout
+    assert "total-lagrangian, modified-mollifier, difference gradient" in done.stdout
     assert "hourglass-control resists them" in done.stdout
     controlled = solidsph(*case, "--hourglass", "0.5", cwd=tmp_path).stdout
     assert "none beyond translations" in controlled

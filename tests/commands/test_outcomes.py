@@ -68,7 +68,7 @@ def test_interrupted(said: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("solidsph.watch.run_watched", interrupted)
+    monkeypatch.setattr("solidsph.commands.run.run_watched", interrupted)
     code, told, _ = said("run", written(SCENE_TOML))
     assert (code, told["outcome"]) == (130, "interrupted")
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from solidsph import Simulation
-from solidsph.commands import prediction as told
+from solidsph.commands import prediction as predictions
 from solidsph.costs import calibration, yardsticks
 from solidsph.costs import timed as timed_module
 from solidsph.costs.calibration import Calibration
@@ -360,7 +360,7 @@ def test_a_machine_too_busy_to_be_calibrated_is_said_to_be(
     cache: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(calibration, "_LONGEST", 0.0)  # what any machine is too slow for
-    assert told.calibrated() is REFERENCE
+    assert predictions.this_machine() is REFERENCE
     assert "could not be calibrated" in capsys.readouterr().err
     assert not cache.exists()
 
@@ -379,7 +379,7 @@ def test_run_and_explain_tell_what_was_predicted_and_what_it_took(
     # A process of some 100 MiB of which most are imports: within a factor of two at any rate.
     assert 0.5 < facts["predicted over measured memory [-]"] < 2.0
     for long, announced in ((0.0, True), (inf, False)):  # a short run is not
-        monkeypatch.setattr(told, "LONG", long)
+        monkeypatch.setattr(predictions, "LONG", long)
         shown = solidsph("run", "pull.toml", cwd=tmp_path)
         assert "predicted over measured time" in shown.stdout
         assert ("predicted:" in shown.stdout) == announced
@@ -417,8 +417,8 @@ def test_a_case_is_the_sum_of_its_scenes(tmp_path: Path) -> None:
 
 
 def test_a_prediction_is_never_why_a_run_fails() -> None:
-    assert told.of_run(None, None) is None  # type: ignore[arg-type]
-    assert told.scored(None, 1.0, 1) == {}
+    assert predictions.predict_run(None, None) is None  # type: ignore[arg-type]
+    assert predictions.comparison(None, 1.0, 1) == {}
 
 
 @attrs.frozen
@@ -446,7 +446,7 @@ def test_what_is_not_known_is_priced_by_defaults() -> None:
     work = counted(simulation)
     assert work.operations[-1].way is Way.UNKNOWN
     assert work.visited == PAIRS  # it says of no pairs that it visits them
-    prediction = told.of_run(simulation, None)
+    prediction = predictions.predict_run(simulation, None)
     assert prediction is not None
     assert prediction.steps > 0.0
     assert coefficient("UNKNOWN 2D pair") >= coefficient("PRODUCTS 2D pair") > 0.0

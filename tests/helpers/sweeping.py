@@ -17,7 +17,7 @@ from solidsph.errors import SceneError
 from solidsph.studies.case import Case, Measurement
 from solidsph.studies.journal import Journal
 from solidsph.studies.processes import Processes
-from solidsph.studies.sweep import Standing, sweep
+from solidsph.studies.sweep import SweepStatus, sweep
 from solidsph.studies.task import Task
 from solidsph_cases.csm3 import Csm3
 from tests.helpers.waiting import HANG
@@ -89,7 +89,7 @@ def swinging() -> Sequence[Task]:
     return [Task(case, {"cover": cover}, repeat) for cover in (2.3, 2.2, 2.6) for repeat in (0, 1)]
 
 
-def tell(standing: Standing, hold: int | None = None) -> None:
+def tell(standing: SweepStatus, hold: int | None = None) -> None:
     """Print how far a sweep is; once so many are done or kept, wait to be killed."""
     print(standing.total, standing.kept, standing.done, flush=True)
     if standing.kept + standing.done == hold:

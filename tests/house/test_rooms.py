@@ -35,7 +35,7 @@ MAY_IMPORT = {
     "studies": "errors maths model interfaces registry scene run results conformance simulation "
     "costs",
     "testing": "errors maths interfaces registry engines run conformance assembly simulation",
-    "commands": "errors system model interfaces registry scene run statics results watch advice "
+    "commands": "errors system interfaces registry scene run statics results watch advice "
     "conformance simulation resumption costs studies testing",
     "cli": "errors commands",
 }

@@ -935,7 +935,7 @@ def test_a_command_that_is_stopped_can_be_resumed(tmp_path: Path, number: signal
     else:
         assert process.returncode == 130
         last = errors.strip().splitlines()[-1]  # warnings of the scene may come before
-        assert last.startswith("interrupted; what was recorded so far can be read")
+        assert last.startswith("interrupted; the outputs so far are readable")
         assert "Traceback" not in errors
     with Record(folder / "record.h5") as record:
         assert record.outcome == ("running" if number is signal.SIGKILL else "interrupted")

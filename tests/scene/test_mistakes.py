@@ -381,9 +381,9 @@ def test_a_reader_that_goes_away_fails_no_run(command: str, tmp_path: Path) -> N
 
 
 def test_a_warning_is_told_without_path_and_source(capsys: pytest.CaptureFixture[str]) -> None:
-    cli._tell(UserWarning("few neighbours"), UserWarning, "/some/where.py", 7)
+    cli._show_warning(UserWarning("few neighbours"), UserWarning, "/some/where.py", 7)
     assert capsys.readouterr().err == "warning: few neighbours\n"
-    cli._tell(RuntimeWarning("overflow"), RuntimeWarning, "/some/where.py", 7)
+    cli._show_warning(RuntimeWarning("overflow"), RuntimeWarning, "/some/where.py", 7)
     assert "/some/where.py:7" in capsys.readouterr().err  # not about the input: it says where
 
 

@@ -22,7 +22,7 @@ from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 from solidsph.studies import certificate as certificates
 from solidsph.studies.certificate import Certificate, certificate
-from solidsph.studies.confirm import amplification, measured_growth
+from solidsph.studies.certificate_runs import amplification, measured_growth
 from solidsph.studies.dispersion import lattice_response
 from solidsph.studies.scheme import Scheme, stretched
 from solidsph.studies.spectrum import spectrum

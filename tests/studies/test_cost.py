@@ -11,19 +11,19 @@ import pandas
 import pytest
 
 from solidsph import SceneError
-from solidsph.commands.cost import seconds
+from solidsph.commands.cost_options import seconds
 from solidsph.scene.scene import Scene
-from solidsph.studies.cost import Means, found, frontier, own_settings
+from solidsph.studies.cost import SweepSetup, default_settings, find_best, frontier
 from solidsph.studies.runner import Inline
-from solidsph.studies.search import Accuracy
+from solidsph.studies.search import Goal
 from solidsph_cases.csm1 import Csm1
 from tests.commands.test_cli import solidsph
 
 AXES = {"across": (5, 9), "gradient": ("consistent", "quadratic")}
 
 
-def inline(folder: Path) -> Means:
-    return Means(Inline(), folder)
+def inline(folder: Path) -> SweepSetup:
+    return SweepSetup(Inline(), folder)
 
 
 def test_a_frontier_of_a_case(tmp_path: Path) -> None:
@@ -42,7 +42,7 @@ def test_the_cases_own_parameters_are_among_the_points(tmp_path: Path) -> None:
     case = Csm1(across=5)
     made = frontier(case, {"across": (9,), "cover": (2.6,)}, inline(tmp_path))
     assert made.points[-1].settings == {"across": 5, "cover": 3.0}
-    assert own_settings(case, {"across": (), "precision": ()}) is None
+    assert default_settings(case, {"across": (), "precision": ()}) is None
 
 
 def test_machine_independent_columns_are_the_same_on_every_run(tmp_path: Path) -> None:
@@ -54,7 +54,7 @@ def test_machine_independent_columns_are_the_same_on_every_run(tmp_path: Path) -
 
 
 def test_a_search_runs_the_case(tmp_path: Path) -> None:
-    result = found("csm1", Accuracy(0.01), AXES, inline(tmp_path))
+    result = find_best("csm1", Goal(error=0.01), AXES, inline(tmp_path))
     assert result.point is not None
     assert result.point.error <= 0.01
     assert result.point in frontier("csm1", AXES, inline(tmp_path)).points
@@ -108,6 +108,8 @@ def test_the_command_and_what_it_leaves(tmp_path: Path) -> None:
     assert len((tmp_path / told["table"]).read_text().splitlines()) == 4
     table = solidsph("cost", "csm1", *axes, cwd=tmp_path)
     assert "the front, of 3 configurations" in table.stdout
+    assert "bytes touched" not in table.stdout
+    assert "bytes touched" in solidsph("cost", "csm1", *axes, "--verbose", cwd=tmp_path).stdout
     assert "the case's own parameters: across 5" in table.stdout
     search = solidsph("cost", "csm1", *axes, "--accuracy", "1%", cwd=tmp_path)
     assert search.returncode == 0, search.stderr

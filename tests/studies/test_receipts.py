@@ -15,8 +15,8 @@ from solidsph import Scene, SceneError, Simulation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.terms import Load
 from solidsph.registry.construct import construct
+from solidsph.run.outcome import FINISHED
 from solidsph.studies.receipts import (
-    FINISHED,
     LARGEST,
     Receipt,
     case_changes,

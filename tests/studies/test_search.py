@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from solidsph import SceneError
 from solidsph.studies.case import Case, Measurement
 from solidsph.studies.point import Point
-from solidsph.studies.search import Accuracy, Goal, Within, search
+from solidsph.studies.search import Goal, search
 from tests.helpers.examples import examples
 
 SCHEMES = ("a", "b", "c", "d", "e")
@@ -87,7 +87,7 @@ def least(goal: Goal, points: Sequence[Point]) -> float:
 @examples(200)
 @given(law=laws, error=st.floats(0.01, 0.1))
 def test_the_cheapest_for_an_accuracy_is_found_by_few_runs(law: Law, error: float) -> None:
-    goal = Accuracy(error)
+    goal = Goal(error=error)
     found = search(Lawful(), AXES, goal, law)
     points = grid(law)
     best = least(goal, points)
@@ -104,25 +104,25 @@ def test_the_cheapest_for_an_accuracy_is_found_by_few_runs(law: Law, error: floa
 @examples(200)
 @given(law=laws, time=st.floats(1.0, 60.0))
 def test_the_nearest_for_a_time_is_found(law: Law, time: float) -> None:
-    goal = Within(time)
+    goal = Goal(time=time)
     found = search(Lawful(), AXES, goal, law)
     assert found.point is not None
     assert found.point.time <= time
     # Times are predicted by powers of the spacing, to some ten per cent, so that the finest level
     # that just fits may be missed.
-    assert found.point.error <= 1.5 * least(Within(0.7 * time), grid(law))
+    assert found.point.error <= 1.5 * least(Goal(time=0.7 * time), grid(law))
 
 
 def test_a_fifth_of_the_time_of_the_grid_is_enough() -> None:
     law = Law({n: (1.0 + i, 2.0) for i, n in enumerate(SCHEMES)}, dict.fromkeys(SCHEMES, 1e-3))
-    found = search(Lawful(), AXES, Accuracy(0.01), law)
+    found = search(Lawful(), AXES, Goal(error=0.01), law)
     assert found.point == law({"across": 12, "scheme": "a"})
     assert found.spent < sum(point.time for point in grid(law)) / 5.0
 
 
 def test_the_axis_is_prolonged_where_the_grid_does_not_reach() -> None:
     law = Law(dict.fromkeys(SCHEMES, (1.0, 2.0)), dict.fromkeys(SCHEMES, 1e-5))
-    found = search(Lawful(), AXES, Accuracy(1e-4), law)
+    found = search(Lawful(), AXES, Goal(error=1e-4), law)
     assert found.point is not None
     assert found.point.error <= 1e-4
     assert found.point.settings["across"] > max(LEVELS)
@@ -133,7 +133,7 @@ def test_what_cannot_be_reached_is_said() -> None:
     def stuck(chosen: Mapping[str, Any]) -> Point:
         return Point(dict(chosen), 0.3, spacing=1.0 / chosen["across"], seconds=(1.0,))
 
-    found = search(Lawful(), AXES, Accuracy(1e-3), stuck, longest=100.0)
+    found = search(Lawful(), AXES, Goal(error=1e-3), stuck, longest=100.0)
     assert found.point is None
     assert max(point.time for point in found.tried) < 100.0
     assert "none meets the goal" in found.sure
@@ -141,9 +141,9 @@ def test_what_cannot_be_reached_is_said() -> None:
     def failing(chosen: Mapping[str, Any]) -> Point:
         return Point(dict(chosen), inf, outcome="diverged")
 
-    assert search(Lawful(), AXES, Within(10.0), failing).point is None
+    assert search(Lawful(), AXES, Goal(time=10.0), failing).point is None
     with pytest.raises(SceneError, match="no axis"):
-        search(Lawful(), {}, Accuracy(0.1), failing)
+        search(Lawful(), {}, Goal(error=0.1), failing)
 
 
 def test_an_error_that_is_small_by_chance_is_doubted() -> None:
@@ -152,9 +152,15 @@ def test_an_error_that_is_small_by_chance_is_doubted() -> None:
         seconds = (float(chosen["across"]),)
         return Point(dict(chosen), error, spacing=1.0 / chosen["across"], seconds=seconds)
 
-    found = search(Lawful(), {"across": LEVELS}, Accuracy(0.01), lucky)
+    found = search(Lawful(), {"across": LEVELS}, Goal(error=0.01), lucky)
     assert found.point is not None
     assert found.point.settings == {"across": 12}
     assert "as it must be" in found.sure
-    alone = search(Lawful(), {"across": (4,)}, Accuracy(0.01), lucky)
+    alone = search(Lawful(), {"across": (4,)}, Goal(error=0.01), lucky)
     assert "may be small by chance" in alone.sure
+
+
+@pytest.mark.parametrize("limits", [{}, {"error": 0.1, "time": 1.0}])
+def test_a_goal_is_one_limit(limits: Mapping[str, float]) -> None:
+    with pytest.raises(SceneError, match="an error or a time"):
+        Goal(**limits)

@@ -17,7 +17,7 @@ from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Measurement, Trial
 from solidsph.studies.case_run import run_case
-from solidsph.studies.suite import Grade, energy_residual, judged, trials
+from solidsph.studies.suite import Grade, energy_residual, run_trial, trials
 from solidsph.studies.suite_picture import draw_suite
 from solidsph_cases.twisting_column import TwistingColumn
 from tests.commands.test_cli import solidsph
@@ -53,14 +53,14 @@ def told(one: tuple[str, str, Case, Trial]) -> str:
 def test_the_short_form_of_every_case_is_as_expected(
     trial: tuple[str, str, Case, Trial], tmp_path: Path
 ) -> None:
-    verdict = judged(*trial, tmp_path, brief=True)
+    verdict = run_trial(*trial, tmp_path, brief=True)
     assert verdict.as_expected, verdict.reason
 
 
 @pytest.mark.validation
 @pytest.mark.parametrize("trial", ALL, ids=told)
 def test_every_trial_is_as_expected(trial: tuple[str, str, Case, Trial], tmp_path: Path) -> None:
-    verdict = judged(*trial, tmp_path)
+    verdict = run_trial(*trial, tmp_path)
     print(f"{verdict.grade.value}, {verdict.seconds:.1f} s: {verdict.reason}")
     assert verdict.as_expected, verdict.reason
 
@@ -87,7 +87,7 @@ def test_a_trial_fails_without_what_it_owes_its_stability_to(
     one = named(name, label)
     assert one in SHORT  # so that it is stable with it, as the test of the short forms says
     assert not one[3].must_fail
-    assert judged(*one, tmp_path, brief=True, words=words).grade is not Grade.STABLE
+    assert run_trial(*one, tmp_path, brief=True, settings=words).grade is not Grade.STABLE
 
 
 @attrs.frozen
@@ -112,11 +112,11 @@ class Told(Case):
 
 
 def test_grades_and_their_reasons(tmp_path: Path) -> None:
-    good = judged("told", "good", Told(), Trial(), tmp_path)
+    good = run_trial("told", "good", Told(), Trial(), tmp_path)
     assert (good.grade, good.reason) == (Grade.STABLE, "it: error 0.5")
-    bad = judged("told", "bad", Told(), Trial({"passes": False}), tmp_path)
+    bad = run_trial("told", "bad", Told(), Trial({"passes": False}), tmp_path)
     assert (bad.grade, bad.reason) == (Grade.DEGRADED, "it: 1 m, should be 2 (so so)")
-    refused = judged("told", "refused", Told(), Trial({"refused": True}), tmp_path)
+    refused = run_trial("told", "refused", Told(), Trial({"refused": True}), tmp_path)
     assert (refused.grade, refused.reason) == (Grade.FAILED, "refused for a reason")
     assert good.as_expected
     assert not bad.as_expected
@@ -136,7 +136,7 @@ def test_the_command(tmp_path: Path) -> None:
     assert {row["expected"] for row in listed} >= {"stable", "fails"}
     brief = solidsph("stability", "inside-out", "stretched-bar", "--brief", cwd=tmp_path)
     assert brief.returncode == 0, brief.stdout
-    assert "as expected, those that must fail included" in brief.stdout
+    assert "as expected, including the trials that must fail" in brief.stdout
     assert (tmp_path / "results/stability/suite.png").exists()
     updated = ("--formulation", "updated-lagrangian", "--brief", "--json")
     surprised = solidsph("stability", "stretched-bar", *updated, cwd=tmp_path)

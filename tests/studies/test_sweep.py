@@ -28,18 +28,18 @@ from rich.progress import Progress
 from solidsph.commands.console import SweepObserver, time_left
 from solidsph.errors import RecordError, SceneError
 from solidsph.studies import cluster as cluster_module
-from solidsph.studies import scratch as scratch_module
+from solidsph.studies import scratch_folder as scratch_module
 from solidsph.studies import task as task_module
 from solidsph.studies.cluster import Cluster
-from solidsph.studies.estimate import Estimate
 from solidsph.studies.journal import Journal
-from solidsph.studies.packing import heard, packed, told, unpacked
 from solidsph.studies.point import Point
 from solidsph.studies.processes import Processes
+from solidsph.studies.remaining_time import RemainingTime
 from solidsph.studies.runner import Inline, Lost, Outcomes, Runner
-from solidsph.studies.scratch import Scratch
-from solidsph.studies.sweep import Standing, sweep
+from solidsph.studies.scratch_folder import ScratchFolder
+from solidsph.studies.sweep import SweepStatus, sweep
 from solidsph.studies.task import Task, plain
+from solidsph.studies.task_lines import decode_outcome, decode_task, encode_outcome, encode_task
 from solidsph_cases.csm3 import Csm3
 from tests.helpers.sweeping import Odd, odd, several, swinging
 from tests.helpers.waiting import HANG, wait_for
@@ -106,7 +106,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path, after: int) -
     with pytest.raises(KeyboardInterrupt):
         sweep(tasks, Interrupted(after), journal)
     assert len(log(tmp_path)) == after
-    seen: list[Standing] = []
+    seen: list[SweepStatus] = []
     points = sweep(tasks, Inline(), journal, seen.append)
     assert [point.error for point in points] == [0.3, inf, 0.1]
     assert [one for _, one, _ in log(tmp_path)] == ["0.3", "inf", "0.1"]
@@ -212,7 +212,7 @@ def test_infinities_and_no_numbers_survive_in_strict_json(tmp_path: Path) -> Non
 
     (line,) = lines(journal.path)
     json.loads(line, parse_constant=refuse)
-    for read in (journal.points([wide])[wide.key], heard(told(point), wide)):
+    for read in (journal.points([wide])[wide.key], decode_outcome(encode_outcome(point), wide)):
         assert isinstance(read, Point)
         assert isnan(read.error)
         assert attrs.evolve(read, error=0.0) == attrs.evolve(point, error=0.0)
@@ -309,13 +309,13 @@ def test_what_has_no_lasting_description_is_refused() -> None:
 
 def test_registered_cases_go_by_name_and_others_pickled(tmp_path: Path) -> None:
     named = Task(Csm3(across=3), {"cover": 2.2}, 4)
-    assert "named" in json.loads(packed(named))
-    assert unpacked(packed(named)) == named
+    assert "named" in json.loads(encode_task(named))
+    assert decode_task(encode_task(named)) == named
     # A tuple would come back as a list, so this one is pickled.
     paired = Task(Csm3(across=3), {"material": {"pair": (1, 2)}})
     for task in (paired, *several(tmp_path, inf)):
-        assert "pickle" in json.loads(packed(task))
-        assert unpacked(packed(task)) == task
+        assert "pickle" in json.loads(encode_task(task))
+        assert decode_task(encode_task(task)) == task
 
 
 def test_a_case_that_no_other_process_finds_is_refused(
@@ -334,10 +334,10 @@ def test_a_case_that_no_other_process_finds_is_refused(
 
 
 def test_other_software_on_the_other_side_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    line = packed(Task(Csm3()))
+    line = encode_task(Task(Csm3()))
     monkeypatch.setattr(task_module, "version", lambda name: "99.0")
     with pytest.raises(SceneError, match="another version; install the same"):
-        unpacked(line)
+        decode_task(line)
 
 
 def test_a_process_that_dies_is_a_failed_point_and_the_rest_goes_on(tmp_path: Path) -> None:
@@ -499,13 +499,13 @@ def test_what_a_killed_sweep_left_is_removed_by_the_next(
     os.utime(folders[1], (now, now))
     held = os.open(folders[2], os.O_RDONLY)
     fcntl.flock(held, fcntl.LOCK_EX)
-    scratch = Scratch()
+    scratch = ScratchFolder()
     os.close(held)
     left = {"foreign", "solidsph-scratch-young", "solidsph-scratch-held"}
     assert {path.name for path in tmp_path.iterdir()} == {*left, scratch.path.name}
     scratch.close()
     assert {path.name for path in tmp_path.iterdir()} == left
-    Scratch().close()
+    ScratchFolder().close()
     assert not folders[2].exists()
 
 
@@ -514,7 +514,7 @@ def test_what_a_killed_sweep_left_is_removed_by_the_next(
 
 def test_no_estimate_without_a_finished_point() -> None:
     tasks = [Task(Csm3(across=n)) for n in (3, 6)]
-    estimate = Estimate.of(tasks)
+    estimate = RemainingTime.of(tasks)
     assert estimate.left(1.0, [], tasks) is None
     estimate.learn(tasks[0], Point({}, inf, "diverged", seconds=(1.0,)))
     assert estimate.left(1.0, tasks[:1], tasks[1:]) is None
@@ -525,21 +525,21 @@ def test_estimates_follow_the_power_law_that_is_there() -> None:
     # Particles lie on both faces: these spacings are a half, a quarter and an eighth of the width.
     tasks = [Task(Csm3(across=n)) for n in (3, 5, 9)]
     for exponent in (1.0, 2.5):
-        estimate = Estimate.of(tasks)
+        estimate = RemainingTime.of(tasks)
         for task, time_taken in zip(tasks, (3.0, 3.0 * 2.0**exponent), strict=False):
             estimate.learn(task, Point({}, 0.1, seconds=(time_taken,)))
         # Wall time is half of the sum of times: two at a time.
         elapsed = 0.5 * 3.0 * (1.0 + 2.0**exponent)
         left = estimate.left(elapsed, tasks[:2], tasks[2:])
         assert left == pytest.approx(0.5 * 3.0 * 4.0**exponent, rel=1e-9)  # of rounding
-    single = Estimate.of(tasks)
+    single = RemainingTime.of(tasks)
     single.learn(tasks[0], Point({}, 0.1, seconds=(1.0,)))
     assert single.left(1.0, tasks[:1], tasks[1:]) == pytest.approx(8.0 + 64.0, rel=1e-9)
 
 
 def test_what_is_timed_already_needs_no_power_law() -> None:
     first, second = (Task(Csm3(across=4), {"precision": word}) for word in ("float32", "float64"))
-    estimate = Estimate.of([first, second])
+    estimate = RemainingTime.of([first, second])
     estimate.learn(first, Point({}, 0.1, seconds=(1.0,)))
     estimate.learn(second, Point({}, 0.1, seconds=(5.0,)))
     again = attrs.evolve(second, repeat=1)
@@ -557,9 +557,9 @@ def test_the_bar_says_what_failed_and_how_long_it_takes() -> None:
     task = Task(Csm3(), {"cover": 2.2})
     with Progress(console=Console(file=shown, width=200), disable=False) as display:
         observer = SweepObserver(display, "cost [csm3]")
-        observer(Standing(4, 1, 0, None))
-        observer(Standing(4, 1, 1, 30.0, task, Point(task.settings, 0.1)))
-        observer(Standing(4, 1, 2, 30.0, task, Lost("the process ended by signal 9")))
+        observer(SweepStatus(4, 1, 0, None))
+        observer(SweepStatus(4, 1, 1, 30.0, task, Point(task.settings, 0.1)))
+        observer(SweepStatus(4, 1, 2, 30.0, task, Lost("the process ended by signal 9")))
         (bar,) = display.tasks
     assert (bar.description, bar.total, bar.completed) == ("cost \\[csm3]", 4, 3)
     assert bar.fields["note"] == "about 30 s left, 1 from before"
@@ -625,7 +625,7 @@ def test_a_worker_killed_in_mid_sweep(tmp_path: Path) -> None:
         ended: list[str] = []
         finished_before: list[str] = []
 
-        def kill_one(standing: Standing) -> None:
+        def kill_one(standing: SweepStatus) -> None:
             if standing.task is not None and isinstance(standing.task.case, Odd):
                 ended.append(str(standing.task.case.error))
             if len(ended) == 2 and not finished_before:
@@ -652,7 +652,7 @@ def test_a_worker_killed_in_mid_sweep(tmp_path: Path) -> None:
 def test_a_cluster_whose_sweep_is_interrupted_ends_its_tasks(tmp_path: Path) -> None:
     tasks, journal = odd(tmp_path, "nothing", "sleep", "hold"), Journal(tmp_path / "journal")
 
-    def interrupt(standing: Standing) -> None:
+    def interrupt(standing: SweepStatus) -> None:
         if standing.done == 1:
             wait_for(lambda: len(log(tmp_path)) == 3)
             raise KeyboardInterrupt
@@ -670,10 +670,10 @@ def test_a_scheduler_that_goes_ends_the_sweep_and_not_what_is_finished(tmp_path:
     tasks, journal = odd(tmp_path, "nothing", "sleep"), Journal(tmp_path / "journal")
     with local_cluster() as cluster:
 
-        def close(standing: Standing) -> None:
+        def close(standing: SweepStatus) -> None:
             if standing.done == 1:
                 cluster.close()
 
-        with pytest.raises(SceneError, match="is gone; what is finished is kept"):
+        with pytest.raises(SceneError, match="is gone; finished points are kept"):
             sweep(tasks, Cluster(cluster.scheduler_address, HANG), journal, close)
     assert len(journal.points(tasks)) == 1

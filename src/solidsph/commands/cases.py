@@ -1,18 +1,22 @@
-"""solidsph cases: what can be run by name."""
+"""solidsph cases: the cases that can be run by name."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import attrs
 import click
 
-from solidsph.commands.console import say, show_json, show_table
+from solidsph.commands.console import Table, present
+from solidsph.commands.options import Output, options
 from solidsph.registry import registry
 
 
 @click.command()
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
-def cases(as_json: bool) -> None:
-    """List the cases that can be run by name, with their parameters."""
+@options(Output)
+def cases(options: Output) -> None:
+    """List the cases with their parameters."""
     rows = []
     for name in registry.names("cases"):
         cls = registry.load("cases", name)
@@ -22,10 +26,11 @@ def cases(as_json: bool) -> None:
         rows.append(
             {"case": name, "title": cls.title, "source": cls.source, "parameters": parameters}
         )
-    if as_json:
-        show_json({"cases": rows})
-        return
-    show_table("cases", ["case", "what", "source"], [list(row.values())[:3] for row in rows])
+    present({"cases": rows}, _text(rows), as_json=options.as_json)
+
+
+def _text(rows: Sequence[Mapping[str, Any]]) -> Iterator[Table | str]:
+    yield Table.of("cases", rows, ("case", "title", "source"))
     for row in rows:
         listed = ", ".join(f"{name}={value}" for name, value in row["parameters"].items())
-        say(f"{row['case']} --set: {listed}")
+        yield f"{row['case']} --set: {listed}"

@@ -1,142 +1,143 @@
-"""solidsph check: whether a part keeps its interface's promises, and what a scheme does."""
+"""solidsph check: conformance of a part with its interface, or the certificate of a scheme."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
+import attrs
 import click
 
-from solidsph.commands.certified import (
-    SchemeOptions,
-    confirmations,
-    facts,
-    passed,
-    scheme_options,
-    show_certificate,
-    stretch_of,
-)
-from solidsph.commands.console import say, show_json, show_table
+from solidsph.commands import certificate_tables as tables
+from solidsph.commands.console import Table, present
+from solidsph.commands.options import Output, flag, option, option_group, options, set_option
+from solidsph.commands.scheme_options import SchemeOptions
 from solidsph.commands.target import parameters
+from solidsph.conformance.check import CheckResult
 from solidsph.errors import SceneError
 from solidsph.registry import registry
+from solidsph.studies.certificate import certificate
 
-if TYPE_CHECKING:
-    from solidsph.conformance.check import CheckResult
+
+@attrs.frozen
+class _Options(Output):
+    all: bool = flag("Check every installed part, or all of a kind.")
+    kind: str | None = option("Kind of the part, where several kinds have the name.")
+    settings: tuple[str, ...] = set_option("the part, or of the case of the scheme")
+    scheme: SchemeOptions = option_group(SchemeOptions)
+    stretch: str = option(
+        "Stretch of the lattice of a scheme: 1.2, or by axis 1.2,1,1.",
+        default="1",
+        show_default=True,
+    )
+    dimension: int | None = option(
+        "Dimension of that lattice.  [default: 2]", type=click.IntRange(1, 3)
+    )
+    run: bool = flag("Confirm a scheme's certificate by runs.")
 
 
 @click.command()
-@click.argument("name", metavar="[PLUGIN]", required=False)
-@click.option("--all", "everything", is_flag=True, help="Every installed part, or all of a kind.")
-@click.option("--kind", help="Kind of part, where parts of several kinds have the name.")
-@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A part's parameter.")
-@scheme_options
-@click.option("--stretch", default="1", show_default=True, help="Of a scheme: 1.2, or 1.2,1,1.")
-@click.option("--dimension", type=click.IntRange(1, 3), help="Of a scheme.  [default: 2]")
-@click.option("--run", "confirm", is_flag=True, help="Confirm a scheme's certificate by runs.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
-def check(
-    name: str | None,
-    everything: bool,
-    kind: str | None,
-    settings: tuple[str, ...],
-    stretch: str,
-    dimension: int | None,
-    confirm: bool,
-    as_json: bool,
-    **options: Any,
-) -> None:
-    """Certify a part by name: the conformance kit that every built-in part passes. Or a scheme, by
-    the waves of its lattice: zero-energy and growing ones, critical step, wave speeds."""
-    scheme = SchemeOptions(**options)
-    if everything:
-        if name is not None or scheme.given:
+@click.argument("name", metavar="[PART]", required=False)
+@options(_Options)
+def check(name: str | None, options: _Options) -> None:
+    """Check a part, or certify a scheme.
+
+    A part is checked by the conformance kit of its kind. A scheme is certified by the waves on its
+    lattice: zero-energy and growing waves, critical step, wave speeds.
+    """
+    if options.all:
+        if name is not None or options.scheme.given:
             raise SceneError("--all checks every part; leave out the name and the scheme's options")
-        _conform_all(kind, as_json)
-        return
-    if name is None:
-        if not scheme.given and dimension is None and stretch == "1":
+        _check_all(options)
+    elif name is not None:
+        if options.scheme.given or options.dimension is not None:
             raise SceneError(
-                "there is nothing to check; name a part, such as `solidsph check cubic-spline`, "
-                "all of them with --all, or a scheme, such as `solidsph check --scheme SCENE` or "
-                "`--kernel NAME --cover 3`"
+                f"{name!r} is a part, but the options name a scheme; check one at a time: leave "
+                "out the part's name, or the scheme's options"
             )
-        _certify(scheme, settings, stretch, dimension or 2, confirm, as_json)
-        return
-    if scheme.given or dimension is not None:
-        raise SceneError(
-            f"{name!r} is a part, but the options name a scheme; check one at a time: leave out "
-            "the part's name, or the scheme's options"
-        )
-    _conform(name, kind, settings, as_json)
-
-
-def _certify(
-    options: SchemeOptions,
-    settings: tuple[str, ...],
-    stretch: str,
-    dimension: int,
-    confirm: bool,
-    as_json: bool,
-) -> None:
-    from solidsph.studies.certificate import certificate
-
-    found = certificate(options.made(settings), dimension, stretch_of(stretch))
-    confirmed = confirmations(found) if confirm else []
-    good = passed(found) and not any(row[1] == "FAIL" for row in confirmed)
-    if as_json:
-        show_json({**facts(found), "confirmed": confirmed})
+        _check_part(name, options)
+    elif options.scheme.given or options.dimension is not None or options.stretch != "1":
+        _certify(options)
     else:
-        show_certificate(found, confirmed)
-        say("certified" if good else "NOT certified: see FAIL above")
-    if not good:
-        raise SystemExit(1)
+        raise SceneError(
+            "there is nothing to check; name a part, such as `solidsph check cubic-spline`, "
+            "all of them with --all, or a scheme, such as `solidsph check --scheme SCENE` or "
+            "`--kernel NAME --cover 3`"
+        )
 
 
-def _conform(name: str, kind: str | None, settings: tuple[str, ...], as_json: bool) -> None:
+def _certify(options: _Options) -> None:
+    stretch = _stretch(options.stretch)
+    result = certificate(options.scheme.build(options.settings), options.dimension or 2, stretch)
+    confirmed = tables.confirmations(result) if options.run else []
+    good = tables.passed(result) and not any(row[1] == "FAIL" for row in confirmed)
+    present(
+        {**tables.certificate_facts(result), "confirmed": confirmed},
+        (
+            *tables.certificate_text(result, confirmed),
+            "certified" if good else "NOT certified: see FAIL above",
+        ),
+        as_json=options.as_json,
+        passed=good,
+    )
+
+
+def _stretch(text: str) -> float | list[float]:
+    """Stretch of all axes, or of each, from "1.2" or "1.2,1"."""
+    try:
+        stretches = [float(number) for number in text.split(",")]
+    except ValueError:
+        raise SceneError(
+            f'--stretch {text!r} is no number; give "1.2", or "1.2,1" by axis'
+        ) from None
+    return stretches[0] if len(stretches) == 1 else stretches
+
+
+def _check_part(name: str, options: _Options) -> None:
     from solidsph.testing import conformance, example_part, kits
 
-    found = _kind_of(name, kind)
-    if found not in kits():
+    group = _group_of(name, options.kind)
+    if group not in kits():
         raise SceneError(
-            f"there is no conformance kit for a {registry.singular(found)}; kits exist for "
-            f"{', '.join(registry.singular(one) for one in kits())}"
+            f"there is no conformance kit for a {registry.singular(group)}; kits exist for "
+            f"{_listed(kits())}"
         )
-    part = example_part(found, name, **parameters(settings))
-    entry = registry.find(found, name)
-    results = conformance(found, part)
-    good = all(result.passed for result in results)
-    if as_json:
-        show_json(
+    part = example_part(group, name, **parameters(options.settings))
+    results = conformance(group, part)
+    facts: dict[str, Any] = {
+        "part": name,
+        "kind": registry.singular(group),
+        "distribution": _distribution(group, name),
+        "passed": all(result.passed for result in results),
+        "checks": [
             {
-                "part": name,
-                "kind": registry.singular(found),
-                "distribution": f"{entry.distribution} {entry.version}",
-                "passed": good,
-                "checks": [
-                    {
-                        "check": result.name,
-                        "passed": result.passed,
-                        "checked": result.checked,
-                        "measured": result.measured,
-                        "required": result.required,
-                    }
-                    for result in results
-                ],
+                "check": result.name,
+                "passed": result.passed,
+                "checked": result.checked,
+                "measured": result.measured,
+                "required": result.required,
             }
-        )
-    else:
-        show_table(
-            f"{registry.singular(found)} {name} ({entry.distribution} {entry.version}): {part}",
-            ["check", "", "measured", "required"],
-            [[r.name, _verdict(r), r.measured, r.required] for r in results],
-        )
-        count = sum(not result.passed for result in results)
-        say("certified" if good else f"NOT certified: {count} of {len(results)} checks failed")
-        left = [result.name for result in results if not result.checked]
-        if left:
-            say(f"not checked, since it does not promise them: {', '.join(left)}")
-    if not good:
-        raise SystemExit(1)
+            for result in results
+        ],
+    }
+    text = _part_text(facts, part, results)
+    present(facts, text, as_json=options.as_json, passed=facts["passed"])
+
+
+def _part_text(
+    facts: Mapping[str, Any], part: object, results: Sequence[CheckResult]
+) -> Iterator[Table | str]:
+    yield Table(
+        f"{facts['kind']} {facts['part']} ({facts['distribution']}): {part}",
+        ["check", "", "measured", "required"],
+        [[r.name, _verdict(r), r.measured, r.required] for r in results],
+    )
+    failed = sum(not result.passed for result in results)
+    yield f"NOT certified: {failed} of {len(results)} checks failed" if failed else "certified"
+    skipped = [result.name for result in results if not result.checked]
+    if skipped:
+        yield f"not checked, because the part does not promise them: {', '.join(skipped)}"
 
 
 def _verdict(result: CheckResult) -> str:
@@ -145,78 +146,77 @@ def _verdict(result: CheckResult) -> str:
     return "pass" if result.passed else "FAIL"
 
 
-def _conform_all(kind: str | None, as_json: bool) -> None:
-    """A badge for every part: how many of its checks it passes."""
+def _check_all(options: _Options) -> None:
+    """How many of its checks every part passes."""
     from solidsph.testing import conformance, example_part, kits
 
     rows: list[dict[str, Any]] = []
-    for one in kits() if kind is None else [_kind(kind)]:
-        for name in registry.names(one):
-            entry = registry.find(one, name)
-            results = conformance(one, example_part(one, name))
-            failed = [result.name for result in results if not result.passed]
+    groups = kits()
+    if options.kind is not None:
+        groups = (_group(options.kind, groups, "kinds with a kit"),)
+    for group in groups:
+        for name in registry.names(group):
+            results = conformance(group, example_part(group, name))
             rows.append(
                 {
-                    "kind": registry.singular(one),
+                    "kind": registry.singular(group),
                     "part": name,
-                    "distribution": f"{entry.distribution} {entry.version}",
+                    "distribution": _distribution(group, name),
                     "passed": sum(result.passed and result.checked for result in results),
                     "checks": sum(result.checked for result in results),
-                    "failed": failed,
+                    "failed": [result.name for result in results if not result.passed],
                 }
             )
     good = not any(row["failed"] for row in rows)
-    if as_json:
-        show_json({"passed": good, "parts": rows})
-    else:
-        show_table(
-            "conformance",
-            ["kind", "part", "distribution", "", "checks", "failed"],
+    table = Table(
+        "conformance",
+        ["kind", "part", "distribution", "", "checks", "failed"],
+        [
             [
-                [
-                    row["kind"],
-                    row["part"],
-                    row["distribution"],
-                    "FAIL" if row["failed"] else "pass",
-                    f"{row['passed']} of {row['checks']}",
-                    ", ".join(row["failed"]),
-                ]
-                for row in rows
-            ],
-        )
-        say("all certified" if good else "NOT all certified")
-    if not good:
-        raise SystemExit(1)
+                *(row["kind"], row["part"], row["distribution"]),
+                "FAIL" if row["failed"] else "pass",
+                f"{row['passed']} of {row['checks']}",
+                ", ".join(row["failed"]),
+            ]
+            for row in rows
+        ],
+    )
+    verdict = "all certified" if good else "NOT all certified"
+    present({"passed": good, "parts": rows}, [table, verdict], as_json=options.as_json, passed=good)
 
 
-def _kind(word: str) -> str:
-    """A kind that has a kit, from its name or that of one part."""
-    from solidsph.testing import kits
-
-    found = [one for one in kits() if word in (one, registry.singular(one))]
-    if not found:
-        known = ", ".join(registry.singular(one) for one in kits())
-        raise SceneError(f"unknown kind {word!r}; kinds with a kit: {known}")
-    return found[0]
+def _distribution(group: str, name: str) -> str:
+    entry = registry.find(group, name)
+    return f"{entry.distribution} {entry.version}"
 
 
-def _kind_of(name: str, kind: str | None) -> str:
-    kinds = [one for one in registry.INTERFACES if name in registry.names(one)]
+def _listed(groups: Sequence[str]) -> str:
+    return ", ".join(registry.singular(group) for group in groups)
+
+
+def _group(kind: str, groups: Sequence[str], known: str = "known") -> str:
+    """The group of parts of a kind, which is called by its name or that of one part."""
+    for group in groups:
+        if kind in (group, registry.singular(group)):
+            return group
+    raise SceneError(f"unknown kind {kind!r}; {known}: {_listed(groups)}")
+
+
+def _group_of(name: str, kind: str | None) -> str:
+    """The group that a part belongs to."""
+    everything = list(registry.INTERFACES)
     if kind is not None:
-        wanted = [one for one in registry.INTERFACES if kind in (one, registry.singular(one))]
-        if not wanted:
-            known = ", ".join(registry.singular(one) for one in registry.INTERFACES)
-            raise SceneError(f"unknown kind {kind!r}; known: {known}")
-        registry.find(wanted[0], name)
-        return wanted[0]
-    if len(kinds) > 1:
-        listed = ", ".join(registry.singular(one) for one in kinds)
-        raise SceneError(f"{name!r} names parts of several kinds: {listed}; choose with --kind")
-    if not kinds:
-        everything = [known for one in registry.INTERFACES for known in registry.names(one)]
-        import difflib
-
-        near = difflib.get_close_matches(name, everything, 1)
+        group = _group(kind, everything)
+        registry.find(group, name)
+        return group
+    groups = [group for group in everything if name in registry.names(group)]
+    if len(groups) > 1:
+        raise SceneError(
+            f"{name!r} names parts of several kinds: {_listed(groups)}; choose with --kind"
+        )
+    if not groups:
+        known = [part for group in everything for part in registry.names(group)]
+        near = difflib.get_close_matches(name, known, 1)
         hint = f"did you mean {near[0]!r}?" if near else "list them: solidsph plugins"
         raise SceneError(f"no installed part is called {name!r}; {hint}")
-    return kinds[0]
+    return groups[0]

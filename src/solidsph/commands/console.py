@@ -1,96 +1,168 @@
-"""How commands speak: tables and progress for people, one JSON object for programs."""
+"""Output of the verbs: tables, lines and progress for people, one JSON object for programs."""
 
 from __future__ import annotations
 
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from math import isfinite
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
+import attrs
 import click
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table as RichTable
 
+from solidsph.interfaces.terms import Observation
 from solidsph.run.hooks import implementation
-
-if TYPE_CHECKING:
-    from solidsph.interfaces.terms import Observation
-    from solidsph.simulation import Simulation
-    from solidsph.studies.sweep import Standing, Watch
+from solidsph.simulation import Simulation
+from solidsph.studies.sweep import StatusCallback, SweepStatus
 
 
 class _Console(Console):
-    """One whose reader may go away, as `head` does: the work goes on, and is no failure."""
+    """Console that falls silent when its reader ends, as `head` does, so that the work goes on."""
 
     def on_broken_pipe(self) -> None:
         self.quiet = True
-        _stop_writing(self.file)
+        _discard_output(self.file)
 
 
-def _stop_writing(stream: IO[str]) -> None:
-    """What is still written to the `stream` goes nowhere."""
+def _discard_output(stream: IO[str]) -> None:
     with suppress(OSError, ValueError):  # no file, or a closed one
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, stream.fileno())
-        os.close(nowhere)
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, stream.fileno())
+        os.close(null)
 
 
-# Where no terminal gives a width, a file or a pipe has room for the widest table.
+# Files and pipes have no width of their own; this one fits the widest table.
 out = _Console(highlight=False, width=None if sys.stdout.isatty() else 170)
 err = _Console(stderr=True, highlight=False)
 
 
+@attrs.frozen
+class Table:
+    """A table for people."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+
+    @classmethod
+    def of(
+        cls,
+        title: str,
+        records: Sequence[Mapping[str, Any]],
+        keys: Sequence[str],
+        headings: Mapping[str, str] | None = None,
+    ) -> Table:
+        """Table of some keys of `records`, under headings that may differ from them."""
+        columns = [(headings or {}).get(key, key) for key in keys]
+        return cls(title, columns, [[record[key] for key in keys] for record in records])
+
+    @classmethod
+    def of_values(cls, title: str, values: Mapping[str, Any], name: str = "") -> Table:
+        """Table of names and values, one a row."""
+        return cls(title, [name, "value"], list(values.items()))
+
+    def show(self) -> None:
+        """Print it; numbers are right-aligned and rounded for reading."""
+        table = RichTable(title=escape(self.title), title_justify="left", header_style="bold")
+        for index, column in enumerate(self.columns):
+            cells = [row[index] for row in self.rows]
+            numeric = bool(cells) and all(_is_number(cell) or cell == "" for cell in cells)
+            # Numbers are never cut to fit; words may wrap.
+            table.add_column(
+                escape(column), justify="right" if numeric else "left", no_wrap=numeric
+            )
+        for row in self.rows:
+            table.add_row(*(escape(_text(cell)) for cell in row))
+        out.print(table)
+
+
+def present(
+    facts: Mapping[str, Any],
+    text: Iterable[Table | str],
+    *,
+    as_json: bool,
+    passed: bool = True,
+) -> None:
+    """Print `facts` as one JSON object, or else the tables and lines of `text`.
+
+    Raises:
+        SystemExit: the check or run has not passed; the exit code is 1.
+    """
+    if as_json:
+        show_json(facts)
+    else:
+        for block in text:
+            say(block) if isinstance(block, str) else block.show()
+    if not passed:
+        raise SystemExit(1)
+
+
 def say(text: str) -> None:
-    """One line of plain text, whatever brackets it holds."""
+    """Print plain text, brackets included, on the standard output."""
     out.print(escape(text), soft_wrap=True)
 
 
-def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
-    """A table; numbers are right-aligned and shortened to what a person reads."""
-    table = Table(title=escape(title), title_justify="left", header_style="bold")
-    for index, column in enumerate(columns):
-        numeric = bool(rows) and all(_is_number(row[index]) or row[index] == "" for row in rows)
-        # Numbers are never cut to fit; words may wrap.
-        table.add_column(escape(column), justify="right" if numeric else "left", no_wrap=numeric)
-    for row in rows:
-        table.add_row(*(escape(_shown(cell)) for cell in row))
-    out.print(table)
+def remark(text: str) -> None:
+    """Print plain text on the standard error."""
+    err.print(escape(text), soft_wrap=True)
 
 
 def show_json(data: Mapping[str, Any]) -> None:
-    """One JSON object on the standard output."""
+    """Print one JSON object on the standard output."""
     try:
         sys.stdout.write(json.dumps(_jsonable(data), indent=2, allow_nan=False) + "\n")
         sys.stdout.flush()
     except BrokenPipeError:
-        _stop_writing(sys.stdout)
+        _discard_output(sys.stdout)
 
 
-def facts() -> dict[str, Any]:
-    """What the object of --json holds whatever the outcome; a verb enters what it knows so far."""
+def known_facts() -> dict[str, Any]:
+    """Entries of the JSON object that are printed even if the verb fails; to be filled by it."""
     context = click.get_current_context(silent=True)
-    found: dict[str, Any] = {} if context is None else context.ensure_object(dict)
-    return found
+    facts: dict[str, Any] = {} if context is None else context.ensure_object(dict)
+    return facts
 
 
 @contextmanager
-def progress(shown: bool) -> Iterator[Progress | None]:
-    """A progress display on the standard error, if it is wanted and someone watches."""
+def progress(shown: bool, column: ProgressColumn | None = None) -> Iterator[Progress | None]:
+    """Progress display on the standard error; None unless `shown` and on a terminal.
+
+    Args:
+        shown: whether it is wanted.
+        column: the last one, by default the time remaining.
+    """
     if not (shown and err.is_terminal):
         yield None
         return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, TimeRemainingColumn(), console=err, transient=True) as display:
+    last = column or TimeRemainingColumn()
+    with Progress(*columns, last, console=err, transient=True) as display:
         yield display
 
 
+def progress_observers(
+    display: Progress | None, description: str, simulation: Simulation
+) -> Sequence[object]:
+    """Observers that show the progress of a run; none without a display."""
+    return [ProgressObserver(display, description, simulation)] if display else []
+
+
 class ProgressObserver:
-    """Moves a progress bar on at every output of a run."""
+    """Observer that advances a progress bar at every output of a run."""
 
     def __init__(self, display: Progress, description: str, simulation: Simulation) -> None:
         self._display = display
@@ -100,7 +172,7 @@ class ProgressObserver:
 
     @implementation
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
-        # By time, and not by counting: load steps are halved and doubled on the way.
+        # By time, not by counting: load steps are halved and doubled on the way.
         moves = simulation.scene.statics is None
         end = simulation.steps * simulation.step_size if moves else simulation.scene.duration
         part = observation.state.time / end
@@ -108,38 +180,34 @@ class ProgressObserver:
 
 
 @contextmanager
-def sweep_progress(description: str, shown: bool) -> Iterator[Watch]:
-    """Shows how far a sweep is, on the standard error, if it is wanted and someone watches."""
-    if not (shown and err.is_terminal):
-        yield lambda standing: None
-        return
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, TextColumn("{task.fields[note]}"), console=err, transient=True) as bar:
-        yield SweepObserver(bar, description)
+def sweep_progress(description: str, shown: bool) -> Iterator[StatusCallback]:
+    """Callback that shows the progress of a sweep, as `progress` does for a run."""
+    with progress(shown, TextColumn("{task.fields[note]}")) as display:
+        yield SweepObserver(display, description) if display else lambda status: None
 
 
 class SweepObserver:
-    """Moves a progress bar on whenever a task of a sweep has ended; shows those that failed."""
+    """Callback that advances a progress bar after every task of a sweep and prints failures."""
 
     def __init__(self, display: Progress, description: str) -> None:
         self._display = display
         self._task = display.add_task(escape(description), total=None, note="")
 
-    def __call__(self, standing: Standing) -> None:
-        point = standing.point
+    def __call__(self, status: SweepStatus) -> None:
+        point = status.point
         if point is not None and not point.finished:
             self._display.console.print(escape(f"{point.label()}: {point.outcome}"))
-        kept = f", {standing.kept} from before" if standing.kept else ""
+        kept = f", {status.kept} from before" if status.kept else ""
         self._display.update(
             self._task,
-            total=standing.total,
-            completed=standing.total - standing.remaining,
-            note=f"{time_left(standing.seconds_left)}{kept}",
+            total=status.total,
+            completed=status.total - status.remaining,
+            note=f"{time_left(status.seconds_left)}{kept}",
         )
 
 
 def time_left(seconds: float | None) -> str:
-    """An estimate as a person would say it."""
+    """Estimated remaining time in words."""
     if seconds is None:
         return "time left not known yet"
     if seconds < 90.0:
@@ -153,7 +221,7 @@ def _is_number(cell: Any) -> bool:
     return isinstance(cell, (int, float)) and not isinstance(cell, bool)
 
 
-def _shown(cell: Any) -> str:
+def _text(cell: Any) -> str:
     if isinstance(cell, bool):
         return "yes" if cell else "no"
     if isinstance(cell, float):
@@ -163,11 +231,9 @@ def _shown(cell: Any) -> str:
 
 def _jsonable(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return {str(key): _jsonable(one) for key, one in value.items()}
+        return {str(key): _jsonable(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_jsonable(one) for one in value]
-    if isinstance(value, (bool, int, str)) or value is None:
-        return value
+        return [_jsonable(item) for item in value]
     if isinstance(value, float):
         return value if isfinite(value) else str(value)  # JSON has no infinity
-    return str(value)
+    return value if isinstance(value, (bool, int, str)) or value is None else str(value)

@@ -1,325 +1,275 @@
-"""solidsph cost: error against time for a case, and what an accuracy or a time buys."""
+"""solidsph cost: error against time for a case, and the best configuration for either."""
 
 from __future__ import annotations
 
 import csv
-import re
-import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import attrs
 import click
 
-from solidsph.commands.console import say, show_json, show_table, sweep_progress
-from solidsph.commands.target import parameters, resolve
+from solidsph.commands.console import Table, present, sweep_progress
+from solidsph.commands.cost_options import axes_of, goal_of, seconds
+from solidsph.commands.options import (
+    ProgressOutput,
+    flag,
+    option,
+    options,
+    output_option,
+    set_option,
+    verbose_option,
+)
+from solidsph.commands.target import resolve
 from solidsph.errors import SceneError
 from solidsph.studies.case import Case
+from solidsph.studies.cluster import Cluster
+from solidsph.studies.cost import Axes, SweepSetup, default_settings, find_best, frontier
+from solidsph.studies.frontier import Frontier
+from solidsph.studies.point import Point
+from solidsph.studies.processes import Processes
+from solidsph.studies.report import write_report
+from solidsph.studies.report_figures import library
+from solidsph.studies.richardson import extrapolate
+from solidsph.studies.search import Goal, SearchResult
+from solidsph.studies.variant import with_settings
 
-if TYPE_CHECKING:
-    from solidsph.studies.cost import Axes, Means
-    from solidsph.studies.frontier import Frontier
-    from solidsph.studies.point import Point
-    from solidsph.studies.search import Found
+
+@attrs.frozen
+class _Options(ProgressOutput):
+    settings: tuple[str, ...] = set_option("the case")
+    axes: tuple[str, ...] = option(
+        "Values to try; the first axis refines, from coarse to fine.  [default: the case's own]",
+        "--axis",
+        multiple=True,
+        metavar="NAME=VALUE,VALUE...",
+    )
+    accuracy: str | None = option(
+        "Find the quickest configuration with this error, such as 1%.", metavar="PERCENT"
+    )
+    time: str | None = option(
+        "Find the most accurate configuration in this time, such as 60s.", metavar="TIME"
+    )
+    repeats: int = option(
+        "Number of runs of every configuration.",
+        type=click.IntRange(1),
+        default=1,
+        show_default=True,
+    )
+    workers: int = option(
+        "Processes at a time; with more than one, wall times are those of a shared machine.",
+        type=click.IntRange(1),
+        default=1,
+        show_default=True,
+    )
+    scheduler: str | None = option("Run on the Dask cluster at this address.", metavar="ADDRESS")
+    longest: str = option(
+        "A search runs nothing that is expected to take longer.",
+        default="10min",
+        show_default=True,
+        metavar="TIME",
+    )
+    output: Path | None = output_option(
+        "Folder for points, picture and scenes.  [default: results/cost/CASE]"
+    )
+    report: bool = flag(
+        "Also write an HTML page with interactive plots and the scene of every point."
+    )
+    verbose: bool = verbose_option()
+
+    def folder(self, target: str) -> Path:
+        """Folder of the results."""
+        return self.output or Path("results") / "cost" / target
 
 
 @click.command()
 @click.argument("target", metavar="CASE")
-@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A case's parameter.")
-@click.option(
-    "--axis",
-    "wanted_axes",
-    multiple=True,
-    metavar="NAME=VALUE,VALUE...",
-    help="Values to try; the first axis refines, from coarse to fine.  [default: the case's own]",
-)
-@click.option("--accuracy", metavar="PERCENT", help="Find the cheapest for this, such as 1%.")
-@click.option(
-    "--time", "time_wanted", metavar="TIME", help="Find the nearest in this, such as 60s."
-)
-@click.option(
-    "--repeats", type=click.IntRange(1), default=1, show_default=True, help="Of each run."
-)
-@click.option(
-    "--workers",
-    type=click.IntRange(1),
-    default=1,
-    show_default=True,
-    help="Processes at a time; with more than one, wall times are those of a shared machine.",
-)
-@click.option("--scheduler", metavar="ADDRESS", help="Run on the Dask cluster at this address.")
-@click.option(
-    "--longest",
-    default="10min",
-    show_default=True,
-    metavar="TIME",
-    help="A search runs nothing that it expects to take longer.",
-)
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path),
-    help="Folder for points, picture and scenes.  [default: results/cost/CASE]",
-)
-@click.option(
-    "--report",
-    is_flag=True,
-    help="Write a page of HTML too, with plots to explore and the scene of every point.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
-@click.option("--quiet", is_flag=True, help="Show no progress.")
-def cost(
-    target: str,
-    settings: tuple[str, ...],
-    wanted_axes: tuple[str, ...],
-    accuracy: str | None,
-    time_wanted: str | None,
-    repeats: int,
-    workers: int,
-    scheduler: str | None,
-    longest: str,
-    output: Path | None,
-    report: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    """Show what accuracy costs in time for a case. What has run is kept: the same command goes on
-    where another was ended."""
-    from solidsph.studies.cost import Means
-    from solidsph.studies.processes import Processes
+@options(_Options)
+def cost(target: str, options: _Options) -> None:
+    """Show the time that accuracy costs for a case.
 
-    case = resolve(target, settings)
+    Finished points are kept: the same command continues an interrupted sweep.
+    """
+    goal = goal_of(options.accuracy, options.time)
+    case = resolve(target, options.settings)
     if not isinstance(case, Case):
         raise SceneError(f"{target!r} is a scene, which has no reference; give a case")
-    if accuracy is not None and time_wanted is not None:
+    if options.accuracy is not None and options.time is not None:
         raise SceneError("--accuracy and --time are two questions; ask one at a time")
-    if report and (accuracy is not None or time_wanted is not None):
+    if options.report and goal is not None:
         raise SceneError(
             "--report shows a sweep, not a search; leave out --accuracy and --time: what a search "
             "has run, the sweep takes from the journal"
         )
-    if report:
-        from solidsph.studies.report_figures import library
-
-        library()  # missed before anything has run
-    runner: Any = Processes(workers)
-    if scheduler is not None:
-        from solidsph.studies.cluster import Cluster  # brings the cluster's library with it
-
-        runner = Cluster(scheduler)
-    folder = output or Path("results") / "cost" / target
-    axes = _axes(wanted_axes, case)
-    with sweep_progress(target, not (as_json or quiet)) as watch:
-        means = Means(runner, folder, repeats, watch)
-        goal = _goal(accuracy, time_wanted)
+    if options.report:
+        library()  # refused before anything runs if Plotly is missing
+    axes = axes_of(options.axes, case)
+    scheduler = options.scheduler
+    runner = Processes(options.workers) if scheduler is None else Cluster(scheduler)
+    with sweep_progress(target, options.progress) as watch:
+        setup = SweepSetup(runner, options.folder(target), options.repeats, watch)
         if goal is None:
-            _sweep(target, case, axes, means, folder, report, as_json)
+            facts, text, passed = _sweep(target, options, case, axes, setup)
         else:
-            _search(target, case, goal, axes, means, folder, seconds(longest, "--longest"), as_json)
+            facts, text, passed = _search(target, options, case, axes, setup, goal)
+    present(facts, text, as_json=options.as_json, passed=passed)
+
+
+Presentation = tuple[Mapping[str, Any], Iterator[Table | str], bool]
+"""Facts for programs, text for people, and whether it succeeded."""
 
 
 def _sweep(
-    target: str,
-    case: Case,
-    axes: Axes,
-    means: Means,
-    folder: Path,
-    report: bool,
-    as_json: bool,
-) -> None:
-    from solidsph.studies.cost import frontier, own_settings
+    target: str, options: _Options, case: Case, axes: Axes, setup: SweepSetup
+) -> Presentation:
     from solidsph.studies.frontier_picture import draw_frontier
-    from solidsph.studies.report import write_report
 
-    made = frontier(case, axes, means)
-    rows = list(made)
-    own = own_settings(case.priced(), axes)
-    default = next((point for point in made.points if point.settings == own), None)
+    folder = options.folder(target)
+    result = frontier(case, axes, setup)
+    rows = list(result)
+    own = default_settings(case.priced(), axes)
+    default = next((point for point in result.points if point.settings == own), None)
     picture, table = folder / f"{target}-frontier.png", folder / f"{target}-points.csv"
-    if made.finished():
-        draw_frontier(made, case.priced().title, picture)
+    if result.finished():
+        draw_frontier(result, case.priced().title, picture)
     with table.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
-    page = folder / f"{target}-report.html" if report else None
+    page = folder / f"{target}-report.html" if options.report else None
     if page is not None:
-        write_report(made, case, page)
-    bars = _bars(made)
-    if as_json:
-        show_json(
+        write_report(result, case, page)
+    facts = {
+        "case": target,
+        "points": rows,
+        "orders": [
             {
-                "case": target,
-                "points": rows,
-                "orders": [
-                    {
-                        "scheme": dict(one.settings),
-                        "in spacing": one.in_spacing,
-                        "in time": one.in_time,
-                        "crosses": one.crosses,
-                    }
-                    for one in made.orders()
-                ],
-                "without a reference": bars,
-                "time for the next digit": made.next_digit(),
-                "default": None if default is None else _default(made, default),
-                "sentence": made.sentence(),
-                "picture": str(picture),
-                "table": str(table),
-                "report": None if page is None else str(page),
+                "scheme": dict(orders.settings),
+                "in spacing": orders.in_spacing,
+                "in time": orders.in_time,
+                "crosses": orders.crosses,
             }
-        )
-    else:
-        _show(target, made, default, bars)
-        say(f"picture: {picture}")
-        say(f"all points: {table}")
-        if page is not None:
-            say(f"report: {page}")
-    if not made.finished():
-        raise SystemExit(1)
+            for orders in result.orders()
+        ],
+        "without a reference": _extrapolations(result),
+        "time for the next digit": result.next_digit(),
+        "default": None
+        if default is None
+        else {
+            "error": default.error,
+            "time [s]": default.time,
+            "times the front": result.excess(default),
+        },
+        "sentence": result.sentence(),
+        "picture": str(picture),
+        "table": str(table),
+        "report": None if page is None else str(page),
+    }
+    return facts, _sweep_text(facts, result, default, options.verbose), bool(result.finished())
 
 
-def _show(target: str, made: Frontier, default: Point | None, bars: Sequence[Any]) -> None:
-    show_table(
-        f"{target}: the front, of {len(made)} configurations",
-        [
-            *("configuration", "error [%]", "trusted [%]", "time [s]"),
-            *("steps", "pair evaluations", "bytes touched", "memory [MiB]"),
-        ],
-        [
-            [*_row(point)[:2], 100.0 * made.trusted(point), *_row(point)[2:]]
-            for point in made.front()
-        ],
+def _sweep_text(
+    facts: Mapping[str, Any], result: Frontier, default: Point | None, verbose: bool
+) -> Iterator[Table | str]:
+    yield _points_table(
+        f"{facts['case']}: the front, of {len(result)} configurations",
+        result.front(),
+        verbose,
+        {"trusted [%]": [100.0 * result.trusted(point) for point in result.front()]},
     )
-    show_table(
+    yield Table(
         "orders, by scheme",
         ["scheme", "in spacing", "in time", "falls steadily"],
-        [
-            [_scheme(one.settings), one.in_spacing, one.in_time, not one.crosses]
-            for one in made.orders()
-        ],
+        [[o.label, o.in_spacing, o.in_time, not o.crosses] for o in result.orders()],
     )
-    if bars:
-        show_table(
-            "without the reference: what the three finest spacings tend to",
-            ["scheme", "finest", "limit", "order", "bar [%]", "true error [%]", "warning"],
-            [list(bar.values()) for bar in bars],
-        )
-    failed = [point for point in made.points if not point.finished]
-    for point in failed:
-        say(f"failed: {point.label()}: {point.outcome.splitlines()[0]}")
+    if bars := facts["without a reference"]:
+        title = "without the reference: extrapolation of the three finest spacings"
+        yield Table.of(title, bars, list(bars[0]))
+    for point in result.points:
+        if not point.finished:
+            yield f"failed: {point.label()}: {point.outcome.splitlines()[0]}"
     if default is not None:
-        excess = made.excess(default)
-        place = (
-            "on the front"
-            if excess == 1.0
-            else f"{excess:.2g} times the time of what is as near on the front"
-            if isfinite(excess)
-            else "failed"
-        )
-        say(f"the case's own parameters: {_brief(default)}: {place}")
-    say(made.sentence())
+        excess = result.excess(default)
+        place = "on the front" if excess == 1.0 else "failed"
+        if isfinite(excess) and excess != 1.0:
+            place = f"{excess:.2g} times the time of an equally accurate one on the front"
+        yield f"the case's own parameters: {default.brief()}: {place}"
+    yield facts["sentence"]
+    yield f"picture: {facts['picture']}"
+    yield f"all points: {facts['table']}"
+    if facts["report"] is not None:
+        yield f"report: {facts['report']}"
 
 
-def _default(made: Frontier, point: Point) -> Mapping[str, Any]:
-    return {"error": point.error, "time [s]": point.time, "times the front": made.excess(point)}
-
-
-def _bars(made: Frontier) -> Sequence[Mapping[str, Any]]:
-    """Of every scheme on the front of which there are three points: its error bar."""
-    from solidsph.studies.richardson import extrapolated
-
+def _extrapolations(result: Frontier) -> Sequence[Mapping[str, Any]]:
+    """Error bar of every scheme on the front that has three points or more."""
     bars = []
-    on_front = {made.scheme(point) for point in made.front()}
-    for scheme, points in made.schemes().items():
+    on_front = {result.scheme(point) for point in result.front()}
+    for scheme, points in result.schemes().items():
         values = [point.value for point in points if point.value is not None]
         if scheme not in on_front or len(points) < 3 or len(values) < len(points):
             continue
         if points[-1].reference is None:
             continue  # its value is the error itself
-        found = extrapolated([point.spacing for point in points], values)
+        limit = extrapolate([point.spacing for point in points], values)
         bars.append(
             {
                 "scheme": scheme,
                 "finest": values[-1],
-                "limit": found.limit,
-                "order": found.order,
-                "bar [%]": 100.0 * found.index,
+                "limit": limit.limit,
+                "order": limit.order,
+                "bar [%]": 100.0 * limit.index,
                 "true error [%]": 100.0 * points[-1].error,
-                "warning": found.warning,
+                "warning": limit.warning,
             }
         )
     return bars
 
 
 def _search(
-    target: str,
-    case: Case,
-    goal: Any,
-    axes: Axes,
-    means: Means,
-    folder: Path,
-    longest: float,
-    as_json: bool,
-) -> None:
-    from solidsph.studies.cost import found as find
+    target: str, options: _Options, case: Case, axes: Axes, setup: SweepSetup, goal: Goal
+) -> Presentation:
+    longest = seconds(options.longest, "--longest")
+    result = find_best(case, goal, axes, setup, longest=longest)
+    best = result.point
+    scenes = list(_write_scenes(target, options.folder(target), case, result))
+    facts = {
+        "case": target,
+        "found": None if best is None else _facts(best),
+        "tried": [_facts(point) for point in result.tried],
+        "spent [s]": result.spent,
+        "sure": result.sure,
+        "scenes": [str(path) for path in scenes],
+    }
+    return facts, _search_text(facts, result, options.verbose), best is not None
 
-    found = find(case, goal, axes, means, longest=longest)
-    scenes = [] if found.point is None else _scenes(target, case, found, folder)
-    if as_json:
-        show_json(
-            {
-                "case": target,
-                "found": None if found.point is None else _facts(found.point),
-                "tried": [_facts(point) for point in found.tried],
-                "spent [s]": found.spent,
-                "sure": found.sure,
-                "scenes": [str(path) for path in scenes],
-            }
-        )
+
+def _search_text(
+    facts: Mapping[str, Any], result: SearchResult, verbose: bool
+) -> Iterator[Table | str]:
+    yield _points_table(f"{facts['case']}: configurations tried", result.tried, verbose)
+    yield f"{result.sure}; {result.spent:.3g} s of runs"
+    yield from (f"scene: {path}" for path in facts["scenes"])
+    if result.point is None:
+        yield "found: nothing; give finer values by --axis, or a longer time by --longest"
     else:
-        show_table(
-            f"{target}: what was tried",
-            [
-                "configuration",
-                "error [%]",
-                "time [s]",
-                "steps",
-                "pair evaluations",
-                "bytes touched",
-                "memory [MiB]",
-            ],
-            [_row(point) for point in found.tried],
-        )
-        say(f"{found.sure}; {found.spent:.3g} s of runs")
-        for path in scenes:
-            say(f"scene: {path}")
-        if found.point is None:
-            say("found: nothing; give finer values by --axis, or more by --longest")
-        else:
-            say(f"found: {_brief(found.point)}")
-    if found.point is None:
-        raise SystemExit(1)
+        yield f"found: {result.point.brief()}"
 
 
-def _scenes(target: str, case: Case, found: Found, folder: Path) -> Sequence[Path]:
-    """The scenes of what was found, each a file with its evidence at the top."""
-    from solidsph.studies.varied import varied
-
-    point = found.point
-    assert point is not None
-    paths = []
-    scenes = varied(case.priced(), point.settings).scenes()
+def _write_scenes(target: str, folder: Path, case: Case, result: SearchResult) -> Iterator[Path]:
+    """Write the scenes of the best point to files that begin with its evidence."""
+    point = result.point
+    if point is None:
+        return
+    scenes = with_settings(case.priced(), point.settings).scenes()
+    evidence = (f"{point.brief()}, of: {point.quantity}", result.sure, f"solidsph cost {target}")
+    heading = "".join(f"# {line}\n" for line in evidence)
     for name, scene in scenes.items():
         path = folder / (f"{target}.toml" if len(scenes) == 1 else f"{target}-{name}.toml")
-        evidence = (
-            f"# {_brief(point)}, of: {point.quantity}",
-            f"# {found.sure}",
-            f"# solidsph cost {target}",
-        )
-        path.write_text("\n".join([*evidence, "", scene.to_toml()]), encoding="utf-8")
-        paths.append(path)
-    return paths
+        path.write_text(f"{heading}\n{scene.to_toml()}", encoding="utf-8")
+        yield path
 
 
 def _facts(point: Point) -> Mapping[str, Any]:
@@ -335,88 +285,22 @@ def _facts(point: Point) -> Mapping[str, Any]:
     }
 
 
-def _row(point: Point) -> list[Any]:
-    return [
-        point.label(),
-        100.0 * point.error,
-        point.time,
-        point.steps,
-        point.pair_evaluations,
-        float(point.bytes_touched),
-        point.peak_memory / 2**20,
-    ]
-
-
-def _brief(point: Point) -> str:
-    return f"{point.label()}: {100.0 * point.error:.2g} % in {point.time:.2g} s"
-
-
-def _scheme(settings: Mapping[str, Any]) -> str:
-    from solidsph.studies.point import shown
-
-    return ", ".join(f"{name} {shown(value)}" for name, value in settings.items()) or "as it is"
-
-
-def _axes(wanted: Sequence[str], case: Case) -> Axes:
-    """Those of the command line after the one that refines; the case's own if there are none."""
-    from solidsph.studies.cost import sweep_of
-
-    if not wanted:
-        return sweep_of(case.priced())
-    axes = dict(_axis(one) for one in wanted)
-    refining, values = next(iter(case.priced().sweep.items()), ("", ()))
-    if refining and refining not in axes:
-        return {refining: values, **axes}
-    return {name: axes[name] for name in sorted(axes, key=lambda name: name != refining)}
-
-
-def _axis(text: str) -> tuple[str, Sequence[Any]]:
-    name, equals, values = text.partition("=")
-    if not equals or not name.strip() or not values.strip():
-        raise SceneError(f"--axis {text!r} is not of the form name=value,value")
-    try:
-        parsed = tomllib.loads(f"values = [{values}]")["values"]
-    except tomllib.TOMLDecodeError:
-        several = (parameters([f"value={value.strip()}"]) for value in values.split(","))
-        parsed = [one["value"] for one in several]
-    parsed = [tuple(value) if isinstance(value, list) else value for value in parsed]
-    if len({repr(value) for value in parsed}) < len(parsed):
-        raise SceneError(f"--axis {text!r} has a value twice; give each once")
-    return name.strip(), parsed
-
-
-def _goal(accuracy: str | None, time: str | None) -> Any:
-    from solidsph.studies.search import Accuracy, Within
-
-    if accuracy is not None:
-        return Accuracy(_part(accuracy))
-    return None if time is None else Within(seconds(time, "--time"))
-
-
-def _part(text: str) -> float:
-    """ "1%" or "0.01" as a number."""
-    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(%?)\s*", text)
-    try:
-        value = float(match[1]) if match else 0.0
-    except ValueError:
-        value = 0.0
-    if match and match[2]:
-        value /= 100.0
-    if not 0.0 < value < 1.0:
-        raise SceneError(f"--accuracy must be between 0 and 100 %, such as 1%, got {text!r}")
-    return value
-
-
-_UNITS = {"": 1.0, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
-
-
-def seconds(text: str, option: str) -> float:
-    """ "60s", "2min" or "1h" in seconds."""
-    match = re.fullmatch(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([a-z]*)\s*", text)
-    try:
-        value = float(match[1]) * _UNITS[match[2]] if match else 0.0
-    except (ValueError, KeyError):
-        value = 0.0
-    if not 0.0 < value < 1e9:
-        raise SceneError(f"{option} must be a time, such as 60s, 2min or 1h, got {text!r}")
-    return value
+def _points_table(
+    title: str,
+    points: Sequence[Point],
+    verbose: bool,
+    after_error: Mapping[str, Sequence[float]] | None = None,
+) -> Table:
+    """Table of points, with more columns after that of the error."""
+    columns = {
+        "configuration": [point.label() for point in points],
+        "error [%]": [100.0 * point.error for point in points],
+        **(after_error or {}),
+        "time [s]": [point.time for point in points],
+        "steps": [point.steps for point in points],
+        "pair evaluations": [point.pair_evaluations for point in points],
+        "memory [MiB]": [point.peak_memory / 2**20 for point in points],
+    }
+    if verbose:
+        columns["bytes touched"] = [float(point.bytes_touched) for point in points]
+    return Table(title, list(columns), list(zip(*columns.values(), strict=True)))

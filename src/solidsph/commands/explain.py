@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import attrs
 import click
 
 from solidsph.advice import advise
-from solidsph.commands import prediction as told
-from solidsph.commands.console import say, show_json, show_table
+from solidsph.commands.console import Table, present
+from solidsph.commands.options import Output, option, options, set_option, verbose_option
+from solidsph.commands.prediction import (
+    INTERNALS,
+    Row,
+    build_timed,
+    cluster_rows,
+    prediction_rows,
+    rows,
+    this_machine,
+    work_rows,
+)
 from solidsph.commands.target import parameters, resolve
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.cluster import Cluster
@@ -31,81 +41,86 @@ from solidsph.statics import critical_step
 from solidsph.statics.freedoms import freedoms
 from solidsph.studies.case import Case
 
+Facts = dict[str, Any]
+
+
+@attrs.frozen
+class _Options(Output):
+    settings: tuple[str, ...] = set_option("the case")
+    cluster: tuple[str, ...] = option(
+        "Assumption about the cluster on which a scene larger than this machine is priced: "
+        "cores, memory [GiB], bandwidth [GB/s], network [GB/s], latency [us], storage [GB/s], "
+        "efficiency, usable.",
+        multiple=True,
+        metavar="NAME=VALUE",
+    )
+    verbose: bool = verbose_option()
+
 
 @click.command()
 @click.argument("target", metavar="SCENE|-|CASE")
-@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A case's parameter.")
-@click.option(
-    "--cluster",
-    "assumed",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="An assumption on the cluster by which a scene larger than this machine is priced: "
-    "cores, memory [GiB], bandwidth [GB/s], network [GB/s], latency [us], storage [GB/s], "
-    "efficiency, usable.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
-def explain(
-    target: str, settings: tuple[str, ...], assumed: tuple[str, ...], as_json: bool
-) -> None:
-    """Say what would be simulated, why, and at what cost. Nothing is run or written.
+@options(_Options)
+def explain(target: str, options: _Options) -> None:
+    """Show what a run would simulate and cost.
 
-    Scenes are built, to be counted; one that needs more memory than this machine has is priced
-    on paper.
+    Nothing is run or written. Scenes are built in order to count their work. One that needs more
+    memory than this machine has is priced on paper.
     """
-    wanted = resolve(target, settings)
-    cluster = _cluster(assumed)
+    wanted = resolve(target, options.settings)
+    cluster = _cluster(options.cluster)
     scenes = wanted.scenes() if isinstance(wanted, Case) else {target: wanted}
-    explanations: dict[str, dict[str, Any]] = {}
-    machine = told.calibrated()
-    compiled: set[Compilation] = set()
+    explanations: dict[str, Facts] = {}
+    machine = this_machine()
+    compiled: frozenset[Compilation] = frozenset()
     predictions = []
     for name, scene in scenes.items():
-        found, explanations[name] = _explained(scene, machine, cluster, frozenset(compiled))
-        compiled |= found.work.compilations
-        predictions.append(found)
-    if as_json:
-        show_json({"scenes": explanations, "predicted": _together(predictions)})
-        return
-    for name, facts in explanations.items():
-        say(f"\n{name}: {scenes[name].title}" if scenes[name].title else f"\n{name}")
-        show_table(
-            "parts", ["kind", "name", "from", "why"], [list(row.values()) for row in facts["parts"]]
-        )
+        prediction, explanations[name] = _explained(scene, machine, cluster, compiled)
+        compiled |= prediction.work.compilations
+        predictions.append(prediction)
+    facts = {
+        "scenes": explanations,
+        "predicted": {
+            "wall time [s]": sum(p.seconds for p in predictions),
+            "peak memory [MiB]": max(p.memory for p in predictions) / 2**20,
+            "pair evaluations": sum(p.work.pair_evaluations for p in predictions),
+        },
+    }
+    titles = {name: scene.title for name, scene in scenes.items()}
+    present(facts, _text(facts, titles, verbose=options.verbose), as_json=options.as_json)
+
+
+def _text(facts: Facts, titles: Mapping[str, str], *, verbose: bool) -> Iterator[Table | str]:
+    for name, scene in facts["scenes"].items():
+        yield f"\n{name}: {titles[name]}" if titles[name] else f"\n{name}"
+        yield Table.of("parts", scene["parts"], ("kind", "name", "from", "why"))
         for title in ("numbers", "work", "cost", "on a cluster"):
-            if facts.get(title):
-                rows = [list(row.values()) for row in facts[title]]
-                show_table(title, ["", "value", "why"], rows)
-        show_table(
-            "effects",
-            ["effect", "simulated", "why", "arrays", "bytes", "of the steps", "stable step"],
-            [[*list(row.values())[:5], *_shares_shown(row)] for row in facts["effects"]],
-        )
-        _show_advice(facts)
-    if len(predictions) > 1:
-        rows = [[key, value] for key, value in _together(predictions).items()]
-        show_table("all scenes, one after the other", ["", "value"], rows)
+            if scene.get(title):
+                shown = [r for r in scene[title] if verbose or r["quantity"] not in INTERNALS]
+                yield Table.of(title, shown, ("quantity", "value", "why"), {"quantity": ""})
+        yield _effects_table(scene["effects"], verbose=verbose)
+        if scene["warnings"]:
+            keys = ("name", "found", "expected", "remedy")
+            yield Table.of("warnings", scene["warnings"], keys, {"name": "warning"})
+            yield 'To silence a warning: silence = ["its-name"] at the top of the scene.'
+        if scene["silenced"]:
+            yield f"silenced by the scene: {', '.join(scene['silenced'])}"
+    if len(titles) > 1:
+        yield Table.of_values("all scenes, one after the other", facts["predicted"])
 
 
-def _shares_shown(row: Mapping[str, Any]) -> tuple[str, str]:
-    share, step = row["share of the steps"], row["stable step"]
-    return (
-        "" if share is None else f"{100.0 * share:.1f} %",
-        "" if step is None else f"times {step:.3g}",
-    )
-
-
-def _show_advice(facts: Mapping[str, Any]) -> None:
-    silenced = facts["silenced"]
-    if facts["warnings"]:
-        show_table(
-            "warnings",
-            ["warning", "found", "expected", "remedy"],
-            [list(row.values()) for row in facts["warnings"]],
-        )
-        say('To silence one: silence = ["its-name"] at the top of the scene.')
-    if silenced:
-        say(f"silenced by the scene: {', '.join(silenced)}")
+def _effects_table(effects: Sequence[Facts], *, verbose: bool) -> Table:
+    share, step = "share of the steps", "stable step"
+    shown = [
+        {
+            **row,
+            share: "" if row[share] is None else f"{100.0 * row[share]:.1f} %",
+            step: "" if row[step] is None else f"times {row[step]:.3g}",
+        }
+        for row in effects
+    ]
+    arrays = ["arrays"] if verbose else []
+    keys = ["effect", "simulated", "why", *arrays, "bytes", share, step]
+    return Table.of("effects", shown, keys, {"bytes": "memory [bytes]", share: "of the steps"})
 
 
 def _cluster(assumed: tuple[str, ...]) -> Cluster:
@@ -117,89 +132,95 @@ def _cluster(assumed: tuple[str, ...]) -> Cluster:
     return Cluster(**values)
 
 
-def _together(predictions: list[Prediction]) -> dict[str, float]:
-    return {
-        "wall time [s]": sum(one.seconds for one in predictions),
-        "peak memory [MiB]": max(one.memory for one in predictions) / 2**20,
-        "pair evaluations": sum(one.work.pair_evaluations for one in predictions),
+def _explained(
+    scene: Scene, machine: Calibration, cluster: Cluster, compiled: frozenset[Compilation]
+) -> tuple[Prediction, Facts]:
+    try:
+        prediction = predicted(estimated(scene), machine, compiled=compiled)
+    except Exception:  # a wrong part, which the build reports, or one that cannot be estimated
+        prediction = None
+    if prediction is not None and prediction.memory > machine_memory():
+        facts = _too_large(scene, prediction)
+        facts["on a cluster"] = cluster_rows(prediction, machine, cluster)
+    else:
+        simulation, build = build_timed(scene)
+        prediction = foreseen(simulation, machine, built=build, compiled=compiled)
+        facts = _built(simulation, shares(simulation, machine))
+    return prediction, {
+        **facts,
+        "work": work_rows(prediction.work),
+        "cost": prediction_rows(prediction),
+        "silenced": list(scene.silence),
     }
 
 
-def _explained(
-    scene: Scene, machine: Calibration, cluster: Cluster, compiled: frozenset[Compilation]
-) -> tuple[Prediction, dict[str, Any]]:
-    on_paper = _on_paper(scene, machine, compiled)
-    if on_paper is not None and on_paper.memory > machine_memory():
-        return on_paper, _too_large(scene, on_paper, machine, cluster)
-    simulation, build = told.built(scene)
-    found = foreseen(simulation, machine, built=build, compiled=compiled)
-    return found, {
-        "parts": _parts(scene, simulation.parts),
+def _built(simulation: Simulation, effect_shares: Mapping[str, Share]) -> Facts:
+    """Facts of a built scene."""
+    # Parts may hold effects of their own.
+    inside = {entry.name for entry in simulation.parts if entry.kind == "effects"}
+    named = {registry.entry_of("effects", part).name for part in simulation.effects.values()}
+    effects = []
+    for label in simulation.effects:
+        share = effect_shares.get(label)
+        effects.append(
+            _effect(
+                label,
+                "named by the scene",
+                simulated=True,
+                arrays=simulation.load_of(label).arrays,
+                share=None if share is None else share.time,
+                step=None if share is None else share.step,
+            )
+        )
+    return {
+        "parts": _parts(simulation.scene, simulation.parts),
         "numbers": _numbers(simulation),
-        "work": told.work_rows(found.work),
-        "cost": told.prediction_rows(found),
-        "effects": _effects(simulation.effects, simulation, shares(simulation, machine)),
+        "effects": effects + _other_effects(named, inside),
         "warnings": [
             {"name": a.name, "found": a.finding, "expected": a.expected, "remedy": a.remedy}
             for a in advise(simulation)
         ],
-        "silenced": list(scene.silence),
     }
 
 
-def _on_paper(
-    scene: Scene, machine: Calibration, compiled: frozenset[Compilation]
-) -> Prediction | None:
-    """A first estimate; nothing where a part is wrong or strange, which the build will tell."""
-    try:
-        return predicted(estimated(scene), machine, compiled=compiled)
-    except Exception:
-        return None
-
-
-def _too_large(
-    scene: Scene, found: Prediction, machine: Calibration, cluster: Cluster
-) -> dict[str, Any]:
-    work = found.work
-    rows = [
-        ("dimensions", work.dimension, "1 is uniaxial strain, 2 is plane strain"),
-        ("particles", work.particles, "about: volume over the cell, ghosts left out"),
-        ("steps", work.steps, "about: by wave speed and spacing alone"),
-    ]
-    _, priced = told.cluster_rows(found, machine, cluster)
-    effects = {
-        one.label or str(k): construct("effects", one.part) for k, one in enumerate(scene.effects)
-    }
+def _too_large(scene: Scene, prediction: Prediction) -> Facts:
+    """Facts of a scene that is too large to be built."""
+    work = prediction.work
+    effects = [construct("effects", effect.part) for effect in scene.effects]
+    named = [registry.entry_of("effects", part).name for part in effects]
     return {
-        "parts": _parts(scene, _named(scene)),
-        "numbers": [{"quantity": name, "value": value, "why": why} for name, value, why in rows],
-        "work": told.work_rows(work),
-        "cost": told.prediction_rows(found),
-        "on a cluster": priced,
-        "effects": _effects(effects, None, {}),
+        "parts": _parts(scene, _named_parts(scene)),
+        "numbers": rows(
+            ("dimensions", work.dimension, "1 is uniaxial strain, 2 is plane strain"),
+            ("particles", work.particles, "about: volume over the cell, without ghosts"),
+            ("steps", work.steps, "about: by wave speed and spacing alone"),
+        ),
+        "effects": [
+            *(_effect(name, "named by the scene", simulated=True) for name in named),
+            *_other_effects(set(named), set()),
+        ],
         "warnings": [],
-        "silenced": list(scene.silence),
     }
 
 
-def _named(scene: Scene) -> tuple[registry.Entry, ...]:
-    """The parts that a scene names, without what is inside of them."""
-    wanted: list[tuple[str, Any]] = [
+def _named_parts(scene: Scene) -> tuple[registry.Entry, ...]:
+    """The parts that a scene names, without those inside them."""
+    named: list[tuple[str, Any]] = [
         ("kernels", scene.kernel),
         ("formulations", scene.formulation),
         ("integrators", scene.integrator or DEFAULT_INTEGRATOR),
-        *(("boundaries", one.part) for one in scene.boundaries),
-        *(("effects", one.part) for one in scene.effects),
+        *(("boundaries", boundary.part) for boundary in scene.boundaries),
+        *(("effects", effect.part) for effect in scene.effects),
     ]
     for body in scene.bodies.values():
         material = body.material if body.material is not None else scene.material
-        wanted += [("shapes", body.shape), ("discretisations", body.discretisation)]
-        wanted += [("materials", material)]
-    made = [(kind, construct(kind, part)) for kind, part in wanted]
-    return tuple(dict.fromkeys(registry.entry_of(kind, part) for kind, part in made))
+        named += [("shapes", body.shape), ("discretisations", body.discretisation)]
+        named += [("materials", material)]
+    parts = [(kind, construct(kind, part)) for kind, part in named]
+    return tuple(dict.fromkeys(registry.entry_of(kind, part) for kind, part in parts))
 
 
-def _parts(scene: Scene, entries: tuple[registry.Entry, ...]) -> list[dict[str, Any]]:
+def _parts(scene: Scene, entries: tuple[registry.Entry, ...]) -> list[Facts]:
     return [
         {
             "kind": registry.singular(entry.kind),
@@ -211,146 +232,109 @@ def _parts(scene: Scene, entries: tuple[registry.Entry, ...]) -> list[dict[str, 
     ]
 
 
-_DEFAULT = "the default: the scene names no other"
-
-# Kinds of which a scene has one, and the field of the scene that holds it.
+# Kinds of which a scene has one part, and the field of the scene that holds it.
 _SINGLE = {"kernels": "kernel", "formulations": "formulation", "integrators": "integrator"}
-_INSIDE = {"gradients": "part of the formulation", "divergences": "part of the formulation"}
 
 
 def _why(scene: Scene, entry: registry.Entry) -> str:
+    default = False
     if entry.kind in _SINGLE:
-        wanted = getattr(scene, _SINGLE[entry.kind])
-        if wanted == getattr(attrs.fields(Scene), _SINGLE[entry.kind]).default:
-            return _DEFAULT
-    default = attrs.fields(BodyScene).discretisation.default
-    if entry.kind == "discretisations" and all(
-        body.discretisation == default for body in scene.bodies.values()
-    ):
-        return _DEFAULT
-    return _INSIDE.get(entry.kind, "named by the scene")
+        field = getattr(attrs.fields(Scene), _SINGLE[entry.kind])
+        default = getattr(scene, field.name) == field.default
+    elif entry.kind == "discretisations":
+        usual = attrs.fields(BodyScene).discretisation.default
+        default = all(body.discretisation == usual for body in scene.bodies.values())
+    elif entry.kind in ("gradients", "divergences"):
+        return "part of the formulation"
+    return "the default: the scene names no other" if default else "named by the scene"
 
 
-def _numbers(simulation: Simulation) -> list[dict[str, Any]]:
+def _numbers(simulation: Simulation) -> list[Row]:
     scene, model = simulation.scene, simulation.model
-    particles = model.particles
-    pairs = simulation.dynamics.internal.pair_count
-    neighbours = pairs / particles.count - 1.0
+    particles, internal = model.particles, simulation.dynamics.internal
     speed = max(body.material.wave_speed for body in model.bodies)
-    d = particles.dimension
-    rows = [
-        ("dimensions", d, "1 is uniaxial strain, 2 is plane strain"),
+    cover = "named by the scene"
+    if scene.cover is None:
+        cover = "the kernel's default, the largest that holds neighbours in a row"
+    hidden = sum(len(body.hidden.keys) for body in model.bodies if body.hidden is not None) // 2
+    gaps = ("pairs across gaps", hidden, "near, but not neighbours: the line leaves the body")
+    return rows(
+        ("dimensions", particles.dimension, "1 is uniaxial strain, 2 is plane strain"),
         ("particles", int((~particles.ghosts).sum()), "from shapes and spacings"),
         ("ghosts", int(particles.ghosts.sum()), "complete the support of those near a surface"),
-        ("neighbours", neighbours, "a particle's, on average, within the support"),
-        ("cover [spacings]", cover_of(scene), _why_cover(scene)),
-        *_hidden(simulation),
-        ("confined wave speed [m/s]", speed, "sqrt((lambda + 2 mu) / rho), the fastest body's"),
-        ("engine", type(simulation.dynamics.internal).__name__, f'engine = "{scene.engine}"'),
+        (
+            "neighbours",
+            internal.pair_count / particles.count - 1.0,
+            "average number within the support",
+        ),
+        ("cover [spacings]", cover_of(scene), f"support radius, {cover}"),
+        *([gaps] if hidden else []),
+        ("confined wave speed [m/s]", speed, "sqrt((lambda + 2 mu) / rho), of the fastest body"),
+        ("engine", type(internal).__name__, f'engine = "{scene.engine}"'),
         *(_of_motion(simulation) if scene.statics is None else _of_statics(simulation)),
-    ]
-    return [{"quantity": name, "value": value, "why": why} for name, value, why in rows]
-
-
-def _why_cover(scene: Scene) -> str:
-    if scene.cover is not None:
-        return "support radius, named by the scene"
-    return "support radius; the kernel's own, the largest that holds neighbours in a row"
-
-
-def _hidden(simulation: Simulation) -> list[tuple[str, Any, str]]:
-    """Pairs of near particles that are no neighbours, where there are any."""
-    found = [body.hidden for body in simulation.model.bodies if body.hidden is not None]
-    count = sum(len(one.keys) for one in found) // 2
-    why = "near, but no neighbours: their straight line leaves the body"
-    return [("pairs across gaps", count, why)] if count else []
-
-
-def _of_motion(simulation: Simulation) -> list[tuple[str, Any, str]]:
-    scene = simulation.scene
-    stated = scene.time_step is not None
-    margin = critical_step(simulation).margin
-    return [
-        (
-            "time step [s]",
-            simulation.step_size,
-            "as the scene states it"
-            if stated
-            else f"{scene.time_step_factor:g} of the CFL step, by wave speed and spacing",
-        ),
-        (
-            "critical step over it",
-            margin,
-            "from the highest frequency of the discrete system at the start"
-            if margin >= 1.0
-            else "BELOW 1: the run will blow up; take a smaller time_step_factor",
-        ),
-        ("steps", simulation.steps, f"for {scene.duration:g} s"),
-        *_sleep(scene),
-        _loop(simulation),
-    ]
-
-
-def _sleep(scene: Scene) -> list[tuple[str, Any, str]]:
-    if scene.sleep is None:
-        return []
-    why = (
-        f"slabs slower than {scene.sleep.tolerance:g} of the largest speed sleep, and cost nothing"
     )
-    return [("sleep", f"up to {scene.sleep.slabs} slabs", why)]
 
 
-def _of_statics(simulation: Simulation) -> list[tuple[str, Any, str]]:
-    wanted = simulation.scene.statics
-    assert wanted is not None
-    own = freedoms(simulation.dynamics)
-    return [
-        ("free displacements", own.count, "unknowns of Newton's method"),
-        ("load steps", wanted.load_steps, "to begin with: halved on failure, doubled on success"),
-        ("tolerance", wanted.tolerance, "imbalance of forces over loads and reactions"),
-    ]
-
-
-def _loop(simulation: Simulation) -> tuple[str, str, str]:
+def _of_motion(simulation: Simulation) -> Iterator[tuple[str, Any, str]]:
+    scene = simulation.scene
+    step = f"{scene.time_step_factor:g} of the CFL step, by wave speed and spacing"
+    if scene.time_step is not None:
+        step = "set by the scene"
+    yield "time step [s]", simulation.step_size, step
+    margin = critical_step(simulation).margin
+    source = "from the highest frequency of the discrete system at the start"
+    if margin < 1.0:
+        source = "BELOW 1: the run will blow up; take a smaller time_step_factor"
+    yield "critical step over it", margin, source
+    yield "steps", simulation.steps, f"for {scene.duration:g} s"
+    if (sleep := scene.sleep) is not None:
+        slow = f"slabs slower than {sleep.tolerance:g} of the largest speed sleep, and cost nothing"
+        yield "sleep", f"up to {sleep.slabs} slabs", slow
     if simulation.plan.compiles_steps:
-        return ("time loop", "compiled", "whole steps together: all parts are of declared kinds")
-    return ("time loop", "step by step", "each step by the parts themselves, which fits all")
+        yield "time loop", "compiled", "whole steps: all parts are of kinds that can be compiled"
+    else:
+        yield "time loop", "step by step", "by the parts themselves, which works for all kinds"
 
 
-def _effects(
-    effects: Mapping[str, Any], simulation: Simulation | None, found: Mapping[str, Share]
-) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = []
-    named = {label: registry.entry_of("effects", one).name for label, one in effects.items()}
-    for label in effects:
-        arrays = {} if simulation is None else simulation.load_of(label).arrays
-        share = found.get(label)
-        rows.append(
-            {
-                "effect": label if simulation is not None else named[label],
-                "simulated": True,
-                "why": "named by the scene",
-                "arrays": ", ".join(arrays),
-                "bytes": sum(arrays.values()),
-                "share of the steps": None if share is None else share.time,
-                "stable step": None if share is None else share.step,
-            }
+def _of_statics(simulation: Simulation) -> Iterator[tuple[str, Any, str]]:
+    statics = simulation.scene.statics
+    assert statics is not None
+    unknowns = freedoms(simulation.dynamics).count
+    yield "free displacements", unknowns, "unknowns of Newton's method"
+    yield "load steps", statics.load_steps, "at first: halved on failure, doubled on success"
+    yield "tolerance", statics.tolerance, "imbalance of forces over loads and reactions"
+
+
+def _effect(
+    name: str,
+    why: str,
+    *,
+    simulated: bool,
+    arrays: Mapping[str, int] | None = None,
+    share: float | None = None,
+    step: float | None = None,
+) -> Facts:
+    """Facts of an effect, with the bytes of its arrays by name."""
+    arrays = arrays or {}
+    return {
+        "effect": name,
+        "simulated": simulated,
+        "why": why,
+        "arrays": ", ".join(arrays),
+        "bytes": sum(arrays.values()),
+        "share of the steps": share,
+        "stable step": step,
+    }
+
+
+def _other_effects(named: set[str], inside: set[str]) -> list[Facts]:
+    """Effects that the scene does not name; those inside another part are simulated."""
+    return [
+        _effect(
+            name,
+            "needed by another part" if name in inside else "not named by the scene",
+            simulated=name in inside,
         )
-    # Parts may hold effects of their own.
-    inside = {e.name for e in simulation.parts if e.kind == "effects"} if simulation else set()
-    for name in registry.names("effects"):
-        if name in named.values():
-            continue
-        needed = name in inside
-        rows.append(
-            {
-                "effect": name,
-                "simulated": needed,
-                "why": "needed by another part" if needed else "not named by the scene",
-                "arrays": "",
-                "bytes": 0,
-                "share of the steps": None,
-                "stable step": None,
-            }
-        )
-    return rows
+        for name in registry.names("effects")
+        if name not in named
+    ]

@@ -4,31 +4,32 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import attrs
 import click
 
-from solidsph.commands.console import say, show_json
+from solidsph.commands.console import present
+from solidsph.commands.options import Output, option, options, output_option
+from solidsph.results.record import Record
+
+
+@attrs.frozen
+class _Options(Output):
+    output: Path | None = output_option("Folder for the pictures.  [default: that of the record]")
+    field: str | None = option(
+        "Field that colours the body.  [default: the largest principal stress]", metavar="NAME"
+    )
 
 
 @click.command()
-@click.argument("result", type=click.Path(path_type=Path))
-@click.option(
-    "--output", type=click.Path(path_type=Path), help="Folder.  [default: beside the record]"
-)
-@click.option(
-    "--field", metavar="NAME", help="What to colour by.  [default: the largest principal stress]"
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
-def plot(result: Path, output: Path | None, field: str | None, as_json: bool) -> None:
-    """Draw a record: the motion or the deformed body with its stress or another field, and the
-    energies."""
+@click.argument("result", metavar="RECORD", type=click.Path(path_type=Path))
+@options(_Options)
+def plot(result: Path, options: _Options) -> None:
+    """Draw the pictures of a record: the deformed body, coloured by a field, and the energies."""
     from solidsph.results.pictures import draw
-    from solidsph.results.record import Record
 
+    folder = options.output or result.parent
     with Record(result) as record:
-        chosen = {} if field is None else {"field": field}
-        paths = draw(record, output or result.parent, result.stem, **chosen)
-    if as_json:
-        show_json({"record": str(result), "pictures": [str(path) for path in paths]})
-        return
-    for path in paths:
-        say(f"picture: {path}")
+        chosen = {} if options.field is None else {"field": options.field}
+        paths = [str(path) for path in draw(record, folder, result.stem, **chosen)]
+    facts = {"record": str(result), "pictures": paths}
+    present(facts, [f"picture: {path}" for path in paths], as_json=options.as_json)

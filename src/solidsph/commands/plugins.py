@@ -1,45 +1,49 @@
-"""solidsph plugins: what is installed."""
+"""solidsph plugins: the installed parts."""
 
 from __future__ import annotations
 
+import attrs
 import click
 
-from solidsph.commands.console import show_json, show_table
+from solidsph.commands.console import Table, present
+from solidsph.commands.options import Output, flag, options
 from solidsph.errors import SolidsphError
 from solidsph.registry import registry
 
 
+@attrs.frozen
+class _Options(Output):
+    load: bool = flag("Import every part, and report those that fail.")
+
+
 @click.command()
-@click.option("--load", is_flag=True, help="Import every part, and say which cannot be.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
-def plugins(load: bool, as_json: bool) -> None:
-    """List every installed part, and where it comes from. Imports none unless told to."""
-    rows = []
-    for kind in registry.INTERFACES:
-        for entry in registry.available(kind):
-            row = {
-                "kind": registry.singular(kind),
-                "name": entry.name,
-                "distribution": f"{entry.distribution} {entry.version}",
-                "target": entry.target,
-            }
-            if load:
-                row["status"] = _status(kind, entry.name)
-            rows.append(row)
-    for point in registry.hook_points():
-        distribution = f"{point.dist.name} {point.dist.version}" if point.dist else ""
-        row = {
+@options(_Options)
+def plugins(options: _Options) -> None:
+    """List the installed parts and where they come from. Nothing is imported without --load."""
+    rows = [
+        {
+            "kind": registry.singular(kind),
+            "name": entry.name,
+            "distribution": f"{entry.distribution} {entry.version}",
+            "target": entry.target,
+            **({"status": _status(kind, entry.name)} if options.load else {}),
+        }
+        for kind in registry.INTERFACES
+        for entry in registry.available(kind)
+    ]
+    rows += [
+        {
             "kind": "hook",
             "name": point.name,
-            "distribution": distribution,
+            "distribution": f"{point.dist.name} {point.dist.version}" if point.dist else "",
             "target": point.value,
+            **({"status": "not checked"} if options.load else {}),
         }
-        rows.append({**row, "status": "not checked"} if load else row)
-    if as_json:
-        show_json({"plugins": rows})
-        return
+        for point in registry.hook_points()
+    ]
     columns = list(rows[0]) if rows else ["kind", "name"]
-    show_table("installed parts", columns, [list(row.values()) for row in rows])
+    table = Table("installed parts", columns, [list(row.values()) for row in rows])
+    present({"plugins": rows}, [table], as_json=options.as_json)
 
 
 def _status(kind: str, name: str) -> str:

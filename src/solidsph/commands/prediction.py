@@ -1,49 +1,61 @@
-"""Predictions as commands show them: before a run, and held against it afterwards."""
+"""Predictions of time and memory as the verbs show them, before a run and compared with it."""
 
 from __future__ import annotations
 
 import subprocess
 import time as clock
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import attrs
 import click
 
 from solidsph.costs import calibration
 from solidsph.costs.calibration import Calibration
-from solidsph.costs.cluster import Cluster, ClusterPrice, priced
+from solidsph.costs.cluster import Cluster, priced
 from solidsph.costs.coefficients import REFERENCE
 from solidsph.costs.foreseen import foreseen
 from solidsph.costs.model import Built, Prediction
 from solidsph.costs.process import company, machine_memory, memory_now, peak_memory
 from solidsph.costs.work import Work
 from solidsph.interfaces.plan import Compilation
+from solidsph.run.outcome import FINISHED
 from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
-
-if TYPE_CHECKING:
-    from solidsph.studies.case_run import SceneRun
+from solidsph.studies.case_run import SceneRun
 
 LONG = 5.0
-"""Runs that are predicted to take longer are announced [s]."""
+"""Runs predicted to take longer are announced [s]."""
 
-# For what takes less than this, no machine is measured to say so [s].
-_NOT_WORTH_IT = 2.0
+INTERNALS = frozenset(
+    {
+        *("engine", "time loop", "pairs an evaluation visits", "entries of the factors"),
+        *("bytes an evaluation touches", "bytes touched in all", "bytes held", "bytes touched"),
+    }
+)
+"""Quantities that tables show with --verbose only."""
+
+# For runs predicted to be shorter, this machine is not calibrated [s].
+_SHORT = 2.0
 
 Row = dict[str, Any]
 
 
-def built(scene: Scene) -> tuple[Simulation, Built]:
-    """A scene built, and what that took."""
+def rows(*entries: tuple[str, Any, str]) -> list[Row]:
+    """Rows of a table of quantity, value and why."""
+    return [{"quantity": name, "value": value, "why": why} for name, value, why in entries]
+
+
+def build_timed(scene: Scene) -> tuple[Simulation, Built]:
+    """A built scene, with the time and memory of the build."""
     begun = clock.perf_counter()
     simulation = Simulation.builder(scene).build()
     seconds = clock.perf_counter() - begun
     return simulation, Built(seconds, peak_memory(), memory_now())
 
 
-def calibrated() -> Calibration:
-    """This machine; where it cannot be measured, the one that the coefficients were measured on."""
+def this_machine() -> Calibration:
+    """Calibration of this machine, or of the reference machine if it cannot be measured."""
     try:
         return calibration.this_machine()
     except (OSError, ValueError, subprocess.SubprocessError) as cause:
@@ -51,26 +63,27 @@ def calibrated() -> Calibration:
         return REFERENCE
 
 
-def of_run(
+def predict_run(
     simulation: Simulation, build: Built | None, compiled: Collection[Compilation] = ()
 ) -> Prediction | None:
-    """What a built scene will take, or nothing: to predict must never be why a run fails.
+    """Time and memory of a run; None if they cannot be predicted, which must not end the run.
 
-    The machine is calibrated only where there is something worth predicting.
+    The machine is calibrated only for runs that are long enough.
     """
     try:
-        about = foreseen(simulation, REFERENCE, built=build, compiled=compiled)
+        estimate = foreseen(simulation, REFERENCE, built=build, compiled=compiled)
         known = calibration.kept()
-        if known is None and about.run_seconds < _NOT_WORTH_IT:
-            return about
-        machine = known or calibrated()
-        return foreseen(simulation, machine, built=build, compiled=compiled)
+        if known is None and estimate.run_seconds < _SHORT:
+            return estimate
+        return foreseen(simulation, known or this_machine(), built=build, compiled=compiled)
     except Exception:
         return None
 
 
-def announcement(prediction: Prediction) -> str:
-    """One line before a long run."""
+def announcement(prediction: Prediction | None) -> str:
+    """One line before a long run; empty before a short one."""
+    if prediction is None or prediction.seconds <= LONG:
+        return ""
     parts = ", ".join(f"{name} {seconds:.2g}" for name, seconds in prediction.parts.items())
     return (
         f"predicted: {prediction.seconds:.3g} s ({parts}), "
@@ -79,47 +92,50 @@ def announcement(prediction: Prediction) -> str:
 
 
 def work_rows(work: Work) -> list[Row]:
-    """What is to be done, the same on every machine."""
+    """Work of a run, the same on every machine."""
     how = "counted" if work.counted else "estimated from volumes and the support, nothing is built"
-    rows: list[tuple[str, Any, str]] = [
-        ("pairs", work.pairs, f"ordered, a particle its own neighbour too; {how}"),
+    calls = "one a step, and one at the start"
+    if work.statics is not None:
+        calls = "one an iteration and one a load step, at least"
+    counts = rows(
+        ("pairs", work.pairs, f"ordered pairs of neighbours, self pairs included; {how}"),
         ("pairs an evaluation visits", work.visited, "with those of loads and effects"),
-        ("evaluations of the forces", work.evaluations, _why_so_many(work)),
+        ("evaluations of the forces", work.evaluations, calls),
         ("pair evaluations", work.pair_evaluations, "visited pairs times evaluations"),
-        ("bytes an evaluation touches", work.touched, "once at least, whatever the caches are"),
+        ("bytes an evaluation touches", work.touched, "at least once, whatever the caches are"),
         ("bytes touched in all", work.traffic, "times evaluations"),
-        ("bytes held", work.held, "of arrays kept between evaluations"),
-        ("outputs", work.outputs, "observed states, the first one among them"),
+        ("bytes held", work.held, "in arrays kept between evaluations"),
+        ("outputs", work.outputs, "observed states, the first one included"),
         ("record [MiB]", work.record_bytes / 2**20, "position, velocity, stress, volume ratio"),
-    ]
-    if work.statics is not None:
-        rows += [
-            ("iterations", work.statics.iterations, "of Newton's method, a guess"),
-            ("entries of the factors", work.statics.fill, "by nested dissection of the box"),
-        ]
-    return [{"quantity": name, "value": value, "why": why} for name, value, why in rows]
-
-
-def _why_so_many(work: Work) -> str:
-    if work.statics is not None:
-        return "one an iteration and one a load step, at least"
-    return "one a step, and one at the start"
+    )
+    if work.statics is None:
+        return counts
+    return counts + rows(
+        ("iterations", work.statics.iterations, "of Newton's method, a guess"),
+        ("entries of the factors", work.statics.fill, "by nested dissection of the box"),
+    )
 
 
 def prediction_rows(prediction: Prediction) -> list[Row]:
-    """Seconds and bytes on this machine."""
-    share = {name: seconds / prediction.seconds for name, seconds in prediction.parts.items()}
-    own = "measured just now" if prediction.measured_build else "predicted"
-    whys = {
-        "build": f"{own}: particles, neighbours, operators",
-        "compile": "what this scene has compiled, each once a process",
-        "steps": "coefficients of benchmarks/fit_costs.py times this machine's calibration",
+    """Predicted time and memory on this machine."""
+    build = "measured just now" if prediction.measured_build else "predicted"
+    reasons = {
+        "build": f"{build}: particles, neighbours, operators",
+        "compile": "once a process for every kind of part",
+        "steps": "work above times the measured speed of this machine",
         "outputs": "observing, and writing the record",
     }
-    rows: list[tuple[str, Any, str]] = [
-        ("predicted wall time [s]", prediction.seconds, _limited(prediction)),
+    limit, busy = f"limited by: {prediction.limit}", company()
+    if busy >= 0.5:
+        limit += f"; {busy:.1f} other programs want a core: it takes longer"
+    return rows(
+        ("predicted wall time [s]", prediction.seconds, limit),
         *(
-            (f"  {name} [s]", seconds, f"{100 * share[name]:.0f} %, {whys[name]}")
+            (
+                f"  {name} [s]",
+                seconds,
+                f"{100 * seconds / prediction.seconds:.0f} %, {reasons[name]}",
+            )
             for name, seconds in prediction.parts.items()
         ),
         (
@@ -127,23 +143,14 @@ def prediction_rows(prediction: Prediction) -> list[Row]:
             prediction.memory / 2**20,
             f"of {machine_memory() / 2**30:.3g} GiB that this machine has",
         ),
-    ]
-    return [{"quantity": name, "value": value, "why": why} for name, value, why in rows]
+    )
 
 
-def _limited(prediction: Prediction) -> str:
-    text = f"limited by: {prediction.limit}"
-    busy = company()
-    return text if busy < 0.5 else f"{text}; {busy:.1f} other programs want a core: it takes longer"
-
-
-def cluster_rows(
-    prediction: Prediction, machine: Calibration, cluster: Cluster
-) -> tuple[ClusterPrice, list[Row]]:
-    """A scene larger than this machine, on paper."""
+def cluster_rows(prediction: Prediction, machine: Calibration, cluster: Cluster) -> list[Row]:
+    """Estimate for a scene larger than this machine, on an assumed cluster."""
     price = priced(prediction, machine, cluster)
     a = attrs.asdict(cluster)
-    rows: list[tuple[str, Any, str]] = [
+    return rows(
         ("memory [GiB]", prediction.memory / 2**30, "MORE THAN THIS MACHINE HAS"),
         ("time here, if it fitted [s]", prediction.seconds, f"limited by: {prediction.limit}"),
         (
@@ -151,9 +158,9 @@ def cluster_rows(
             price.nodes,
             f"of {a['memory']:g} GiB, {100 * a['usable']:g} % of it usable (memory, usable)",
         ),
-        ("bytes a particle", price.bytes_a_particle, "at the peak, halos not counted"),
+        ("bytes a particle", price.bytes_a_particle, "at the peak, without halos"),
         ("halo of a node [particles]", price.halo, "a cube of particles, all within its reach"),
-        ("bytes exchanged a step", price.exchanged, "displacements out, forces back, a node"),
+        ("bytes exchanged a step", price.exchanged, "displacements out, forces back, per node"),
         (
             "step, computing [s]",
             price.computing,
@@ -170,24 +177,23 @@ def cluster_rows(
             price.seconds,
             f"limited by: {price.limit}; the record at {a['storage']:g} GB/s (storage)",
         ),
-    ]
-    rows += [
         ("not in it", "", "building in parallel, and ghosts; what effects add to the stable step"),
         ("on paper", "", "solidsph runs on one machine; assumptions: --cluster NAME=VALUE"),
-    ]
-    return price, [{"quantity": name, "value": value, "why": why} for name, value, why in rows]
+    )
 
 
-def work_done(work: Work, effort: Mapping[str, Any]) -> dict[str, Any]:
-    """Counts of a run that is over: for an equilibrium by the iterations that it really took."""
+def work_done(prediction: Prediction | None, effort: Mapping[str, Any]) -> dict[str, Any]:
+    """Counts of a finished run; of an equilibrium by the iterations that it took."""
+    if prediction is None:
+        return {}
+    work = prediction.work
     if work.statics is not None:
-        done = effort["iterations"] + effort["load steps"]
-        work = attrs.evolve(work, evaluations=done)
+        work = attrs.evolve(work, evaluations=effort["iterations"] + effort["load steps"])
     return {"pair evaluations": work.pair_evaluations, "bytes touched": work.traffic}
 
 
-def scored(prediction: Prediction | None, seconds: float, memory: int) -> dict[str, float]:
-    """Prediction beside truth; nothing where there was none."""
+def comparison(prediction: Prediction | None, seconds: float, memory: int) -> dict[str, float]:
+    """Prediction beside measured seconds and bytes; empty without a prediction."""
     if prediction is None:
         return {}
     return {
@@ -198,31 +204,16 @@ def scored(prediction: Prediction | None, seconds: float, memory: int) -> dict[s
     }
 
 
-def compilations(prediction: Prediction | None) -> Collection[Compilation]:
-    """What its run compiles."""
-    return frozenset() if prediction is None else prediction.work.compilations
-
-
-def scores(
-    predictions: Mapping[str, Prediction | None], runs: Sequence[SceneRun]
+def total_comparison(
+    runs: Sequence[SceneRun], predicted: Mapping[str, float | None]
 ) -> dict[str, float | None]:
-    """Predicted seconds of each run of a case, by its name."""
-    found = {run.name: predictions.get(run.name) for run in runs}
-    return {name: None if one is None else one.run_seconds for name, one in found.items()}
-
-
-def sums(
-    runs: Sequence[SceneRun], predictions: Mapping[str, float | None]
-) -> dict[str, float | None]:
-    """Measured and predicted seconds of all runs of a case that finished."""
-    done = [run for run in runs if run.outcome == "finished"]
-    measured = sum(run.seconds for run in done)
-    known = [predictions[run.name] for run in done]
-    total = None if None in known else sum(one for one in known if one is not None)
+    """Measured and predicted seconds of all finished runs of a case, predicted ones by name."""
+    finished = [run for run in runs if run.outcome == FINISHED]
+    measured = sum(run.seconds for run in finished)
+    known = [seconds for run in finished if (seconds := predicted[run.name]) is not None]
+    total = sum(known) if len(known) == len(finished) else None
     return {
         "wall time of finished runs [s]": measured,
         "predicted wall time [s]": total,
-        "predicted over measured time [-]": None
-        if total is None or not measured
-        else total / measured,
+        "predicted over measured time [-]": total / measured if total and measured else None,
     }

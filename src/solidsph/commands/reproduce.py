@@ -3,110 +3,89 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import attrs
 import click
 
-from solidsph.commands.console import ProgressObserver, progress, say, show_json, show_table
+from solidsph.commands.console import Table, present, progress, progress_observers
+from solidsph.commands.options import FILE, ProgressOutput, flag, option, options, output_option
 from solidsph.registry import registry
+
+
+@attrs.frozen
+class _Options(ProgressOutput):
+    listed: bool = flag("List figures and passages with their cases.", "--list")
+    output: Path = output_option(
+        "Folder for pictures, data and records.", Path("results/reproduce")
+    )
+    page: Path | None = option(
+        "Also write a Markdown page of text and pictures to this file.", type=FILE
+    )
 
 
 @click.command()
 @click.argument("wanted", metavar="[FIGURE]...", nargs=-1)
-@click.option(
-    "--list", "listed", is_flag=True, help="List figures and passages, and what shows them."
-)
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path),
-    default=Path("results/reproduce"),
-    show_default=True,
-    help="Folder for pictures, data and records.",
-)
-@click.option(
-    "--page",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="Write a page of text and pictures to this file too.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
-@click.option("--quiet", is_flag=True, help="Show no progress.")
-def reproduce(
-    wanted: tuple[str, ...],
-    listed: bool,
-    output: Path,
-    page: Path | None,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    """Reproduce the figures of Ismail & Reddy, and answer what they ask for: all, or those named,
-    such as fig-11."""
-    from solidsph.studies.reproduce import figures
-    from solidsph.studies.reproduce import reproduce as solve
+@options(_Options)
+def reproduce(wanted: tuple[str, ...], options: _Options) -> None:
+    """Reproduce figures of the paper.
 
-    if listed:
-        _list(figures(), as_json)
+    The paper is Ismail & Reddy, Smoothed Particle Hydrodynamics for Nonlinear Solid Mechanics.
+    Figures have names such as fig-11; passages that raise a question have names too. Without a
+    name, all are reproduced.
+    """
+    from solidsph.studies.reproduce import figures
+    from solidsph.studies.reproduce import reproduce as run_cases
+
+    if options.listed:
+        known = [
+            {"figure": figure, "case": case, "what": registry.load("cases", case).title}
+            for figure, case in figures().items()
+        ]
+        table = Table.of("figures", known, ("figure", "case", "what"), {"what": "title"})
+        present({"figures": known}, [table], as_json=options.as_json)
         return
     begun = clock.perf_counter()
-    with progress(not (as_json or quiet)) as display:
-
-        def begin(name: str, simulation: Any) -> Sequence[object]:
-            return [ProgressObserver(display, name, simulation)] if display else []
-
-        made = solve(wanted, output, begin)
+    with progress(options.progress) as display:
+        result = run_cases(wanted, options.output, partial(progress_observers, display))
     seconds = clock.perf_counter() - begun
-    if page is not None:
+    if options.page is not None:
         from solidsph.studies.gallery import write_gallery
 
-        write_gallery(made, page)
-    rows = [
-        {
-            "case": case,
-            "quantity": m.quantity,
-            "paper": m.paper,
-            "theory": m.reference,
-            "measured": m.value,
-            "unit": m.unit,
-            "error": m.error,
-            "as expected": m.passed,
-        }
-        for case, result in made.results.items()
-        for m in result.measurements
-    ]
-    tables = [path for result in made.results.values() for path in result.tables]
-    if as_json:
-        show_json(
+        write_gallery(result, options.page)
+    facts = {
+        "passed": result.passed,
+        "wall time [s]": seconds,
+        "measurements": [
             {
-                "passed": made.passed,
-                "wall time [s]": seconds,
-                "measurements": rows,
-                "pictures": [str(path) for path in made.pictures],
-                "tables": [str(path) for path in tables],
-                "contact sheet": None if made.sheet is None else str(made.sheet),
+                "case": case,
+                "quantity": m.quantity,
+                "paper": m.paper,
+                "theory": m.reference,
+                "measured": m.value,
+                "unit": m.unit,
+                "error": m.error,
+                "as expected": m.passed,
             }
-        )
-    else:
-        show_table(
-            "what the paper says, what theory says, what is measured",
-            ["case", "quantity", "paper", "theory", "measured", "unit", "error", "as expected"],
-            [list(row.values()) for row in rows],
-        )
-        for path in (*made.pictures, *tables):
-            say(str(path))
-        say(f"all pictures at once: {made.sheet}")
-        say(f"{len(made.results)} cases in {seconds:.0f} s")
-        say("verdict: " + ("as the sources predict" if made.passed else "NOT as predicted"))
-    if not made.passed:
-        raise SystemExit(1)
+            for case, outcome in result.results.items()
+            for m in outcome.measurements
+        ],
+        "pictures": [str(path) for path in result.pictures],
+        "tables": [str(path) for each in result.results.values() for path in each.tables],
+        "contact sheet": None if result.sheet is None else str(result.sheet),
+    }
+    text = _text(facts, len(result.results))
+    present(facts, text, as_json=options.as_json, passed=result.passed)
 
 
-def _list(known: Any, as_json: bool) -> None:
-    rows = [
-        {"figure": figure, "case": case, "what": registry.load("cases", case).title}
-        for figure, case in known.items()
-    ]
-    if as_json:
-        show_json({"figures": rows})
-        return
-    show_table("figures", ["figure", "case", "what"], [list(row.values()) for row in rows])
+def _text(facts: Mapping[str, Any], cases: int) -> Iterator[Table | str]:
+    rows: Sequence[Mapping[str, Any]] = facts["measurements"]
+    columns = ("case", "quantity", "paper", "theory", "measured", "unit", "error", "as expected")
+    yield Table.of("the paper, theory and measurement", rows, columns)
+    yield from (*facts["pictures"], *facts["tables"])
+    yield f"all pictures on one sheet: {facts['contact sheet']}"
+    yield f"{cases} cases in {facts['wall time [s]']:.0f} s"
+    yield "verdict: " + ("as the sources predict" if facts["passed"] else "NOT as predicted")

@@ -1,52 +1,53 @@
-"""solidsph resume: go on with runs that were killed, interrupted or are to be extended."""
+"""solidsph resume: continue runs that were killed or interrupted, or extend finished ones."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import attrs
 import click
 
-from solidsph.commands.console import ProgressObserver, progress, say, show_json
+from solidsph.commands.console import present, progress, progress_observers, say
+from solidsph.commands.options import ProgressOutput, flag, option, options
 from solidsph.errors import RecordError
 from solidsph.results.layout import RECORD_SUFFIXES
 from solidsph.results.record import Record
+from solidsph.resumption import Pending, pending
 from solidsph.run.outcome import UNSOUND
 
-if TYPE_CHECKING:
-    from solidsph.resumption import Pending
+
+@attrs.frozen
+class _Options(ProgressOutput):
+    until: float | None = option("Extend the run to this time [s].", type=float, metavar="T")
+    force: bool = flag("Resume even if versions, plugins or threads have changed.")
 
 
 @click.command()
 @click.argument("result", metavar="RECORD|FOLDER", type=click.Path(path_type=Path))
-@click.option("--until", type=float, metavar="T", help="A later end than the scene's [s].")
-@click.option(
-    "--force", is_flag=True, help="Also with other versions, plugins or threads than before."
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
-@click.option("--quiet", is_flag=True, help="Show no progress.")
-def resume(result: Path, until: float | None, force: bool, as_json: bool, quiet: bool) -> None:
-    """Go on with a run in its own record, bit for bit; of a folder, with every run in it."""
-    from solidsph.resumption import pending
+@options(_Options)
+def resume(result: Path, options: _Options) -> None:
+    """Continue the run of a record. The result is the same to the bit as without interruption.
 
+    A FOLDER continues every run in it.
+    """
     facts = []
     for path in _records(result):
-        found = pending(path, until=until, force=force)
-        if found is None:
+        run = pending(path, until=options.until, force=options.force)
+        if run is None:
             facts.append({"record": str(path), "outcome": f"{_outcome(path)} before"})
-            if not as_json:
-                say(f"{path} is {_outcome(path)}; --until T extends it")
-            continue
-        facts.append(_carried_out(found, shown=not (as_json or quiet)))
-        if not as_json:
-            since = facts[-1]["from [s]"]
-            anew = "" if found.since.state is not None else ", without a checkpoint"
-            say(f"{path} is finished now; it went on from t = {since:.6g} s{anew}")
-    unsound = any(one["outcome"].startswith(UNSOUND) for one in facts)
-    if as_json:
-        show_json({"runs": facts, "exit code": int(unsound)})
-    if unsound:
-        raise SystemExit(1)
+            text = f"{path} is {_outcome(path)}; --until T extends it"
+        else:
+            facts.append(_resumed(run, shown=options.progress))
+            start = f"t = {facts[-1]['from [s]']:.6g} s"
+            without = "" if run.since.state is not None else ", for lack of a checkpoint"
+            text = f"{path} is finished now; it was resumed at {start}{without}"
+        if not options.as_json:
+            say(text)
+    unsound = any(entry["outcome"].startswith(UNSOUND) for entry in facts)
+    present(
+        {"runs": facts, "exit code": int(unsound)}, (), as_json=options.as_json, passed=not unsound
+    )
 
 
 def _outcome(path: Path) -> str:
@@ -57,23 +58,20 @@ def _outcome(path: Path) -> str:
 def _records(result: Path) -> list[Path]:
     if not result.is_dir():
         return [result]
-    found = sorted(path for suffix in RECORD_SUFFIXES for path in result.glob(f"*{suffix}"))
-    if not found:
+    records = sorted(path for suffix in RECORD_SUFFIXES for path in result.glob(f"*{suffix}"))
+    if not records:
         raise RecordError(f"there is no record (*.h5) in the folder {result}; check the path")
-    return found
+    return records
 
 
-def _carried_out(found: Pending, *, shown: bool) -> dict[str, Any]:
+def _resumed(run: Pending, *, shown: bool) -> dict[str, Any]:
     with progress(shown) as display:
-        observers = (
-            [ProgressObserver(display, found.path.stem, found.simulation)] if display else []
-        )
-        result = found.solve(observers)
-    since = found.since.state
+        result = run.solve(progress_observers(display, run.path.stem, run.simulation))
+    start = run.since.state
     return {
-        "record": str(found.path),
+        "record": str(run.path),
         "outcome": "finished",
-        "from [s]": 0.0 if since is None else since.time,
+        "from [s]": 0.0 if start is None else start.time,
         **result.effort,
         "wall time [s]": result.seconds,
     }

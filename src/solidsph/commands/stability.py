@@ -1,162 +1,68 @@
-"""solidsph stability: hard cases and what becomes of them; or a map of where schemes are stable."""
+"""solidsph stability: hard cases and their outcomes; or a map of where schemes are stable."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import attrs
 import click
 
-from solidsph.commands.certified import SchemeOptions, scheme_options
-from solidsph.commands.console import progress, say, show_json, show_table
+from solidsph.commands.console import Table, present, progress
+from solidsph.commands.options import (
+    ProgressOutput,
+    flag,
+    option,
+    option_group,
+    options,
+    output_option,
+)
+from solidsph.commands.scheme_options import SchemeOptions
 from solidsph.errors import SceneError
+from solidsph.studies.suite import Verdict, run_trial, trials
 
-if TYPE_CHECKING:
-    from solidsph.studies.suite import Verdict
+
+@attrs.frozen
+class _Options(ProgressOutput):
+    listed: bool = flag("List the trials without running them.", "--list")
+    brief: bool = flag("Run the short form of each trial.")
+    map: bool = flag("Draw a stability map of a scheme instead.")
+    scheme: SchemeOptions = option_group(SchemeOptions)
+    points: tuple[int, int] = option(
+        "Number of stretches and of covers in the map.",
+        type=(int, int),
+        default=(39, 22),
+        show_default=True,
+        metavar="S C",
+    )
+    output: Path = output_option("Folder for the picture.", Path("results/stability"))
 
 
 @click.command()
 @click.argument("cases", metavar="[CASE]...", nargs=-1)
-@click.option("--list", "listed", is_flag=True, help="List the trials, and run none.")
-@click.option("--brief", is_flag=True, help="Run the short form of each trial.")
-@click.option("--map", "as_map", is_flag=True, help="Draw a map of stability instead.")
-@scheme_options
-@click.option(
-    "--points",
-    type=(int, int),
-    default=(39, 22),
-    show_default=True,
-    metavar="S C",
-    help="Of the map: how many stretches and covers.",
-)
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path),
-    default=Path("results/stability"),
-    show_default=True,
-    help="Folder for the picture.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
-@click.option("--quiet", is_flag=True, help="Show no progress.")
-def stability(
-    cases: tuple[str, ...],
-    listed: bool,
-    brief: bool,
-    as_map: bool,
-    points: tuple[int, int],
-    output: Path,
-    as_json: bool,
-    quiet: bool,
-    **options: Any,
-) -> None:
-    """Run the hard cases, all or those named, by the default parts or by those that are named, and
-    say what became of each. Some must fail: a suite in which nothing can fail proves nothing."""
-    chosen = SchemeOptions(**options)
-    if as_map:
+@options(_Options)
+def stability(cases: tuple[str, ...], options: _Options) -> None:
+    """Run the hard cases, or draw a stability map.
+
+    All cases or those named run with their own scheme, or with the parts given. Some trials must
+    fail: a suite in which nothing can fail proves nothing.
+    """
+    if options.map:
         if cases:
             raise SceneError(f"a map is of a scheme, not of cases; leave out {', '.join(cases)}")
         from solidsph.commands.stability_map import draw_map
 
-        draw_map(chosen, points, output / "map.png", as_json=as_json)
-    elif listed:
-        _list(cases, as_json=as_json)
+        picture = options.output / "map.png"
+        draw_map(options.scheme, options.points, picture, as_json=options.as_json)
+    elif options.listed:
+        _list(cases, as_json=options.as_json)
     else:
-        _run(cases, chosen, output, brief=brief, as_json=as_json, quiet=quiet)
-
-
-def _run(
-    cases: Sequence[str],
-    chosen: SchemeOptions,
-    output: Path,
-    *,
-    brief: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    from solidsph.studies.suite import judged, trials
-    from solidsph.studies.suite_picture import draw_suite
-
-    words = _words(chosen)
-    wanted = list(trials(cases))
-    verdicts = []
-    with progress(not (as_json or quiet)) as display, TemporaryDirectory() as folder:
-        task = display.add_task("hard cases", total=len(wanted)) if display else None
-        for number, (name, label, case, trial) in enumerate(wanted):
-            if display is not None and task is not None:
-                display.update(task, description=f"{name}: {label}", completed=number)
-            place = Path(folder) / str(number)
-            verdicts.append(judged(name, label, case, trial, place, words=words, brief=brief))
-    picture = output / "suite.png"
-    title = "Hard cases" + (f": {', '.join(f'{k} {v}' for k, v in words.items())}" if words else "")
-    draw_suite(verdicts, title, picture)
-    surprises = [one for one in verdicts if not one.as_expected]
-    seconds = sum(one.seconds for one in verdicts)
-    if as_json:
-        rows = [_facts(one) for one in verdicts]
-        show_json({"trials": rows, "wall time [s]": seconds, "picture": str(picture)})
-    else:
-        show_table(
-            title,
-            ["case", "trial", "became", "as expected", "time [s]", "energy residual", "why"],
-            [
-                [
-                    *(one.case, one.trial, one.grade.value, one.as_expected, one.seconds),
-                    *(one.energy_residual, _why(one)),
-                ]
-                for one in verdicts
-            ],
-        )
-        say(f"picture: {picture}")
-        say(f"{len(verdicts)} trials in {seconds:.0f} s")
-        say(
-            "verdict: "
-            + (
-                "; ".join(f"{one.case}, {one.trial}: {one.grade.value}" for one in surprises)
-                + ": NOT as expected"
-                if surprises
-                else "as expected, those that must fail included"
-            )
-        )
-    if surprises:
-        raise SystemExit(1)
-
-
-def _words(chosen: SchemeOptions) -> dict[str, Any]:
-    if chosen.scheme is not None or chosen.material is not None or chosen.effect:
-        raise SceneError(
-            "hard cases have scenes, materials and effects of their own; change their kernel, "
-            "cover, gradient, divergence, formulation or hourglass strength"
-        )
-    names = ("kernel", "cover", "formulation", "gradient", "divergence", "hourglass")
-    return {name: value for name in names if (value := getattr(chosen, name)) is not None}
-
-
-def _why(one: Verdict) -> str:
-    reason = one.reason
-    if one.must_fail:
-        return f"{reason}; it must fail: {one.must_fail}"
-    return f"{reason}; known: {one.known}" if one.known else reason
-
-
-def _facts(one: Verdict) -> dict[str, Any]:
-    return {
-        "case": one.case,
-        "trial": one.trial,
-        "grade": one.grade.value,
-        "as expected": one.as_expected,
-        "reason": one.reason,
-        "must fail": one.must_fail,
-        "known": one.known,
-        "time [s]": one.seconds,
-        "energy residual": one.energy_residual,
-    }
+        _run(cases, _settings(options.scheme), options)
 
 
 def _list(cases: Sequence[str], *, as_json: bool) -> None:
-    from solidsph.studies.suite import trials
-
     rows = [
         {
             "case": name,
@@ -170,9 +76,77 @@ def _list(cases: Sequence[str], *, as_json: bool) -> None:
         }
         for name, label, case, trial in trials(cases)
     ]
-    if as_json:
-        show_json({"trials": rows})
-        return
-    show_table(
-        "hard cases", ["case", "trial", "expected", "why"], [list(row.values()) for row in rows]
-    )
+    table = Table.of("hard cases", rows, ("case", "trial", "expected", "why"))
+    present({"trials": rows}, [table], as_json=as_json)
+
+
+def _run(cases: Sequence[str], settings: Mapping[str, Any], options: _Options) -> None:
+    from solidsph.studies.suite_picture import draw_suite
+
+    wanted = list(trials(cases))
+    verdicts = []
+    with progress(options.progress) as display, TemporaryDirectory() as folder:
+        task = display.add_task("hard cases", total=len(wanted)) if display else None
+        for number, (name, label, case, trial) in enumerate(wanted):
+            if display is not None and task is not None:
+                display.update(task, description=f"{name}: {label}", completed=number)
+            place = Path(folder) / str(number)
+            verdicts.append(
+                run_trial(name, label, case, trial, place, settings=settings, brief=options.brief)
+            )
+    picture = options.output / "suite.png"
+    changes = ", ".join(f"{name} {value}" for name, value in settings.items())
+    title = f"Hard cases: {changes}" if changes else "Hard cases"
+    draw_suite(verdicts, title, picture)
+    facts = {
+        "trials": [_facts(verdict) for verdict in verdicts],
+        "wall time [s]": sum(verdict.seconds for verdict in verdicts),
+        "picture": str(picture),
+    }
+    passed = all(verdict.as_expected for verdict in verdicts)
+    present(facts, _text(title, verdicts, facts), as_json=options.as_json, passed=passed)
+
+
+def _settings(options: SchemeOptions) -> dict[str, Any]:
+    """What the options change in the scenes of the hard cases."""
+    if options.scheme is not None or options.material is not None or options.effect:
+        raise SceneError(
+            "hard cases have scenes, materials and effects of their own; change their kernel, "
+            "cover, gradient, divergence, formulation or hourglass strength"
+        )
+    names = ("kernel", "cover", "formulation", "gradient", "divergence", "hourglass")
+    return {name: value for name in names if (value := getattr(options, name)) is not None}
+
+
+def _facts(verdict: Verdict) -> dict[str, Any]:
+    return {
+        "case": verdict.case,
+        "trial": verdict.trial,
+        "grade": verdict.grade.value,
+        "as expected": verdict.as_expected,
+        "reason": verdict.reason,
+        "must fail": verdict.must_fail,
+        "known": verdict.known,
+        "time [s]": verdict.seconds,
+        "energy residual": verdict.energy_residual,
+    }
+
+
+def _text(
+    title: str, verdicts: Sequence[Verdict], facts: Mapping[str, Any]
+) -> Iterator[Table | str]:
+    rows = [{**row, "why": _why(v)} for row, v in zip(facts["trials"], verdicts, strict=True)]
+    keys = ("case", "trial", "grade", "as expected", "time [s]", "energy residual", "why")
+    yield Table.of(title, rows, keys, {"grade": "outcome"})
+    yield f"picture: {facts['picture']}"
+    yield f"{len(verdicts)} trials in {facts['wall time [s]']:.0f} s"
+    surprises = [v for v in verdicts if not v.as_expected]
+    listed = "; ".join(f"{v.case}, {v.trial}: {v.grade.value}" for v in surprises)
+    expected = "as expected, including the trials that must fail"
+    yield f"verdict: {listed}: NOT as expected" if surprises else f"verdict: {expected}"
+
+
+def _why(verdict: Verdict) -> str:
+    if verdict.must_fail:
+        return f"{verdict.reason}; it must fail: {verdict.must_fail}"
+    return f"{verdict.reason}; known: {verdict.known}" if verdict.known else verdict.reason

@@ -1,4 +1,4 @@
-"""What a command is asked to work on: a scene file, or a built-in case by name."""
+"""Target of a verb: a scene file, or a case by name."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ STANDARD_INPUT = "-"
 
 
 def resolve(target: str, settings: Sequence[str]) -> Scene | Case:
-    """A scene from a path or the standard input, or a case from its name with `name=value`.
+    """Scene from a path or the standard input, or case from its name and `name=value` settings.
 
     Raises:
-        SceneError: neither a file nor a case is called so, or a setting is wrong.
+        SceneError: there is no such file or case, or a setting is wrong.
     """
     path = Path(target)
     cases = registry.names("cases")
@@ -43,7 +43,7 @@ def resolve(target: str, settings: Sequence[str]) -> Scene | Case:
 
 
 def name_of(target: str) -> str:
-    """What its results are called."""
+    """Name for the results of a target."""
     return "standard-input" if target == STANDARD_INPUT else Path(target).stem
 
 
@@ -51,7 +51,7 @@ def _from_standard_input() -> Scene:
     origin = "the standard input"
     data = sys.stdin.buffer.read(MOST_BYTES + 1)
     if len(data) > MOST_BYTES:
-        raise SceneError(f"{origin} goes on after {MOST_BYTES:,} bytes, which no scene has")
+        raise SceneError(f"{origin} is longer than {MOST_BYTES:,} bytes, the limit for a scene")
     try:
         return Scene.from_toml(decoded(data), origin)
     except ValueError as cause:
@@ -59,7 +59,11 @@ def _from_standard_input() -> Scene:
 
 
 def parameters(settings: Sequence[str]) -> dict[str, Any]:
-    """`name=value` pairs as a table; a value is read as TOML, or else as text."""
+    """`name=value` settings as a table. Values are TOML, or else plain text.
+
+    Raises:
+        SceneError: a setting has no name or no equals sign.
+    """
     table: dict[str, Any] = {}
     for setting in settings:
         name, equals, value = setting.partition("=")

@@ -1,4 +1,4 @@
-"""Case: a scene with parameters, its reference solution and its error measure."""
+"""Cases: scenes with parameters, a reference solution and an error measure."""
 
 from __future__ import annotations
 
@@ -15,39 +15,39 @@ from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 
 Curves: TypeAlias = Mapping[str, Array]
-"""Columns (k,) of a table by their headings, "quantity [unit]"; all of one length."""
+"""Columns of a table, each (k,), by headings "quantity [unit]"."""
 
 
 @attrs.frozen
 class Measurement:
-    """A number beside the number it should be."""
+    """A measured value and its reference."""
 
     quantity: str
     value: float
     unit: str
-    reference: float | None = None  # None where the measurement stands alone
-    source: str = ""  # where the reference comes from
-    error: float | None = None  # as the case measures it, relative unless it says otherwise
-    verdict: str = ""  # what it means, in a word or two
-    passed: bool = True  # whether the outcome is the one that the source predicts
-    paper: str = ""  # what the paper says of it, where it says something
+    reference: float | None = None  # None if there is none
+    source: str = ""  # of the reference
+    error: float | None = None  # relative, unless the case defines it otherwise
+    verdict: str = ""  # its meaning in a word or two
+    passed: bool = True  # whether the outcome is as the source predicts
+    paper: str = ""  # statement of the paper about it, if any
 
 
 @attrs.frozen
 class Trial:
-    """A case at hard settings. It is passed if everything that the case measures passes."""
+    """Hard settings of a case. The trial passes if all measurements of the case pass."""
 
     settings: Mapping[str, Any] = attrs.field(factory=dict)  # parameters of the case
-    brief: Mapping[str, Any] = attrs.field(factory=dict)  # others, for a short form of it
-    must_fail: str = ""  # of a negative control: why nothing may come through
-    known: str = ""  # of a trial that the defaults do not pass: why, and what does
+    brief: Mapping[str, Any] = attrs.field(factory=dict)  # further ones for its short form
+    must_fail: str = ""  # for a negative control: the reason why it must fail
+    known: str = ""  # for a trial that the defaults fail: the reason, and what passes
 
 
 class Case(ABC):
-    """One object behind reproduction, tests, cost, stability and the gallery.
+    """A case, as used by reproduction, tests, cost, stability and the gallery.
 
-    An implementation is a frozen attrs class whose fields are the case's parameters, set on the
-    command line by `--set name=value`.
+    An implementation is a frozen attrs class. Its fields are the parameters of the case, which
+    `--set name=value` sets on the command line.
     """
 
     title: ClassVar[str]
@@ -55,19 +55,19 @@ class Case(ABC):
 
     figures: ClassVar[tuple[str, ...]] = ()
     """Figures of the paper that it reproduces, such as "fig-11", and passages that it answers, such
-    as "section-6-viscosity". The name of a picture begins with that of its figure or passage; one
-    that shows several figures begins with all their numbers, "fig-13-14"."""
+    as "section-6-viscosity". The name of a picture begins with that of its figure or passage, or
+    with the numbers of all its figures, "fig-13-14"."""
 
     sweep: ClassVar[Mapping[str, Sequence[Any]]] = {}
-    """Parameters to vary where accuracy is held against cost, each with the values to try. The
-    first one refines: its values go from coarse to fine."""
+    """Parameters to vary in a cost sweep, each with the values to try. The first one refines, from
+    coarse to fine."""
 
     trials: ClassVar[Mapping[str, Trial]] = {}
-    """Hard settings that `solidsph stability` puts it to, by name."""
+    """Trials of `solidsph stability`, by name."""
 
     @abstractmethod
     def scenes(self) -> Mapping[str, Scene]:
-        """The scenes to run, by name."""
+        """Scenes to run, by name."""
 
     @abstractmethod
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
@@ -75,32 +75,32 @@ class Case(ABC):
 
     @abstractmethod
     def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        """Write the case's pictures into `folder`; returns their paths."""
+        """Write the pictures into `folder` and return their paths."""
 
     def priced(self) -> Case:
-        """What is run where accuracy is held against cost: itself, or what of it that takes."""
+        """Case to run in a cost sweep: itself, or the part of it that matters there."""
         return self
 
     def accuracy(self, measurements: Sequence[Measurement]) -> Measurement:
-        """The one of its measurements whose error is held against cost.
+        """The measurement whose error is compared with the cost; by default the first with one.
 
         Raises:
             SceneError: none of them has an error.
         """
-        found = next((m for m in measurements if m.error is not None), None)
-        if found is None:
-            raise SceneError(
-                f"{self.title!r} has no reference at these parameters; leave them as they are"
-            )
-        return found
+        for measurement in measurements:
+            if measurement.error is not None:
+                return measurement
+        raise SceneError(
+            f"{self.title!r} has no reference at these parameters; leave them as they are"
+        )
 
     @property
     def resolution(self) -> float:
-        """The smallest spacing of its particles [m], against which errors are held."""
+        """Smallest particle spacing [m], the measure of its refinement."""
         return min(
             body.spacing for scene in self.scenes().values() for body in scene.bodies.values()
         )
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
-        """The data of its pictures, to be written as tables, by name."""
+        """Data of the pictures, to be written as tables, by name."""
         return {}

@@ -16,16 +16,15 @@ from solidsph.costs.process import peak_memory
 from solidsph.errors import ConvergenceError, DivergedError, UnsoundError
 from solidsph.results.record import Record
 from solidsph.results.sole_writer import sole_writer
+from solidsph.run.outcome import FINISHED
 from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Curves, Measurement
 
-FINISHED = "finished"
-
 
 @attrs.frozen
 class SceneRun:
-    """What one scene of a case took."""
+    """Outcome and cost of one scene of a case."""
 
     name: str
     record: Path
@@ -34,14 +33,14 @@ class SceneRun:
     evaluations: int  # of the forces, or of the tangent
     particles: int
     pairs: int
-    pairs_visited: int  # by an evaluation, for effects too
-    bytes_touched: int  # that an evaluation must move at least
+    pairs_visited: int  # in an evaluation, those of effects included
+    bytes_touched: int  # in an evaluation, at least
     outcome: str
 
 
 @attrs.frozen
 class CaseResult:
-    """What a case measured, and what it left behind."""
+    """Measurements and files of a case."""
 
     measurements: Sequence[Measurement]
     runs: Sequence[SceneRun]
@@ -51,58 +50,54 @@ class CaseResult:
 
     @property
     def passed(self) -> bool:
-        """Whether every measurement came out as its source predicts."""
+        """Whether every measurement is as its source predicts."""
         return all(m.passed for m in self.measurements)
 
 
 Begin = Callable[[str, Simulation], Sequence[object]]
-"""Called before each scene with its name; returns observers of its run."""
+"""Called before each run with the name of the scene; returns observers of the run."""
 
 
 Ahead = Callable[[Scene], None]
 """Called before each scene is built."""
 
 
-def _unchecked(scene: Scene) -> None:
-    pass
-
-
-def _unobserved(name: str, simulation: Simulation) -> Sequence[object]:
-    return ()
-
-
 def run_case(
-    case: Case, folder: Path, *, ahead: Ahead = _unchecked, begin: Begin = _unobserved
+    case: Case,
+    folder: Path,
+    *,
+    ahead: Ahead = lambda scene: None,
+    begin: Begin = lambda name, simulation: (),
 ) -> CaseResult:
     """Run every scene of `case`, record it in `folder`, measure and draw.
 
     Raises:
         RecordError: another run of a case writes into that folder.
     """
-    # Until what was recorded has been measured, nobody else may replace it.
+    # No other process may replace the records before they have been measured.
     with sole_writer(folder / "case"):
-        return _run_case(case, folder, ahead, begin)
-
-
-def _run_case(case: Case, folder: Path, ahead: Ahead, begin: Begin) -> CaseResult:
-    runs = run_scenes(case, folder, ahead=ahead, begin=begin)
-    with opened(runs) as records:
-        measurements = case.measure(records)
-        pictures = case.draw(records, folder)
-        tables = [
-            _written(folder / f"{name}.csv", curves)
-            for name, curves in case.curves(records).items()
-        ]
+        runs = run_scenes(case, folder, ahead=ahead, begin=begin)
+        with open_records(runs) as records:
+            measurements = case.measure(records)
+            pictures = case.draw(records, folder)
+            tables = [
+                _write_table(folder / f"{name}.csv", curves)
+                for name, curves in case.curves(records).items()
+            ]
     return CaseResult(measurements, runs, pictures, tables, peak_memory())
 
 
 def run_scenes(
-    case: Case, folder: Path, *, ahead: Ahead = _unchecked, begin: Begin = _unobserved
+    case: Case,
+    folder: Path,
+    *,
+    ahead: Ahead = lambda scene: None,
+    begin: Begin = lambda name, simulation: (),
 ) -> Sequence[SceneRun]:
     """Run every scene of `case` and record it in `folder`.
 
-    A scene that diverges, is unsound or finds no equilibrium does not end the case: what it
-    recorded is measured, because for some combinations of parts to diverge is the result.
+    A scene that diverges, is unsound or finds no equilibrium does not end the case. Its record is
+    measured, because for some combinations of parts divergence is the expected result.
     """
     runs = []
     for name, scene in case.scenes().items():
@@ -115,9 +110,9 @@ def run_scenes(
         try:
             effort = simulation.run(record=path, observers=observers).effort
         except (DivergedError, UnsoundError, ConvergenceError) as cause:
-            if not path.exists():  # it failed before there was anything to measure
+            if not path.exists():  # it failed before the first output
                 raise
-            outcome = _told(cause)
+            outcome = _outcome(cause)
         seconds = clock.perf_counter() - begun
         work = counted(simulation)
         with Record(path) as record:
@@ -140,20 +135,20 @@ def run_scenes(
 
 
 @contextmanager
-def opened(runs: Sequence[SceneRun]) -> Iterator[Mapping[str, Record]]:
-    """The records of `runs`, by scene."""
+def open_records(runs: Sequence[SceneRun]) -> Iterator[Mapping[str, Record]]:
+    """Records of `runs`, by scene."""
     with ExitStack() as stack:
         yield {run.name: stack.enter_context(Record(run.record)) for run in runs}
 
 
-def _written(path: Path, curves: Curves) -> Path:
+def _write_table(path: Path, curves: Curves) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     values = np.column_stack(list(curves.values()))
     np.savetxt(path, values, "%.9g", delimiter=",", header=",".join(curves), comments="")
     return path
 
 
-def _told(cause: DivergedError | UnsoundError | ConvergenceError) -> str:
+def _outcome(cause: DivergedError | UnsoundError | ConvergenceError) -> str:
     if isinstance(cause, UnsoundError):
         return f"unsound: {cause}"
     if isinstance(cause, DivergedError):

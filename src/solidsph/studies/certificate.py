@@ -1,9 +1,9 @@
-"""Certificate: what a scheme does to small deviations from a uniform stretch, wave by wave.
+"""Certificate of a scheme: the waves of a uniformly stretched lattice.
 
-On an endless lattice every small deviation is a sum of waves, each with an exponent of its own
-(`studies.dispersion`). Four things can be read off them before anything is run: waves that cost no
-energy, waves that grow, the largest stable step, and how fast waves go for how fast they should.
-A free body adds its surface; its modes come from `studies.spectrum`.
+On an endless lattice every small deviation is a sum of waves, each with its own exponent
+(`studies.dispersion`). They show, before any run, which waves cost no energy, which grow, the
+largest stable step, and the error of wave speeds. A small free body adds the modes of a surface
+(`studies.spectrum`).
 """
 
 from __future__ import annotations
@@ -29,55 +29,54 @@ from solidsph.studies.scheme import Scheme, deformation, stretched
 from solidsph.studies.spectrum import spectrum
 
 GROWS = 5e-4
-"""Growth counts from here on [e-foldings per wave transit of one spacing]: rounding leaves 1e-4 of
-a neutral mode, the square root of what it leaves of its eigenvalue."""
+"""Growth rate above which a wave grows [e-foldings per wave transit of one spacing]. Rounding gives
+a neutral mode 1e-4, the square root of the error of its eigenvalue."""
 
 SOFT = 1e-2
-"""A wave that is not even so fast, relative to a shear wave, costs no energy to speak of [-]."""
+"""Speed below which a wave counts as free of energy, relative to a shear wave [-]."""
 
-# Wave numbers along each axis between 0 and pi; extremes are then sought between them.
+# Wave numbers along each axis between 0 and pi; extremes are then refined between them.
 _GRID = {1: 400, 2: 40, 3: 14}
 
-# Between two points of the coarsest grid, a tenth of a radian away, a wave that costs nothing is
-# followed by ones of this softness.
+# Softness of waves a tenth of a radian, half a cell of the coarsest grid, from a zero-energy wave.
 _SOFT_ON_GRID = 0.05
 
-# As a phase: of longer waves rounding leaves nothing, and the translation is none.
+# Smallest wave number [rad]: shorter ones drown in rounding, and 0 is the translation.
 _LONGEST = 1e-3
 
-# Extremes that are told: the rest are waves much like them.
-_TOLD = 8
+# Extremes that are reported; the rest are similar waves.
+_MOST = 8
 
-# Two extremes this close, as phases, are one.
+# Extremes closer than this are the same [rad].
 _SAME = 1e-2
 
-# Layers about the middle of the free body, along each axis: enough for edges and an inside.
+# Layers around the middle of the free body along each axis: enough for edges and an inside.
 _FREE = {1: (8,), 2: (4, 3), 3: (2, 2, 1)}
 
-# Of the highest frequency: rounding leaves 1e-6 of it, the slowest bending of so small a body has
-# some hundredths.
+# Frequency below which a mode of the free body costs no energy, over the highest one: rounding
+# leaves 1e-6, and the slowest bending of so small a body has some hundredths.
 _STILL = 1e-3
 
-# Of a spacing: a rotation so small is a linear motion up to its square.
+# Rigid motion by which stiffness is differenced [spacings]: its square is negligible.
 _TINY = 1e-4
 
-_LARGE = 1e9  # in place of infinity, of which a search makes differences
+_LARGE = 1e9  # in place of infinity, which the minimiser cannot subtract
 _SEARCH: Any = {"xatol": 1e-7, "fatol": 1e-14, "maxiter": 400}
 
 WAVELENGTHS = (2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 40.0)
-"""Where wave speeds are told [spacings]."""
+"""Wavelengths at which wave speeds are reported [spacings]."""
 
 
 @attrs.frozen(eq=False)
 class Wave:
-    """One wave of the lattice, in units of spacing and of the transit of a confined wave."""
+    """A wave of the lattice, in units of the spacing and of its transit by a confined wave."""
 
-    wave_vector: Array  # (d,) advance of the phase from particle to particle along each axis
-    polarisation: Array  # (d,) direction of its displacement, real part, of length 1
+    wave_vector: Array  # (d,) phase from particle to particle along each axis [rad]
+    polarisation: Array  # (d,) direction of its displacement, real part, normalised
     growth_rate: float  # [1/transit]
     frequency: float  # [rad/transit]
     softness: float  # squared speed over that of a shear wave; negative where it grows [-]
-    count: int  # polarisations with this wave vector that grow, or else cost no energy
+    count: int  # polarisations with this wave vector that grow, or otherwise cost no energy
 
     @property
     def wavelength(self) -> float:
@@ -90,8 +89,8 @@ class FreeBody:
     """Modes of a small free body, unstretched."""
 
     particles: int
-    rigid_modes: int  # translations and rotations that cost no energy: 1, 3 or 6 of them should
-    zero_modes: int  # that cost no energy, beyond those
+    rigid_modes: int  # translations and rotations without energy: should be 1, 3 or 6
+    zero_modes: int  # further modes without energy
     growth_rate: float  # [1/transit]
     highest_frequency: float  # [rad/transit]
     critical_step: float  # [transits]
@@ -99,20 +98,20 @@ class FreeBody:
 
 @attrs.frozen(eq=False)
 class Certificate:
-    """What a scheme does at one uniform stretch."""
+    """Stability and accuracy of a scheme at one uniform stretch."""
 
     scheme: Scheme
     stretches: tuple[float, ...]  # along each axis
-    elliptic: bool  # whether the material itself carries waves in every direction there
-    mean_stress: float  # over lambda + 2 mu; positive in tension
-    zero_modes: tuple[Wave, ...]  # that cost no energy
-    growing: tuple[Wave, ...]  # the fastest first, each the fastest about its wave vector
-    fastest: Wave  # of the highest frequency
+    elliptic: bool  # whether the material itself carries waves in every direction
+    mean_stress: float  # over lambda + 2 mu; positive in tension [-]
+    zero_modes: tuple[Wave, ...]  # zero-energy waves
+    growing: tuple[Wave, ...]  # local maxima of the growth rate, the fastest first
+    fastest: Wave  # wave of the highest frequency
     critical_step: float  # largest stable step on the endless lattice [transits]
-    rule_step: float  # the CFL step, that of time_step_factor = 1 [transits]
+    rule_step: float  # CFL step, that of time_step_factor = 1 [transits]
     wavelengths: Array  # (m,) along the first axis [spacings]
-    speeds: Array  # (m, d) over the exact ones: along the wave first, then across it [-]
-    free: FreeBody | None  # only unstretched: otherwise a free body is in no equilibrium
+    speeds: Array  # (m, d) over the exact ones: longitudinal first, then transverse [-]
+    free: FreeBody | None  # only unstretched: otherwise a free body is not in equilibrium
 
     @property
     def dimension(self) -> int:
@@ -121,7 +120,7 @@ class Certificate:
 
     @property
     def growth_rate(self) -> float:
-        """Of the fastest growing wave [1/transit]; 0 if none grows."""
+        """Growth rate of the fastest growing wave [1/transit]; 0 if none grows."""
         return self.growing[0].growth_rate if self.growing else 0.0
 
     @property
@@ -132,10 +131,10 @@ class Certificate:
 
     @property
     def cause(self) -> str:
-        """Why waves grow: "material", "tensile", "pairing", or nothing if none does.
+        """Cause of growth: "material", "tensile", "pairing", or "" if no wave grows.
 
-        Where the material has lost ellipticity no scheme may hide it. Otherwise it is the scheme
-        alone: by the stress that is there, tensile where it pulls, pairing where it pushes.
+        A material that has lost ellipticity must be unstable. Otherwise the scheme is the cause:
+        a tensile instability under tensile mean stress, pairing under compressive.
         """
         if not self.growing:
             return ""
@@ -152,7 +151,7 @@ def certificate(
     Args:
         scheme: kernel, cover, formulation with its gradient and divergence, material, effects.
         dimension: 1, 2 or 3.
-        stretch: of every axis, or one for each.
+        stretch: of all axes, or one for each.
 
     Raises:
         SceneError: a stretch is not positive, or the block of particles would be too large.
@@ -167,8 +166,8 @@ def certificate(
     softness, rates, frequencies = waves.measured(grid)
     soft = waves.extremes(grid, softness, waves.softness, below=_SOFT_ON_GRID)
     growing = waves.extremes(grid, -rates, lambda k: -waves.wave(k).growth_rate, below=-GROWS)
-    # Waves that cost nothing are minima of the energy, not places where it changes its sign.
-    zero = [one for one in soft if abs(one.softness) <= SOFT**2 and one.growth_rate <= GROWS]
+    # Zero-energy waves are minima of the energy, not places where it changes sign.
+    zero = [w for w in soft if abs(w.softness) <= SOFT**2 and w.growth_rate <= GROWS]
     (fastest, *_) = waves.extremes(
         grid, -frequencies, lambda k: -waves.wave(k).frequency, below=-0.99 * frequencies.max()
     )
@@ -192,23 +191,23 @@ def certificate(
 
 @attrs.frozen(eq=False)
 class _Waves:
-    """All waves of a lattice, in units of spacing and transit."""
+    """Waves of a lattice, in units of spacing and transit."""
 
     scheme: Scheme
     response: LatticeResponse
     dimension: int
 
     def grid(self) -> Array:
-        """Wave vectors (n, ..., d) between 0 and pi along each axis."""
+        """Wave vectors (n, ..., d) between 0 and pi along each axis [rad]."""
         axis = np.linspace(0.0, pi, _GRID[self.dimension] + 1)
         return np.stack(np.meshgrid(*[axis] * self.dimension, indexing="ij"), axis=-1)
 
     def symbols(self, wave_vectors: Array) -> NDArray[np.complex128]:
-        """(k, d, d) [1/transit^2]"""
+        """Matrices (k, d, d) of `LatticeResponse.symbols` [1/transit^2]."""
         return self.response.symbols(wave_vectors) * self.scheme.transit**2
 
     def measured(self, grid: Array) -> tuple[Array, Array, Array]:
-        """Softness, growth rate and highest frequency at every wave vector of the grid."""
+        """Softness, growth rate and highest frequency (n, ...) on a grid of wave vectors."""
         flat = grid.reshape(-1, self.dimension)
         squares = np.linalg.eigvals(self.symbols(flat))
         exponents = np.sqrt(squares)
@@ -216,18 +215,18 @@ class _Waves:
         lengths[0] = np.inf  # the translation
         softness = (-squares.real).min(axis=1) / lengths
         softness[0] = np.inf
-        found = (softness, exponents.real.max(axis=1), np.abs(exponents.imag).max(axis=1))
-        softness, rates, frequencies = (one.reshape(grid.shape[:-1]) for one in found)
+        measures = (softness, exponents.real.max(axis=1), np.abs(exponents.imag).max(axis=1))
+        softness, rates, frequencies = (values.reshape(grid.shape[:-1]) for values in measures)
         return softness, rates, frequencies
 
     @property
     def _shear(self) -> float:
-        """Squared speed of a shear wave, in 1D of the confined one, over that of the latter."""
+        """Squared speed of a shear wave over that of a confined one; 1 in 1D."""
         lam, mu = self.scheme.material.lame_parameters
         return 1.0 if self.dimension == 1 else mu / (lam + 2.0 * mu)
 
     def softness(self, wave_vector: Array) -> float:
-        """Least squared speed over that of a shear wave."""
+        """Least squared speed of a wave over that of a shear wave."""
         length = float(wave_vector @ wave_vector)
         if length < _LONGEST**2:
             return np.inf
@@ -235,7 +234,7 @@ class _Waves:
         return float((-squares.real).min() / (length * self._shear))
 
     def wave(self, wave_vector: Array) -> Wave:
-        """The fastest growing, or else the softest, wave with that wave vector."""
+        """The fastest growing wave with a wave vector, or the softest if none grows."""
         squares, modes = np.linalg.eig(self.symbols(wave_vector[None])[0])
         exponents = np.sqrt(squares)
         grows = float(exponents.real.max()) > GROWS
@@ -255,52 +254,54 @@ class _Waves:
     def extremes(
         self, grid: Array, values: Array, measure: Callable[[Array], float], *, below: float
     ) -> list[Wave]:
-        """Waves at the least local minima of `measure`, the least first.
+        """Waves at the lowest local minima of a measure, the lowest first.
 
         Args:
             grid: wave vectors (n, ..., d).
-            values: what it is there, (n, ...).
-            measure: what it is at any wave vector (d,).
-            below: only minima whose value on the grid is less count.
+            values: the measure on the grid, (n, ...).
+            measure: the measure at any wave vector (d,).
+            below: limit of the values on the grid that are considered.
         """
         neighbourhood = minimum_filter(values, size=3, mode="nearest")
         minima = np.argwhere((values <= neighbourhood) & (values < below))
-        order = np.argsort([values[tuple(one)] for one in minima], kind="stable")
+        order = np.argsort([values[tuple(index)] for index in minima], kind="stable")
         width = pi / _GRID[self.dimension]
-        found: list[tuple[float, Array]] = []
-        for index in minima[order[: 4 * _TOLD]]:
+        extremes: list[tuple[float, Array]] = []
+        for index in minima[order[: 4 * _MOST]]:
             start = grid[tuple(index)]
             bounds = [(max(0.0, k - width), min(pi, k + width)) for k in start]
             k = _least(measure, start, bounds)
-            if all(np.abs(k - other).max() > _SAME for _, other in found):
-                found.append((measure(k), k))
-        found.sort(key=lambda one: one[0])
-        return [self.wave(k) for _, k in found[:_TOLD]]
+            if all(np.abs(k - other).max() > _SAME for _, other in extremes):
+                extremes.append((measure(k), k))
+        extremes.sort(key=lambda minimum: minimum[0])
+        return [self.wave(k) for _, k in extremes[:_MOST]]
 
     def speeds(self, F: Array) -> Array:
-        """Phase speeds along the first axis over the exact ones, (m, d); nan where one grows."""
+        """Phase speeds along the first axis over the exact ones (m, d); nan where a wave grows."""
         k = np.zeros((len(WAVELENGTHS), self.dimension))
         k[:, 0] = 2.0 * pi / np.array(WAVELENGTHS)
         lam, mu = self.scheme.material.lame_parameters
         along = np.eye(self.dimension)[:1]
         exact = acoustic_tensors(self.scheme.material, F, along)[0] / (lam + 2.0 * mu)
         squares = np.real(np.einsum("kii->ki", -self.symbols(k))) / k[:, :1] ** 2
-        # In rows along the axes of stretch, waves along an axis move along one.
+        # On a lattice along the axes of stretch, waves along an axis are polarised along axes.
         ratios = squares / np.diag(exact)
-        # What rounding leaves of a wave that costs nothing is no growth.
+        # A slightly negative square is the rounding of a zero-energy wave, not growth.
         return np.sqrt(np.where(ratios > -(SOFT**2), np.maximum(ratios, 0.0), np.nan))
 
 
 def _least(
     measure: Callable[[Array], float], start: Array, bounds: Sequence[tuple[float, float]]
 ) -> Array:
-    """Where near `start` (d,) it is least, within bounds of each component."""
+    """Local minimum (d,) of a measure near `start` (d,), within bounds of each component."""
 
     def finite(wave_vector: Any) -> Any:
         return min(measure(wave_vector), _LARGE)
 
-    found: Any = minimize(finite, start, method="Nelder-Mead", bounds=list(bounds), options=_SEARCH)
-    return np.asarray(found.x) if found.fun < measure(start) else start
+    result: Any = minimize(
+        finite, start, method="Nelder-Mead", bounds=list(bounds), options=_SEARCH
+    )
+    return np.asarray(result.x) if result.fun < measure(start) else start
 
 
 def _checked(dimension: int, stretch: float | Sequence[float]) -> tuple[float, ...]:
@@ -314,11 +315,11 @@ def _checked(dimension: int, stretch: float | Sequence[float]) -> tuple[float, .
             f"stretch must be one positive number, or one for each of {dimension} axes, got "
             f"{stretch!r}; 1 is unstretched"
         )
-    return tuple(float(one) for one in stretches)
+    return tuple(stretches.tolist())
 
 
 def _response(scheme: Scheme, stretches: Sequence[float]) -> tuple[LatticeResponse, float, float]:
-    """The lattice's answer, the CFL step [s] and the rate of damping that effects declare [1/s]."""
+    """Response of the lattice, CFL step [s] and the damping rate that effects declare [1/s]."""
     dimension = len(stretches)
     layers = [scheme.depth(min(stretches))] * dimension
     simulation = scheme.simulation(dimension, layers)
@@ -340,9 +341,9 @@ def _mean_stress(scheme: Scheme, F: Array) -> float:
 
 def _free_body(scheme: Scheme, dimension: int, rate: float) -> FreeBody:
     simulation = scheme.simulation(dimension, _FREE[dimension])
-    found = spectrum(simulation.dynamics, simulation.start())
-    exponents = found.growth_rates + 1j * found.frequencies
-    highest = found.highest_frequency
+    modes = spectrum(simulation.dynamics, simulation.start())
+    exponents = modes.growth_rates + 1j * modes.frequencies
+    highest = modes.highest_frequency
     still = int(np.sum(np.abs(exponents) < _STILL * highest))
     rigid = _free_rigid_motions(simulation, (_STILL * highest) ** 2)
     limit = scheme.integrator.stability_limit
@@ -350,14 +351,14 @@ def _free_body(scheme: Scheme, dimension: int, rate: float) -> FreeBody:
         particles=simulation.particles.count,
         rigid_modes=rigid,
         zero_modes=still - rigid,
-        growth_rate=found.growth_rate * scheme.transit,
+        growth_rate=modes.growth_rate * scheme.transit,
         highest_frequency=highest * scheme.transit,
         critical_step=limit / (highest + rate) / scheme.transit,
     )
 
 
 def _free_rigid_motions(simulation: Simulation, least: float) -> int:
-    """How many translations and rotations meet less than the stiffness `least` [1/s^2]."""
+    """Number of rigid motions that meet a stiffness below `least` [1/s^2]."""
     X = simulation.particles.positions
     dimension = X.shape[1]
     motions = [np.tile(axis, (len(X), 1)) for axis in np.eye(dimension)]

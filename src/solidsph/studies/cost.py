@@ -1,4 +1,4 @@
-"""What accuracy costs: a case swept over axes, or searched for an accuracy or a time."""
+"""Cost of accuracy: a sweep of a case over axes, or a search for an accuracy or a time."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from solidsph.studies.journal import Journal
 from solidsph.studies.point import Point
 from solidsph.studies.processes import Processes
 from solidsph.studies.runner import Runner
-from solidsph.studies.search import Found, Goal, Settings, search
-from solidsph.studies.sweep import Watch, sweep, unwatched
+from solidsph.studies.search import Goal, SearchResult, Settings, search
+from solidsph.studies.sweep import StatusCallback, ignore_status, sweep
 from solidsph.studies.task import Task
-from solidsph.studies.varied import varied
+from solidsph.studies.variant import with_settings
 
 Axes = Mapping[str, Sequence[Any]]
 
@@ -30,69 +30,73 @@ JOURNAL = "points.jsonl"
 
 
 @attrs.frozen
-class Means:
-    """Where and how often configurations are run, and where what came of them is kept."""
+class SweepSetup:
+    """Where and how often configurations are run, and where their points are kept."""
 
     runner: Runner = attrs.field(factory=lambda: Processes(1))
     folder: Path | None = None  # of the journal; None keeps nothing
-    repeats: int = 1  # of every configuration: times are medians
-    watch: Watch = unwatched
+    repeats: int = 1  # of every configuration; times are medians
+    watch: StatusCallback = ignore_status
 
-    def points(self, case: Case, several: Sequence[Settings]) -> Sequence[Point]:
-        """Of `case` with these settings, in their order; from the journal where it has them."""
-        tasks = [Task(case, one, repeat) for one in several for repeat in range(self.repeats)]
+    def points(self, case: Case, grid: Sequence[Settings]) -> Sequence[Point]:
+        """Points of `case` with each of these settings; from the journal if it has them."""
+        tasks = [
+            Task(case, settings, repeat) for settings in grid for repeat in range(self.repeats)
+        ]
         with ExitStack() as stack:
             folder = self.folder or Path(stack.enter_context(TemporaryDirectory()))
             return sweep(tasks, self.runner, Journal(folder / JOURNAL), self.watch)
 
 
-def frontier(case: Case | str, axes: Axes | None = None, means: Means | None = None) -> Frontier:
+def frontier(
+    case: Case | str, axes: Axes | None = None, setup: SweepSetup | None = None
+) -> Frontier:
     """Run `case` at every combination of the values of `axes`, and at its own parameters.
 
     Args:
-        case: or its registered name.
-        axes: parameters of the case, or words of any scene, with the values to try. The first one
-            refines, from coarse to fine. By default those that the case gives.
-        means: by default one process at a time, once each, and nothing is kept.
+        case: a case or its registered name.
+        axes: parameters of the case, or keys of any scene, with the values to try. The first one
+            refines, from coarse to fine. By default those of the case.
+        setup: by default one process at a time and one repeat, and nothing is kept.
 
     Raises:
         SceneError: there is no such axis, or nothing to sweep.
     """
-    priced = _priced(case)
-    axes = checked(priced, axes or sweep_of(priced))
+    priced, axes = _priced(case, axes)
     grid: list[Settings] = [
         dict(zip(axes, values, strict=True)) for values in product(*axes.values())
     ]
-    own = own_settings(priced, axes)
+    own = default_settings(priced, axes)
     if own is not None and own not in grid:
         grid.append(own)
-    points = (means or Means()).points(priced, grid)
+    points = (setup or SweepSetup()).points(priced, grid)
     return Frontier(points, next(iter(axes)))
 
 
-def found(
+def find_best(
     case: Case | str,
     goal: Goal,
     axes: Axes | None = None,
-    means: Means | None = None,
+    setup: SweepSetup | None = None,
     *,
     longest: float = 600.0,
-) -> Found:
+) -> SearchResult:
     """The best configuration for `goal`, by few runs; see `search`."""
-    priced, how = _priced(case), means or Means()
+    priced, axes = _priced(case, axes)
+    how = setup or SweepSetup()
 
     def run(settings: Settings) -> Point:
         (point,) = how.points(priced, [settings])
         return point
 
-    return search(priced, checked(priced, axes or sweep_of(priced)), goal, run, longest=longest)
+    return search(priced, axes, goal, run, longest=longest)
 
 
 def sweep_of(case: Case) -> Axes:
-    """The axes that a case gives.
+    """Axes of a case.
 
     Raises:
-        SceneError: it gives none.
+        SceneError: it has none.
     """
     if not case.sweep:
         raise SceneError(
@@ -102,27 +106,21 @@ def sweep_of(case: Case) -> Axes:
     return case.sweep
 
 
-def checked(case: Case, axes: Axes) -> Axes:
-    """The same `axes`, of which the case takes every value by itself.
-
-    Raises:
-        SceneError: it does not.
-    """
-    for axis, values in axes.items():
-        if not values:
-            raise SceneError(f"axis {axis!r} has no values; give some")
-        for value in values:
-            varied(case, {axis: value}).scenes()
-    return axes
-
-
-def own_settings(case: Case, axes: Axes) -> Settings | None:
-    """The case's own values on these axes; None if it has no parameter for one of them."""
+def default_settings(case: Case, axes: Axes) -> Settings | None:
+    """The case's own values of these axes; None if one of them is not a parameter of the case."""
     missing = object()
     own = {axis: getattr(case, axis, missing) for axis in axes}
     return None if missing in own.values() else own
 
 
-def _priced(case: Case | str) -> Case:
-    made: Case = construct("cases", case)
-    return made.priced()
+def _priced(case: Case | str, axes: Axes | None) -> tuple[Case, Axes]:
+    """The case to run, and its axes, whose values have been tried one by one."""
+    whole: Case = construct("cases", case)
+    priced = whole.priced()
+    axes = axes or sweep_of(priced)
+    for axis, values in axes.items():
+        if not values:
+            raise SceneError(f"axis {axis!r} has no values; give some")
+        for value in values:
+            with_settings(priced, {axis: value}).scenes()
+    return priced, axes

@@ -1,4 +1,4 @@
-"""A task in a process of its own: its peak of memory, and its crash, are nobody else's."""
+"""A task in its own process, so that its peak of memory and its crash concern no other."""
 
 from __future__ import annotations
 
@@ -9,59 +9,59 @@ import tempfile
 from contextlib import suppress
 from typing import IO
 
-from solidsph.studies.packing import told
 from solidsph.studies.runner import Lost
-from solidsph.studies.scratch import Scratch
+from solidsph.studies.scratch_folder import ScratchFolder
+from solidsph.studies.task_lines import encode_outcome
 
 _CHUNK = 65536
 
 
 class FreshProcess:
-    """A process that carries out one packed task. It ends when this one closes it, or dies."""
+    """A process that runs one encoded task. It ends when this process closes it, or dies."""
 
     def __init__(self, line: str) -> None:
         self._answer = b""
         self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  # closed by close()
-        self._scratch = Scratch()  # for records, which a run that is killed leaves behind
+        self._scratch = ScratchFolder()  # for records, which a killed run does not remove
         self._process = subprocess.Popen(
-            # -P: no module of the current folder stands in for one that is installed.
-            [sys.executable, "-P", "-m", "solidsph.studies.one_point"],
+            # -P: modules in the current folder do not hide installed ones.
+            [sys.executable, "-P", "-m", "solidsph.studies.run_task"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
             env={**os.environ, "TMPDIR": str(self._scratch.path)},
-            start_new_session=True,  # an interrupt from the terminal is for the sweep alone
+            start_new_session=True,  # an interrupt from the terminal reaches the sweep only
         )
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(line.encode("ascii") + b"\n")
-            self._process.stdin.flush()  # not closed: an open pipe says that someone waits
+            self._process.stdin.flush()  # not closed: the process ends when the pipe does
         except BrokenPipeError:
-            pass  # it has died already, as its outcome will say
+            pass  # it has died already; its outcome reports that
         except BaseException:
             self.close()
             raise
 
     def fileno(self) -> int:
-        """Readable when there is an answer, or when it has ended."""
+        """File descriptor that is readable when there is an answer, or the process has ended."""
         assert self._process.stdout is not None
         return self._process.stdout.fileno()
 
     def is_over(self) -> bool:
-        """Take what there is to read; whether that was the end."""
+        """Read what is available, and return whether that was the end."""
         part = os.read(self.fileno(), _CHUNK)
         self._answer += part
         return not part
 
     def reply(self) -> str:
-        """One line for `packing.heard`, once it is over."""
+        """Line for `decode_outcome`, once it is over."""
         code = self._process.wait()
         if self._answer.endswith(b"\n"):
             return self._answer.decode("ascii")
-        return told(Lost(_ended(code, self._last_words())))
+        return encode_outcome(Lost(_ended(code, self._last_words())))
 
     def close(self) -> None:
-        """End it if it still runs, and remove whatever it leaves."""
+        """Kill the process if it still runs, and remove its files."""
         self._process.kill()
         self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout, self._errors):
@@ -79,5 +79,5 @@ class FreshProcess:
 def _ended(code: int, last_words: str) -> str:
     how = f"by signal {-code}" if code < 0 else f"with code {code}"
     if code == -9:
-        how += ", as it does when memory runs out"
+        how += ", as happens when memory runs out"
     return f"the process ended {how}" + (f": {last_words}" if last_words else "")

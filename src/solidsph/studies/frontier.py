@@ -1,4 +1,4 @@
-"""Frontier: which configurations of a case are worth their time, and what the next digit costs."""
+"""Frontier: the configurations of a case that are worth their time, and the price of a digit."""
 
 from __future__ import annotations
 
@@ -11,33 +11,40 @@ from typing import Any, final
 import attrs
 import numpy as np
 
-from solidsph.studies.point import Point
+from solidsph.studies.point import Point, label
 
 Cost = Callable[[Point], float]
+
+AS_IT_IS = "as it is"
+"""Label of a configuration without settings."""
 
 
 @attrs.frozen
 class Orders:
-    """Powers by which the error of one scheme falls as it is refined."""
+    """Orders of convergence of one scheme."""
 
     settings: Mapping[str, Any]  # all but the one that refines
-    in_spacing: float  # error ~ spacing^p
-    in_time: float  # error ~ time^-p
-    crosses: bool  # an error is larger than at a coarser spacing: no power describes it
+    in_spacing: float  # p of error ~ spacing^p
+    in_time: float  # p of error ~ time^-p
+    crosses: bool  # whether an error rises on refinement, so that no power describes it
+
+    @property
+    def label(self) -> str:
+        """Settings in one line."""
+        return label(self.settings) or AS_IT_IS
 
 
 @final
 @attrs.frozen(slots=False)
 class Frontier:
-    """The points of a sweep over one case. Iterating gives a row for each, as pandas takes them."""
+    """Points of a sweep over one case. Iteration gives a row for each, for example for pandas."""
 
     points: Sequence[Point]
     refining: str  # the setting that refines
 
     @cached_property
     def _trusted(self) -> Mapping[int, float]:
-        """Of every point, by its identity: the largest error of its scheme at its spacing or any
-        finer one."""
+        """Largest error of a point's scheme at its spacing or a finer one, by id of the point."""
         trusted = {}
         for points in self.schemes().values():
             largest = 0.0
@@ -47,7 +54,7 @@ class Frontier:
         return trusted
 
     def trusted(self, point: Point) -> float:
-        """An error that refinement does not take back [-]: a smaller one was small by chance."""
+        """Error that refinement does not exceed [-]; a smaller one was small by chance."""
         return self._trusted.get(id(point), point.error)
 
     def __iter__(self) -> Iterator[Mapping[str, Any]]:
@@ -74,13 +81,10 @@ class Frontier:
         return len(self.points)
 
     def front(self, cost: Cost = lambda point: point.time) -> Sequence[Point]:
-        """Points than which none is both cheaper and nearer, by rising cost.
-
-        How near a point is says the error that can be trusted: what crosses the reference on its
-        way past it is not nearer for that.
+        """Points that no other beats in both cost and trusted error, by rising cost.
 
         Args:
-            cost: what is cheap: by default the median wall time.
+            cost: by default the median wall time.
         """
         chosen: list[Point] = []
         for point in sorted(self.finished(), key=lambda point: (cost(point), self.trusted(point))):
@@ -89,11 +93,11 @@ class Frontier:
         return chosen
 
     def finished(self) -> Sequence[Point]:
-        """Points that have an error."""
+        """Points with a finite error."""
         return [point for point in self.points if point.finished]
 
     def schemes(self) -> Mapping[str, Sequence[Point]]:
-        """Finished points that differ in the refining setting only, from coarse to fine."""
+        """Finished points of each scheme, from coarse to fine."""
         groups: dict[str, list[Point]] = {}
         for point in self.finished():
             groups.setdefault(self.scheme(point), []).append(point)
@@ -103,42 +107,50 @@ class Frontier:
         }
 
     def scheme(self, point: Point) -> str:
-        """All settings of a point but the refining one, in a line."""
-        rest = {k: v for k, v in point.settings.items() if k != self.refining}
-        return attrs.evolve(point, settings=rest).label() or "as it is"
+        """Scheme of a point: all its settings but the refining one, in one line."""
+        return label(self._scheme(point)) or AS_IT_IS
+
+    def _scheme(self, point: Point) -> Mapping[str, Any]:
+        return {k: v for k, v in point.settings.items() if k != self.refining}
 
     def orders(self) -> Sequence[Orders]:
-        """Fitted orders of every scheme of which there are two points or more."""
+        """Fitted orders of every scheme with two points or more."""
         return [self._orders(points) for points in self.schemes().values() if len(points) > 1]
 
     def _orders(self, points: Sequence[Point]) -> Orders:
-        settings = {k: v for k, v in points[0].settings.items() if k != self.refining}
         errors = [point.error for point in points]
         return Orders(
-            settings,
-            in_spacing=power([point.spacing for point in points], errors),
-            in_time=-power([point.time for point in points], errors),
+            self._scheme(points[0]),
+            in_spacing=fitted_exponent([point.spacing for point in points], errors),
+            in_time=-fitted_exponent([point.time for point in points], errors),
             crosses=any(fine > coarse for coarse, fine in pairwise(errors)),
         )
 
     def next_digit(self) -> float:
-        """How many times the time a tenth of the error takes, along the front."""
+        """Factor in time for a tenth of the error, along the front."""
         front = self.front()
-        falls = -power([point.time for point in front], [self.trusted(point) for point in front])
+        falls = -fitted_exponent(
+            [point.time for point in front], [self.trusted(point) for point in front]
+        )
         return 10.0 ** (1.0 / falls) if falls > 0.0 else inf
 
     def cheapest(self, accuracy: float) -> Point | None:
-        """The quickest point with at most that error, to be trusted."""
+        """The quickest point with at most this trusted error."""
         within = [point for point in self.front() if self.trusted(point) <= accuracy]
         return within[0] if within else None
 
     def best(self, time: float) -> Point | None:
-        """The point with the smallest error that takes at most that time [s]."""
+        """The point with the smallest trusted error that takes at most this time [s]."""
         within = [point for point in self.front() if point.time <= time]
         return within[-1] if within else None
 
+    def numbers(self, points: Sequence[Point]) -> Sequence[int]:
+        """Places of these points in the sweep, from 0."""
+        places = {id(point): number for number, point in enumerate(self.points)}
+        return [places[id(point)] for point in points]
+
     def excess(self, point: Point) -> float:
-        """How much longer a point takes than its error must, by the front between its points [-].
+        """Time of a point over that of the quickest with its trusted error [-].
 
         1 on the front; infinite if it did not finish.
         """
@@ -147,8 +159,25 @@ class Frontier:
         cheaper = self.cheapest(self.trusted(point))
         return 1.0 if cheaper is None else max(1.0, point.time / cheaper.time)
 
+    @property
+    def quantity(self) -> str:
+        """Quantity that the errors are of; empty if no point knows it."""
+        return next((point.quantity for point in self.points if point.quantity), "")
+
+    def second_order(self) -> tuple[tuple[float, float], tuple[float, float]] | None:
+        """Spacings [m] and errors [-] of a line of second order below all errors, for pictures.
+
+        None unless two spacings have finished with an error.
+        """
+        spacings = [p.spacing for p in self.finished() if isfinite(p.spacing)]
+        errors = [p.error for p in self.finished() if p.error > 0.0]
+        if not errors or not spacings or not 0.0 < min(spacings) < max(spacings):
+            return None
+        coarse, fine, least = max(spacings), min(spacings), 0.7 * min(errors)
+        return (coarse, fine), (least * (coarse / fine) ** 2, least)
+
     def sentence(self) -> str:
-        """What a person can act on."""
+        """Summary in words."""
         front = self.front()
         if not front:
             failed = self.points[0].outcome if self.points else "there is no point"
@@ -164,7 +193,7 @@ class Frontier:
         if not parts:
             parts.append(f"10 % was not reached by any of {len(self.points)} configurations")
         parts.append(
-            f"nothing was nearer than {100.0 * self.trusted(last):.2g} %, in {_time(last.time)} "
+            f"the smallest error was {100.0 * self.trusted(last):.2g} %, in {_time(last.time)} "
             f"with {last.label()}"
         )
         price = self.next_digit()
@@ -173,8 +202,8 @@ class Frontier:
         return "; ".join(parts) + "."
 
 
-def power(costs: Sequence[float], errors: Sequence[float]) -> float:
-    """The exponent p of errors ~ costs^p by least squares of logarithms; nan if there is none."""
+def fitted_exponent(costs: Sequence[float], errors: Sequence[float]) -> float:
+    """Exponent p of errors ~ costs^p by least squares of logarithms; nan if there is none."""
     pairs = [
         (log(cost), log(error))
         for cost, error in zip(costs, errors, strict=True)

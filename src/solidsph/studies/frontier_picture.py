@@ -1,4 +1,4 @@
-"""The picture of a frontier: error against time, and against spacing."""
+"""Picture of a frontier: error against time, and against spacing."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from solidsph.studies.frontier import Frontier
-from solidsph.studies.point import Point, shown
+from solidsph.studies.point import Point, format_setting
 
 _MARKERS = "osD^vP*X<>"
 
 
 def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
-    """Dominated points in grey, the front in black, where errors are those that can be trusted;
-    bars go from the quickest repeat to the slowest. On the right every scheme as it is refined.
+    """Draw trusted errors against time, and the refinement of every scheme.
+
+    The front is black and dominated points are grey; bars go from the quickest repeat to the
+    slowest.
     """
     figure = Figure(figsize=(13.0, 6.0), layout="constrained")
     by_time, by_spacing = figure.subplots(1, 2, sharey=True)
@@ -39,7 +41,7 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
         _points(by_time, frontier, mine, marker, "black", scheme)
     for point in front:
         by_time.annotate(
-            shown(point.settings.get(frontier.refining, "")),
+            format_setting(point.settings.get(frontier.refining, "")),
             (point.time, 100.0 * frontier.trusted(point)),
             xytext=(6, 5),
             textcoords="offset points",
@@ -49,8 +51,7 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
     by_time.set_yscale("log")
     by_time.margins(x=0.12)
     by_time.set_xlabel("wall time [s]")
-    quantity = next((point.quantity for point in frontier.points if point.quantity), "result")
-    by_time.set_ylabel(f"error [%] of: {quantity}")
+    by_time.set_ylabel(f"error [%] of: {frontier.quantity or 'result'}")
     by_time.legend(
         frameon=False,
         fontsize=8,
@@ -70,7 +71,11 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
             markersize=5,
             zorder=2 if on_front else 1,
         )
-    _draw_order(by_spacing, frontier.finished())
+    if line := frontier.second_order():
+        spacings, errors = line[0], [100.0 * error for error in line[1]]
+        end = (spacings[1], errors[1])
+        by_spacing.loglog(spacings, errors, ":", color="0.4", linewidth=1.0)
+        by_spacing.annotate("order 2", end, (4, -10), textcoords="offset points", fontsize=8)
     by_spacing.set_xlabel("particle spacing [m]")
     for axis in (by_time.xaxis, by_spacing.xaxis, by_time.yaxis):
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -107,19 +112,4 @@ def _points(
         elinewidth=0.8,
         label=label,
         zorder=3 if color == "black" else 1,
-    )
-
-
-def _draw_order(axes: Axes, points: Sequence[Point]) -> None:
-    """What second order is, below all errors."""
-    if not points:
-        return
-    coarse, fine = max(p.spacing for p in points), min(p.spacing for p in points)
-    if not 0.0 < fine < coarse < float("inf"):
-        return
-    least = 100.0 * min(p.error for p in points if p.error > 0.0)
-    start = 0.7 * least * (coarse / fine) ** 2
-    axes.loglog([coarse, fine], [start, 0.7 * least], ":", color="0.4", linewidth=1.0)
-    axes.annotate(
-        "order 2", (fine, 0.7 * least), xytext=(4, -10), textcoords="offset points", fontsize=8
     )

@@ -1,4 +1,4 @@
-"""The gallery: a page of what cases measured, with their pictures."""
+"""Gallery: a page of the measurements of cases, with their pictures."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _section(name: str, result: CaseResult, pictures: Path) -> str:
     case = registry.load("cases", name)
     lines = [f"## {case.title}", "", f"{case.source}. `solidsph run {name}`", ""]
     for path in result.pictures:
-        copied(path, pictures / path.name)
+        write_small_copy(path, pictures / path.name)
         lines += [f"![{path.stem}]({pictures.name}/{path.name})", ""]
     lines += [
         "| quantity | the paper | theory | measured | unit | error |",
@@ -48,11 +48,11 @@ def _section(name: str, result: CaseResult, pictures: Path) -> str:
 
 
 def _cell(text: str) -> str:
-    """`text` in a table of Markdown, where "<f>" would be a tag of HTML."""
+    """`text` for a table of Markdown, where "<f>" would be an HTML tag."""
     return text.replace("|", "\\|").replace("<", "&lt;")
 
 
-def copied(picture: Path, path: Path) -> None:
-    """Write a copy in few colours, a third of the size: pages are kept beside the code."""
+def write_small_copy(picture: Path, path: Path) -> None:
+    """Write a copy in few colours, a third of the size, for pages kept beside the code."""
     with Image.open(picture) as image:
         image.convert("RGB").quantize(_COLOURS).save(path, optimize=True)

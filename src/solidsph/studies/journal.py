@@ -1,4 +1,4 @@
-"""Journal: what a sweep has finished, a line each, safe from being killed at any point."""
+"""Journal: the finished tasks of a sweep, one a line, which survives kills at any time."""
 
 from __future__ import annotations
 
@@ -13,54 +13,54 @@ import attrs
 
 from solidsph.errors import RecordError
 from solidsph.studies.point import Point
-from solidsph.studies.point_json import from_json, to_json
 from solidsph.studies.task import Task
+from solidsph.studies.task_lines import decode_point, encode_point
 
 VERSION = 1
-"""Of the lines. Lines of another version are left where they are, and passed over."""
+"""Version of the format. Lines of other versions are kept and ignored."""
 
 Append = Callable[[Task, Point], None]
-"""Write down that a task has given a point; once it returns, the line is on the disk."""
+"""Appends the point of a task; the line is on the disk when it returns."""
 
 
 @attrs.frozen
 class Journal:
-    """A file of JSON lines, each of one finished task. Only whole lines count.
+    """A file of JSON lines, one for each finished task. Nothing in it is ever changed.
 
-    A line that was torn when its writer was killed is passed over, and ended by whoever appends
-    next. Nothing that the file holds is ever changed.
+    A line that is incomplete because its writer was killed is ignored, and ended by the next
+    writer.
     """
 
     path: Path
 
     def points(self, tasks: Sequence[Task]) -> Mapping[str, Point]:
-        """What it holds of these tasks, by their keys."""
+        """Points of these tasks in the file, by key."""
         if not self.path.exists():
             return {}
         wanted = {task.key: task for task in tasks}
-        found: dict[str, Point] = {}
+        known: dict[str, Point] = {}
         for line in self.path.read_bytes().split(b"\n"):
             try:
                 entry = json.loads(line)
                 if entry["journal"] == VERSION and entry["key"] in wanted:
                     key = entry["key"]
-                    found[key] = from_json(entry["point"], wanted[key].settings)
+                    known[key] = decode_point(entry["point"], wanted[key].settings)
             except (ValueError, KeyError, TypeError):
                 continue
-        return found
+        return known
 
     @contextmanager
     def writer(self) -> Iterator[Append]:
-        """The right to append, which one process has at a time.
+        """Open the file to append points, in one process at a time.
 
         Raises:
-            RecordError: another sweep has it.
+            RecordError: another sweep is writing to it.
         """
         self.path.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
         try:
-            _lock(file, self.path)  # the system takes it back from whoever dies
-            _sync_folder(self.path.parent)  # so that the file itself outlasts a loss of power
+            _lock(file, self.path)  # released by the system when the process ends
+            _sync_folder(self.path.parent)  # so that the file survives a loss of power
 
             def append(task: Task, point: Point) -> None:
                 entry = {
@@ -68,7 +68,7 @@ class Journal:
                     "key": task.key,
                     "case": task.case.title,
                     "repeat": task.repeat,
-                    "point": to_json(point),
+                    "point": encode_point(point),
                 }
                 line = json.dumps(entry, allow_nan=False).encode("ascii") + b"\n"
                 _write(file, line if _is_whole(file) else b"\n" + line)
@@ -97,7 +97,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def _is_whole(file: int) -> bool:
-    """Whether the last line has its end."""
+    """Whether the last line is complete."""
     size = os.fstat(file).st_size
     return size == 0 or os.pread(file, 1, size - 1) == b"\n"
 

@@ -1,9 +1,9 @@
-"""Point: what one configuration of a case costs, and how far it is from the reference."""
+"""Point: error and cost of one configuration of a case."""
 
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import inf, isfinite
 from pathlib import Path
 from statistics import median
@@ -11,31 +11,37 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import attrs
+from attrs.converters import optional
 
 from solidsph.costs.process import peak_memory
 from solidsph.errors import SolidsphError
+from solidsph.run.outcome import FINISHED
 from solidsph.studies.case import Case
-from solidsph.studies.case_run import FINISHED, opened, run_scenes
-from solidsph.studies.varied import varied
+from solidsph.studies.case_run import open_records, run_scenes
+from solidsph.studies.variant import with_settings
+
+
+def _floats(values: Iterable[float]) -> tuple[float, ...]:
+    return tuple(map(float, values))
 
 
 @attrs.frozen
 class Point:
-    """Error and cost of one configuration. Its costs but for time and memory hang on no machine."""
+    """Error and cost of one configuration. All but time and memory are machine-independent."""
 
-    settings: Mapping[str, Any]  # what differs from the case's own parameters
-    error: float  # relative to the reference [-]; infinite if the run failed
-    outcome: str = FINISHED  # or why it failed
-    quantity: str = ""  # what the error is of
-    value: float | None = None  # what was measured of it
-    reference: float | None = None  # and what it should be; None if the error is all there is
-    spacing: float = inf  # of the particles [m]
-    particles: int = 0
-    steps: int = 0
-    pair_evaluations: int = 0  # pairs visited in all evaluations, those of effects included
-    bytes_touched: int = 0  # that all evaluations must move at least
-    seconds: Sequence[float] = (inf,)  # wall time of every repeat [s]
-    peak_memory: int = 0  # largest of a whole process [bytes]
+    settings: Mapping[str, Any]  # parameters that differ from the case's own
+    error: float = attrs.field(converter=float)  # relative [-]; infinite if the run failed
+    outcome: str = attrs.field(default=FINISHED, converter=str)  # or the reason of the failure
+    quantity: str = attrs.field(default="", converter=str)  # that the error is of
+    value: float | None = attrs.field(default=None, converter=optional(float))  # measured
+    reference: float | None = attrs.field(default=None, converter=optional(float))
+    spacing: float = attrs.field(default=inf, converter=float)  # of the particles [m]
+    particles: int = attrs.field(default=0, converter=int)
+    steps: int = attrs.field(default=0, converter=int)
+    pair_evaluations: int = attrs.field(default=0, converter=int)  # those of effects included
+    bytes_touched: int = attrs.field(default=0, converter=int)  # in all evaluations, at least
+    seconds: Sequence[float] = attrs.field(default=(inf,), converter=_floats)  # of repeats [s]
+    peak_memory: int = attrs.field(default=0, converter=int)  # of the largest process [bytes]
 
     @property
     def time(self) -> float:
@@ -44,28 +50,32 @@ class Point:
 
     @property
     def finished(self) -> bool:
-        """Whether it has an error to speak of."""
+        """Whether the run finished with a finite error."""
         return self.outcome == FINISHED and isfinite(self.error)
 
     def label(self) -> str:
-        """Its settings in one line."""
-        return ", ".join(f"{name} {shown(value)}" for name, value in self.settings.items())
+        """Settings in one line."""
+        return label(self.settings)
+
+    def brief(self) -> str:
+        """Settings, error and time in one line."""
+        return f"{self.label()}: {100.0 * self.error:.2g} % in {self.time:.2g} s"
 
 
-def measured(case: Case, settings: Mapping[str, Any]) -> Point:
-    """Run `case` with these settings once, in this process, in a folder that is then removed.
+def run_point(case: Case, settings: Mapping[str, Any]) -> Point:
+    """Run `case` with these settings once, in this process and a temporary folder.
 
-    A run that goes wrong is a point too: its error is infinite.
+    A failed run is a point with an infinite error.
     """
     begun = clock.perf_counter()
     try:
-        wanted = varied(case, settings)
+        variant = with_settings(case, settings)
         with TemporaryDirectory() as folder:
-            runs = run_scenes(wanted, Path(folder))
+            runs = run_scenes(variant, Path(folder))
             seconds = clock.perf_counter() - begun
-            with opened(runs) as records:
-                headline = wanted.accuracy(wanted.measure(records))
-            if not runs:  # then to measure is all there is to do
+            with open_records(runs) as records:
+                headline = variant.accuracy(variant.measure(records))
+            if not runs:  # the measurement is all the work
                 seconds = clock.perf_counter() - begun
         failed = [run.outcome for run in runs if run.outcome != FINISHED]
         return Point(
@@ -75,7 +85,7 @@ def measured(case: Case, settings: Mapping[str, Any]) -> Point:
             quantity=headline.quantity,
             value=headline.value,
             reference=headline.reference,
-            spacing=wanted.resolution,
+            spacing=variant.resolution,
             particles=sum(run.particles for run in runs),
             steps=sum(run.steps for run in runs),
             pair_evaluations=sum(run.pairs_visited * run.evaluations for run in runs),
@@ -87,15 +97,20 @@ def measured(case: Case, settings: Mapping[str, Any]) -> Point:
         return Point(dict(settings), inf, outcome=str(cause))
 
 
-def together(repeats: Sequence[Point]) -> Point:
+def merge_repeats(repeats: Sequence[Point]) -> Point:
     """One point of several runs of one configuration, which differ in time and memory only."""
     return attrs.evolve(
         repeats[0],
-        seconds=tuple(one for point in repeats for one in point.seconds),
+        seconds=[seconds for point in repeats for seconds in point.seconds],
         peak_memory=max(point.peak_memory for point in repeats),
     )
 
 
-def shown(value: Any) -> str:
-    """A setting as a person would write it."""
+def label(settings: Mapping[str, Any]) -> str:
+    """Names and values of settings in one line."""
+    return ", ".join(f"{name} {format_setting(value)}" for name, value in settings.items())
+
+
+def format_setting(value: Any) -> str:
+    """Value of a setting as text."""
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""Processes: tasks side by side on this machine, each in a process of its own."""
+"""Processes: parallel tasks on this machine, each in its own process."""
 
 from __future__ import annotations
 
@@ -11,24 +11,26 @@ import attrs
 
 from solidsph.errors import SceneError
 from solidsph.studies.fresh_process import FreshProcess
-from solidsph.studies.packing import heard, packed
 from solidsph.studies.runner import Outcomes, Runner
 from solidsph.studies.task import Task
+from solidsph.studies.task_lines import decode_outcome, encode_task
 
 
 @final
 @attrs.frozen
 class Processes(Runner):
-    """So many tasks at a time; a crash of one leaves the others alone."""
+    """Runs tasks in parallel; a crash of one does not affect the others."""
 
-    workers: int
+    workers: int  # tasks at a time
 
     def __attrs_post_init__(self) -> None:
         if self.workers < 1:
             raise SceneError(f"workers must be at least 1, got {self.workers}")
 
     def run(self, tasks: Sequence[Task]) -> Outcomes:
-        waiting = deque([(task, packed(task)) for task in tasks])  # refused before any begins
+        waiting = deque(
+            [(task, encode_task(task)) for task in tasks]
+        )  # refused before any of them begins
         running: dict[FreshProcess, Task] = {}
         with selectors.DefaultSelector() as ready:
             try:
@@ -46,7 +48,7 @@ class Processes(Runner):
                             reply = process.reply()
                             process.close()
                             del running[process]
-                            yield task, heard(reply, task)
+                            yield task, decode_outcome(reply, task)
             finally:
                 for process in running:
                     process.close()

@@ -1,8 +1,8 @@
-"""Receipts: what each effect of a run has taken, done and changed, found by leaving it out.
+"""Receipts: the cost, work and influence of each effect of a run, found by leaving it out.
 
-Time is that of steps of the scene as it is, with and without the effect, in turns. What it changes
-is found at reduced size, where a run without each effect is affordable: fewer particles, and a
-shorter duration if it is long. Runs with and without it make the same steps.
+The cost is that of steps of the scene itself, with and without the effect in turns. The influence
+is found at reduced size, where a run without each effect is affordable: with fewer particles, and
+for a shorter duration if it is long. Runs with and without the effect make the same steps.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import tempfile
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
@@ -27,6 +28,7 @@ from solidsph.model.particles import State
 from solidsph.registry.construct import construct
 from solidsph.results.record import Record
 from solidsph.run.energy import RESIDUAL
+from solidsph.run.outcome import FINISHED
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import BodyScene
 from solidsph.simulation import Simulation
@@ -35,38 +37,41 @@ from solidsph.studies.case import Case
 LARGEST = "largest displacement [m]"
 
 COARSER = 2.0
-"""Times the spacing, of the runs in which effects are left out."""
+"""Spacing of the runs without an effect, over that of the scene."""
 
-# Particles along the shortest side of a body below which it is made no coarser.
+# A body keeps at least this many particles along its shortest side.
 _FEWEST = 3.0
 
-# What a reduced run may take, and what a step and a pair of it take, about [s].
+# Time that a reduced run may take, and about what a step and a pair of it take [s].
 _BUDGET, _STEP, _PAIR = 20.0, 1e-4, 25e-9
 
-# Of the timing: rounds, and how long a sample of each is at least [s].
+# Rounds of timing, and the shortest sample in each [s].
 _ROUNDS, _SAMPLE = 7, 0.03
 
-# Columns of a history that never leave this part of the largest one of their unit are rounding.
+# Columns of a history below this part of the largest one of their unit are rounding.
 _ROUNDING = 1e-9
 
+# How the histories of works are called, and their unit.
+_WORK, _JOULE = "work of ", " [J]"
+
 Series: TypeAlias = Mapping[str, Array]
-"""Quantities over the outputs of a run, each (steps,)."""
+"""Quantities at the outputs of a run, each (outputs,)."""
 
 
 @attrs.frozen
 class Receipt:
-    """Of one effect."""
+    """Cost and influence of one effect."""
 
     label: str
-    share: float | None  # of the time of steps [-]; None where nothing is stepped
-    work: float | None  # that its account has done [J]; None where there is no run with it
-    acted: bool  # whether its account or any quantity shows it at all
+    share: float | None  # of the time of steps [-]; None for an equilibrium
+    work: float | None  # done by its account [J]; None without a run
+    acted: bool  # whether its account or any quantity shows it
     changes: Mapping[str, float]  # by quantity, over the largest value with it [-]
     outcome: str  # of the run without it: "finished", or how it failed
 
     @property
     def line(self) -> str:
-        """As a sentence."""
+        """Summary in one line."""
         time = "" if self.share is None else f"{percent(max(0.0, self.share))} of the time, "
         if self.outcome != FINISHED:
             return f"{self.label}: {time}needed: without it the run {self.outcome}"
@@ -75,22 +80,25 @@ class Receipt:
         name = next(iter(self.changes), None)
         if name is None:
             return f"{self.label}: {time}acted"
-        what = name.partition("=")[0] if "@" in name else name.partition(" [")[0]
-        return f"{self.label}: {time}changed the {what} by {percent(self.changes[name])}"
-
-
-FINISHED = "finished"
+        return (
+            f"{self.label}: {time}changed the {short_name(name)} by {percent(self.changes[name])}"
+        )
 
 
 def percent(part: float) -> str:
-    """As a person reads it."""
+    """A part of one in per cent, rounded for reading."""
     value = 100.0 * part
     return f"{value:.0f} %" if abs(value) >= 10.0 else f"{value:.2g} %"
 
 
+def short_name(name: str) -> str:
+    """A quantity without its unit or its place."""
+    return name.partition("=" if "@" in name else " [")[0]
+
+
 @attrs.frozen
 class Receipts:
-    """Of a scene."""
+    """Receipts of a scene."""
 
     each: Sequence[Receipt]
     coarser: float  # spacing of the runs without effects, over that of the scene
@@ -102,8 +110,8 @@ class Receipts:
 @attrs.frozen
 class _Run:
     outcome: str
-    series: Series
-    work: Mapping[str, float]
+    series: Series = attrs.field(factory=dict)
+    work: Mapping[str, float] = attrs.field(factory=dict)
 
 
 def receipts(
@@ -113,58 +121,76 @@ def receipts(
     of: Sequence[str] = (),
     coarser: float = COARSER,
 ) -> Receipts:
-    """What the effects of a scene have taken and changed.
+    """Receipts of the effects of a scene.
 
     Args:
         simulation: the scene, built.
-        end: the last state of its run, from which steps are timed; the first one by default.
-        of: quantities to add, each as `quantity` reads it.
-        coarser: the spacing of runs without an effect, over the scene's.
+        end: last state of its run, from which steps are timed; the first one by default.
+        of: further quantities, each as `quantity` reads it.
+        coarser: spacing of the runs without an effect, over that of the scene.
 
     Raises:
-        SceneError: a quantity is not understood.
+        SceneError: a quantity is of neither form.
     """
-    for one in of:
-        quantity(one)
+    for text in of:
+        quantity(text)
     with tempfile.TemporaryDirectory() as folder:
         for factor in (coarser, 1.0):
             small = reduced(simulation.scene, factor)
             whole = Simulation.builder(small).build()
-            base = _carried_out(whole, Path(folder) / "with.h5", of)
+            base = _run(whole, Path(folder) / "with.h5", of)
             if base.outcome == FINISHED:
-                break  # else the scene does not stand being coarser
+                break  # otherwise the scene needs its full resolution
         shares = measured_shares(simulation, end)
         each = []
         for label in simulation.effects:
-            less = _carried_out(without(whole, label), Path(folder) / "without.h5", of)
+            less = _run(without(whole, label), Path(folder) / "without.h5", of)
             each.append(_receipt(label, shares.get(label), base, less))
-    factor = _coarsening(simulation.scene, small)
+    factor = max(
+        small.bodies[name].spacing / body.spacing for name, body in simulation.scene.bodies.items()
+    )
     return Receipts(each, factor, small.duration, whole.particles.count, base.outcome)
 
 
-def case_changes(case: Case, coarser: float = COARSER) -> Mapping[str, Mapping[str, float]]:
-    """By effect and quantity, how much what a case measures changes without it [-].
+def _receipt(label: str, share: float | None, base: _Run, less: _Run) -> Receipt:
+    changes = {}
+    for name, values in base.series.items():
+        if name.startswith(f"{label} "):
+            continue  # reported by the effect itself
+        other = less.series.get(name, np.zeros_like(values))  # absent if it is only rounding
+        both = min(len(values), len(other))
+        scale = float(np.abs(values[:both]).max(initial=0.0))
+        apart = float(np.abs(values[:both] - other[:both]).max(initial=0.0))
+        changes[name] = apart / scale if scale > 0.0 else float(apart > 0.0)
+    work = base.work.get(label)
+    outcome = less.outcome if base.outcome == FINISHED else FINISHED
+    acted = bool(work) or any(change > 0.0 for change in changes.values())
+    return Receipt(label, share, work, acted, changes, outcome)
 
-    Empty where the case cannot measure its scenes at reduced size.
+
+def case_changes(case: Case, coarser: float = COARSER) -> Mapping[str, Mapping[str, float]]:
+    """Relative change of every measurement of a case without an effect, by effect and quantity [-].
+
+    Empty if the case cannot measure its scenes at reduced size.
     """
     scenes = {name: reduced(scene, coarser) for name, scene in case.scenes().items()}
     built = {name: Simulation.builder(scene).build() for name, scene in scenes.items()}
-    labels = dict.fromkeys(label for one in built.values() for label in one.effects)
+    labels = dict.fromkeys(label for simulation in built.values() for label in simulation.effects)
     if not labels:
         return {}
     with tempfile.TemporaryDirectory() as folder:
         paths = {name: Path(folder) / f"{name}.h5" for name in built}
         for name, simulation in built.items():
-            _carried_out(simulation, paths[name], ())
-        base = _measured(case, paths)
+            _run(simulation, paths[name], ())
+        base = _measurements(case, paths)
         changes: dict[str, Mapping[str, float]] = {}
         for label in labels:
             others = dict(paths)
             for name, simulation in built.items():
                 if label in simulation.effects:
                     others[name] = Path(folder) / f"{name}-without.h5"
-                    _carried_out(without(simulation, label), others[name], ())
-            less = _measured(case, others)
+                    _run(without(simulation, label), others[name], ())
+            less = _measurements(case, others)
             changes[label] = {
                 name: abs(less[name] - value) / (abs(value) or 1.0)
                 for name, value in base.items()
@@ -173,7 +199,7 @@ def case_changes(case: Case, coarser: float = COARSER) -> Mapping[str, Mapping[s
     return changes
 
 
-def _measured(case: Case, paths: Mapping[str, Path]) -> Mapping[str, float]:
+def _measurements(case: Case, paths: Mapping[str, Path]) -> Mapping[str, float]:
     try:
         with ExitStack() as stack:
             records = {name: stack.enter_context(Record(path)) for name, path in paths.items()}
@@ -187,24 +213,24 @@ def measured_shares(
     end: State | None = None,
     ticks: Callable[[], float] = clock.process_time,
 ) -> Mapping[str, float]:
-    """Of every effect, its part in the time of steps of the scene as it is [-].
+    """Share of every effect in the time of steps of the scene at full size [-].
 
-    Steps with and without it take turns, and of each the quickest sample counts: what else goes on
-    only ever adds. Shares below about 0.02 are within what is left of that.
+    Steps with and without it take turns, and the quickest sample of each counts, because other
+    load only adds time. The remaining noise is about 0.02.
 
     Args:
         simulation: the scene, built.
-        end: the state from which steps are timed; the first one by default.
-        ticks: the time [s]; that of the processor, which other programs change less.
+        end: state from which steps are timed; the first one by default.
+        ticks: clock [s]; by default that of the processor, which other programs disturb less.
     """
     if simulation.scene.statics is not None or not simulation.effects:
         return {}
     begin = simulation.start() if end is None else end
     variants = {"": simulation} | {name: without(simulation, name) for name in simulation.effects}
-    loops = {name: one.time_loop() for name, one in variants.items()}
+    loops = {name: variant.time_loop() for name, variant in variants.items()}
     counts = dict.fromkeys(loops, 1)
     for name, loop in loops.items():
-        loop.advance(begin, begin.step + 1)  # compiles, and makes what is made once
+        loop.advance(begin, begin.step + 1)  # compiles, and builds what is built once
         while _seconds(loop, begin, counts[name], ticks) < _SAMPLE and counts[name] < 10**6:
             counts[name] *= 2
     times: dict[str, list[float]] = {name: [] for name in loops}
@@ -217,18 +243,18 @@ def measured_shares(
 
 def _seconds(loop: TimeLoop, begin: State, count: int, ticks: Callable[[], float]) -> float:
     begun = ticks()
-    with suppress(StepError):  # without it the motion may fail
+    with suppress(StepError):  # without the effect the motion may fail
         loop.advance(begin, begin.step + count)
     return ticks() - begun
 
 
 def reduced(scene: Scene, coarser: float = COARSER) -> Scene:
-    """The scene at a coarser spacing, where it can be, and no longer than is affordable."""
+    """The scene at a coarser spacing, if it can be built so, and no longer than is affordable."""
     bodies = {name: _coarser(body, coarser) for name, body in scene.bodies.items()}
     small = attrs.evolve(scene, bodies=bodies, engine="matrix", time_step=None)
     try:
         built = Simulation.builder(small).build()
-    except BuildError:  # what is smaller than the coarser spacing matches nothing
+    except BuildError:  # a region smaller than the coarser spacing is empty
         small = attrs.evolve(scene, engine="matrix")
         built = Simulation.builder(small).build()
     if scene.statics is not None:
@@ -249,11 +275,7 @@ def _coarser(body: BodyScene, factor: float) -> BodyScene:
     return attrs.evolve(body, spacing=max(body.spacing, min(factor * body.spacing, most)))
 
 
-def _coarsening(scene: Scene, small: Scene) -> float:
-    return max(small.bodies[name].spacing / body.spacing for name, body in scene.bodies.items())
-
-
-def _carried_out(simulation: Simulation, path: Path, of: Sequence[str]) -> _Run:
+def _run(simulation: Simulation, path: Path, of: Sequence[str]) -> _Run:
     outcome = FINISHED
     try:
         simulation.run(record=path)
@@ -264,20 +286,20 @@ def _carried_out(simulation: Simulation, path: Path, of: Sequence[str]) -> _Run:
     except ConvergenceError as cause:
         outcome = f"finds no equilibrium beyond load factor {cause.load_factor:g}"
     if not path.exists():
-        return _Run(outcome, {}, {})
+        return _Run(outcome)
     with Record(path) as record:
         work = {
-            name.removeprefix("work of ").removesuffix(" [J]"): float(values[-1])
+            name.removeprefix(_WORK).removesuffix(_JOULE): float(values[-1])
             for name, values in record.history.items()
-            if name.startswith("work of ")
+            if name.startswith(_WORK)
         }
         return _Run(outcome, dict(_series(record, of)), work)
 
 
 def _series(record: Record, of: Sequence[str]) -> Iterator[tuple[str, Array]]:
-    """What is asked for, the largest displacement, and the columns of the history."""
-    for one in of:
-        yield one, quantity(one)(record)
+    """Requested quantities, the largest displacement, and the columns of the history."""
+    for text in of:
+        yield text, quantity(text)(record)
     particles = record.particles
     real = ~particles.ghosts
     moved = [x[real] - particles.positions[real] for x in record.positions]
@@ -285,80 +307,55 @@ def _series(record: Record, of: Sequence[str]) -> Iterator[tuple[str, Array]]:
     columns = {
         name: np.asarray(values, dtype=np.float64)
         for name, values in record.history.items()
-        if not name.startswith("work of ") and name != RESIDUAL
+        if not name.startswith(_WORK) and name != RESIDUAL
     }
+    largest = {name: float(np.abs(column).max(initial=0.0)) for name, column in columns.items()}
     scale: dict[str, float] = {}
-    for name, values in columns.items():
+    for name, size in largest.items():
         unit = name.rpartition("[")[2]
-        scale[unit] = max(scale.get(unit, 0.0), float(np.abs(values).max(initial=0.0)))
-    for name, values in columns.items():
-        if np.abs(values).max(initial=0.0) > _ROUNDING * scale[name.rpartition("[")[2]]:
-            yield name, values
+        scale[unit] = max(scale.get(unit, 0.0), size)
+    for name, column in columns.items():
+        if largest[name] > _ROUNDING * scale[name.rpartition("[")[2]]:
+            yield name, column
 
 
-@attrs.frozen
-class _Displacement:
-    axis: int
-    point: tuple[float, ...]
-
-    def __call__(self, record: Record) -> Array:
-        X = record.particles.positions
-        if len(self.point) != X.shape[1] or self.axis >= X.shape[1]:
-            raise SceneError(
-                f"the point {list(self.point)} and {'xyz'[self.axis]} are not of {X.shape[1]} "
-                "dimensions; give one coordinate for each"
-            )
-        nearest = int(np.argmin(np.linalg.norm(X - self.point, axis=1)))
-        places = np.array([x[nearest, self.axis] for x in record.positions])
-        moved: Array = places - X[nearest, self.axis]
-        return moved
-
-
-@attrs.frozen
-class _Column:
-    name: str
-
-    def __call__(self, record: Record) -> Array:
-        for name, values in record.history.items():
-            if self.name in (name, name.partition(" [")[0]):
-                return np.asarray(values, dtype=np.float64)
+def _displacement(record: Record, axis: str, point: tuple[float, ...]) -> Array:
+    X = record.particles.positions
+    column = "xyz".index(axis)
+    if len(point) != X.shape[1] or column >= X.shape[1]:
         raise SceneError(
-            f"no column {self.name!r} in the history; there are {', '.join(record.history)}"
+            f"the point {list(point)} and {axis} are not of {X.shape[1]} dimensions; give one "
+            "coordinate for each"
         )
+    nearest = int(np.argmin(np.linalg.norm(X - point, axis=1)))
+    places = np.array([x[nearest, column] for x in record.positions])
+    moved: Array = places - X[nearest, column]
+    return moved
 
 
-def quantity(text: str) -> _Displacement | _Column:
+def _column(record: Record, wanted: str) -> Array:
+    for name, values in record.history.items():
+        if wanted in (name, name.partition(" [")[0]):
+            return np.asarray(values, dtype=np.float64)
+    raise SceneError(f"no column {wanted!r} in the history; there are {', '.join(record.history)}")
+
+
+def quantity(text: str) -> Callable[[Record], Array]:
     """`NAME=x@[X, Y]`, the displacement of the particle nearest to a point, or a history column.
 
     Raises:
-        SceneError: it is of neither form.
+        SceneError: the text is of neither form.
     """
     if "@" not in text:
-        return _Column(text)
-    found = re.fullmatch(r"[^=]+=\s*([xyz])\s*@\s*\[([^]]*)\]", text)
+        return partial(_column, wanted=text)
+    match = re.fullmatch(r"[^=]+=\s*([xyz])\s*@\s*\[([^]]*)\]", text)
     try:
-        if found is None:
+        if match is None:
             raise ValueError
-        point = tuple(float(one) for one in found[2].split(","))
+        point = tuple(float(number) for number in match[2].split(","))
     except ValueError:
         raise SceneError(
             f"--receipts-of {text!r} is not understood; write NAME=x@[0.35, 0.01], or the name of "
             "a column of the history"
         ) from None
-    return _Displacement("xyz".index(found[1]), point)
-
-
-def _receipt(label: str, share: float | None, base: _Run, less: _Run) -> Receipt:
-    changes = {}
-    for name, values in base.series.items():
-        if name.startswith(f"{label} "):
-            continue  # what the effect itself reports
-        other = less.series.get(name, np.zeros_like(values))  # missing is what rounding leaves
-        both = min(len(values), len(other))
-        scale = float(np.abs(values[:both]).max(initial=0.0))
-        apart = float(np.abs(values[:both] - other[:both]).max(initial=0.0))
-        changes[name] = apart / scale if scale > 0.0 else float(apart > 0.0)
-    work = base.work.get(label)
-    outcome = less.outcome if base.outcome == FINISHED else FINISHED
-    acted = bool(work) or any(change > 0.0 for change in changes.values())
-    return Receipt(label, share, work, acted, changes, outcome)
+    return partial(_displacement, axis=match[1], point=point)

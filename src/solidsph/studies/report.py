@@ -1,10 +1,10 @@
-"""A report: a sweep as one page of HTML that needs nothing but a browser."""
+"""Report of a sweep: one HTML page that needs only a browser."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from importlib.metadata import version
 from importlib.resources import files
@@ -16,24 +16,26 @@ from typing import Any, final
 import attrs
 
 from solidsph.errors import SolidsphError
+from solidsph.run.outcome import FINISHED
 from solidsph.studies.case import Case
-from solidsph.studies.case_run import FINISHED
-from solidsph.studies.frontier import Frontier
-from solidsph.studies.point import Point, shown
+from solidsph.studies.frontier import AS_IT_IS, Frontier
+from solidsph.studies.point import Point, format_setting
 from solidsph.studies.report_figures import EXPENSES, TIME, Figures, drawable, library
-from solidsph.studies.varied import varied
+from solidsph.studies.variant import with_settings
+
+_NUMBER = "no."  # heading of the numbers of configurations
 
 
 def write_report(made: Frontier, case: Case, path: Path, *, title: str | None = None) -> None:
-    """Write a page with the plots, a table of all points and the scenes of each.
+    """Write a page with plots, a table of all points and the scenes of each.
 
-    It asks nothing of any network: Plotly's script is in it, about 5 MB.
+    It contains Plotly's script, about 5 MB, and needs no network.
 
     Args:
         made: a sweep over `case`.
-        case: whose scenes are shown.
-        path: of the page, an HTML file.
-        title: by default the case's.
+        case: its scenes are shown.
+        path: of the HTML file.
+        title: by default that of the case.
 
     Raises:
         SceneError: Plotly is not installed.
@@ -44,30 +46,17 @@ def write_report(made: Frontier, case: Case, path: Path, *, title: str | None = 
 
 
 @attrs.frozen
-class Column:
-    """Of the table: a heading, and a cell of every point."""
-
-    heading: str
-    cells: Sequence[Cell]
-
-    @property
-    def numeric(self) -> bool:
-        """Whether it holds numbers only."""
-        return all(cell.number is not None or not cell.text for cell in self.cells)
-
-
-@attrs.frozen
-class Cell:
-    """What is read, and the number it is sorted by, if it is one."""
+class _Cell:
+    """Text of a cell, and the number that it is sorted by."""
 
     text: str
     number: float | None = None
 
     @classmethod
-    def of(cls, value: Any, form: str = ".3g") -> Cell:
-        """A number in this form, none if it is not finite, or else words."""
+    def of(cls, value: Any, form: str) -> _Cell:
+        """Cell of a number in this format, empty if it is not finite, or of any other value."""
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            return cls(shown(value))
+            return cls(format_setting(value))
         if not isfinite(value):
             return cls("")
         return cls(str(value) if isinstance(value, int) else format(value, form), float(value))
@@ -84,13 +73,13 @@ class _Page:
         folder = files("solidsph.studies") / "report_page"
         parts = {name: (folder / name).read_text("utf-8") for name in ("page.css", "page.js")}
         points, finished = len(self.made), len(self.made.finished())
-        quantity = next((p.quantity for p in self.made.points if p.quantity), "")
+        quantity = self.made.quantity
         return Template((folder / "page.html").read_text("utf-8")).substitute(
             title=escape(self.title or self.case.title),
             sentence=escape(self.made.sentence()),
             facts=escape(
                 f"{points} configurations, {finished} finished"
-                + (f"; the error is that of: {quantity}" if quantity else "")
+                + (f"; error of: {quantity}" if quantity else "")
                 + f"; reference: {self.case.source}"
             ),
             version=escape(version("solidsph")),
@@ -110,7 +99,7 @@ class _Page:
         return {
             "expenses": [
                 {
-                    "front": figures.numbers(self.made.front(expense.of)),
+                    "front": self.made.numbers(self.made.front(expense.of)),
                     "figures": [figures.against(expense), figures.against_spacing(expense)],
                 }
                 if expense.fits(self.made)
@@ -119,7 +108,7 @@ class _Page:
             ],
             "points": [
                 {
-                    "label": point.label() or "as it is",
+                    "label": point.label() or AS_IT_IS,
                     "brief": _brief(point),
                     "places": _places(point),
                     **self._scenes(number, point),
@@ -129,20 +118,24 @@ class _Page:
         }
 
     def _scenes(self, number: int, point: Point) -> Mapping[str, Any]:
-        """Of one point: texts of TOML with names for files; or why there is none."""
+        """Scenes of one point as TOML with file names, or the reason why there is none."""
         try:
-            scenes = varied(self.case, point.settings).scenes()
+            scenes = with_settings(self.case, point.settings).scenes()
         except SolidsphError as cause:
             return {"scenes": [], "note": f"There is no scene: {cause}"}
         if not scenes:
-            return {"scenes": [], "note": "This case runs no scene: it computes its result itself."}
+            return {
+                "scenes": [],
+                "note": "This case runs no scene: it computes its result.",
+            }
         written = []
         for name, scene in scenes.items():
-            one = {"name": name, "file": f"{re.sub(r'[^A-Za-z0-9_-]+', '-', name)}-{number}.toml"}
+            file = f"{re.sub(r'[^A-Za-z0-9_-]+', '-', name)}-{number}.toml"
             try:
-                written.append({**one, "toml": scene.to_toml()})
+                content = {"toml": scene.to_toml()}
             except SolidsphError as cause:
-                written.append({**one, "why": f"This scene cannot be written: {cause}"})
+                content = {"why": f"This scene cannot be written: {cause}"}
+            written.append({"name": name, "file": file, **content})
         return {"scenes": written, "note": ""}
 
     def _choices(self) -> Iterator[str]:
@@ -160,62 +153,60 @@ class _Page:
         if not exact:
             return ""
         return (
-            f"<p>{len(exact)} of them have an error of exactly 0 and are in the table only: a "
-            "logarithmic axis has no place for them.</p>"
+            f"<p>{len(exact)} of them have an error of exactly 0, which a logarithmic axis cannot "
+            "show; they are only in the table.</p>"
         )
 
     def _table(self) -> str:
-        columns = self._columns()
+        columns = [(heading, cells, _class(cells)) for heading, cells in self._columns()]
         headings = "".join(
-            f'<th scope="col"{_numeric(c)}><button type="button">{escape(c.heading)}</button></th>'
-            for c in columns
+            f'<th scope="col"{kind}><button type="button">{escape(heading)}</button></th>'
+            for heading, _, kind in columns
         )
-        front = self._front()
+        front = self.made.numbers(self.made.front())
         rows = []
         for number in range(len(self.made)):
             cells = "".join(
-                _td(column, column.cells[number], number if place == 0 else None)
-                for place, column in enumerate(columns)
+                _td(cells[number], kind, with_button=heading == _NUMBER)
+                for heading, cells, kind in columns
             )
             mark = ' class="front"' if number in front else ""
             rows.append(f'<tr data-point="{number}"{mark}>{cells}</tr>')
         body = "\n".join(rows)
         return f"<thead><tr>{headings}</tr></thead>\n<tbody>\n{body}\n</tbody>"
 
-    def _columns(self) -> Sequence[Column]:
-        points, front = self.made.points, self._front()
+    def _columns(self) -> Sequence[tuple[str, Sequence[_Cell]]]:
+        """Headings, which a setting may repeat, and cells of every point."""
+        points, front = self.made.points, self.made.numbers(self.made.front())
         names = dict.fromkeys(name for point in points for name in point.settings)
         several = any(len(point.seconds) > 1 for point in points)
         return [
-            _column("no.", list(range(1, len(points) + 1))),
-            _column("front", ["front" if n in front else "" for n in range(len(points))]),
-            *(_column(name, [p.settings.get(name, "") for p in points], "g") for name in names),
-            _column("error [%]", [100.0 * p.error for p in points]),
-            _column("trusted [%]", [100.0 * self.made.trusted(p) for p in points]),
-            _column("time [s]", [p.time for p in points]),
-            *([Column("repeats [s]", [_repeats(p) for p in points])] if several else []),
-            _column("spacing [m]", [p.spacing for p in points]),
-            _column("particles", [p.particles for p in points]),
-            _column("steps", [p.steps for p in points]),
-            _column("pair evaluations", [float(p.pair_evaluations) for p in points], ".4g"),
-            _column("bytes touched", [float(p.bytes_touched) for p in points], ".4g"),
-            _column("memory [MiB]", [p.peak_memory / 2**20 for p in points], ".4g"),
-            _column("outcome", [_outcome(p).splitlines()[0] for p in points]),
+            (_NUMBER, _cells(range(1, len(points) + 1))),
+            ("front", _cells("front" if n in front else "" for n in range(len(points)))),
+            *((name, _cells((p.settings.get(name, "") for p in points), "g")) for name in names),
+            ("error [%]", _cells(100.0 * p.error for p in points)),
+            ("trusted [%]", _cells(100.0 * self.made.trusted(p) for p in points)),
+            ("time [s]", _cells(p.time for p in points)),
+            *([("repeats [s]", [_repeats(p) for p in points])] if several else []),
+            ("spacing [m]", _cells(p.spacing for p in points)),
+            ("particles", _cells(p.particles for p in points)),
+            ("steps", _cells(p.steps for p in points)),
+            ("pair evaluations", _cells((float(p.pair_evaluations) for p in points), ".4g")),
+            ("bytes touched", _cells((float(p.bytes_touched) for p in points), ".4g")),
+            ("memory [MiB]", _cells((p.peak_memory / 2**20 for p in points), ".4g")),
+            ("outcome", _cells(_outcome(p).splitlines()[0] for p in points)),
         ]
-
-    def _front(self) -> set[int]:
-        return set(Figures(self.made).numbers(self.made.front()))
 
     def _orders(self) -> str:
         orders = self.made.orders()
         if not orders:
             return "<p>No scheme has two spacings that finished.</p>"
         rows = "\n".join(
-            f'<tr><th scope="row">{escape(_scheme(one.settings))}</th>'
-            f'<td class="number">{_order(one.in_spacing)}</td>'
-            f'<td class="number">{_order(one.in_time)}</td>'
-            f"<td>{'no' if one.crosses else 'yes'}</td></tr>"
-            for one in orders
+            f'<tr><th scope="row">{escape(order.label)}</th>'
+            f'<td class="number">{_order(order.in_spacing)}</td>'
+            f'<td class="number">{_order(order.in_time)}</td>'
+            f"<td>{'no' if order.crosses else 'yes'}</td></tr>"
+            for order in orders
         )
         return (
             '<div class="wide" tabindex="0" role="region" aria-label="orders"><table id="orders">\n'
@@ -229,32 +220,34 @@ class _Page:
         if not failed:
             return "<p>Every configuration finished.</p>"
         items = "\n".join(
-            f"<li>{n}, {escape(p.label() or 'as it is')}: <pre>{escape(_outcome(p))}</pre></li>"
+            f"<li>{n}, {escape(p.label() or AS_IT_IS)}: <pre>{escape(_outcome(p))}</pre></li>"
             for n, p in failed
         )
         return f'<ul id="failures">\n{items}\n</ul>'
 
 
-def _column(heading: str, values: Sequence[Any], form: str = ".3g") -> Column:
-    return Column(heading, [Cell.of(value, form) for value in values])
+def _cells(values: Iterable[Any], form: str = ".3g") -> Sequence[_Cell]:
+    return [_Cell.of(value, form) for value in values]
 
 
-def _repeats(point: Point) -> Cell:
-    """From the quickest to the slowest, sorted by the quickest."""
+def _repeats(point: Point) -> _Cell:
+    """Range of repeats, sorted by the quickest."""
     quickest, slowest = min(point.seconds), max(point.seconds)
-    return Cell(f"{quickest:.3g} to {slowest:.3g}", quickest) if isfinite(slowest) else Cell("")
+    return _Cell(f"{quickest:.3g} to {slowest:.3g}", quickest) if isfinite(slowest) else _Cell("")
 
 
-def _td(column: Column, cell: Cell, number: int | None) -> str:
+def _class(cells: Sequence[_Cell]) -> str:
+    """Attribute of the cells of a column: whether all are numbers or empty."""
+    numeric = all(cell.number is not None or not cell.text for cell in cells)
+    return ' class="number"' if numeric else ""
+
+
+def _td(cell: _Cell, attribute: str, *, with_button: bool) -> str:
     sort = "" if cell.number is None else f' data-number="{cell.number!r}"'
     text = escape(cell.text)
-    if number is not None:  # what the keyboard comes to, and says whose scene it shows
+    if with_button:  # reached by the keyboard; its label says whose scene it shows
         text = f'<button type="button" aria-label="scene of configuration {text}">{text}</button>'
-    return f"<td{_numeric(column)}{sort}>{text}</td>"
-
-
-def _numeric(column: Column) -> str:
-    return ' class="number"' if column.numeric else ""
+    return f"<td{attribute}{sort}>{text}</td>"
 
 
 def _outcome(point: Point) -> str:
@@ -270,7 +263,7 @@ def _brief(point: Point) -> str:
 
 
 def _places(point: Point) -> Mapping[str, Any] | None:
-    """Where a point is drawn, across for each cost; None if it is not."""
+    """Coordinates of a point for each cost; None if it is not drawn."""
     if not drawable(point):
         return None
     return {
@@ -280,15 +273,11 @@ def _places(point: Point) -> Mapping[str, Any] | None:
     }
 
 
-def _scheme(settings: Mapping[str, Any]) -> str:
-    return ", ".join(f"{name} {shown(value)}" for name, value in settings.items()) or "as it is"
-
-
 def _order(value: float) -> str:
     return f"{value:.2f}" if isfinite(value) else "none"
 
 
 def _embedded(data: Mapping[str, Any]) -> str:
-    """`data` as JSON that ends no element of HTML early, whatever texts it holds."""
+    """`data` as JSON whose texts cannot end an HTML element."""
     text = json.dumps(data, allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

@@ -1,7 +1,7 @@
-"""The interactive figures of a report: error against a cost, and against spacing.
+"""Interactive figures of a report: error against a cost, and against spacing.
 
-They are made as data, which Plotly draws in the browser; text in them is escaped, because Plotly
-takes tags of HTML in its labels.
+They are data that Plotly draws in the browser. Text in them is escaped, because Plotly interprets
+HTML tags in labels.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import json
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib import import_module
+from itertools import cycle
 from math import inf, isfinite
 from typing import Any
 
@@ -17,9 +18,9 @@ import attrs
 
 from solidsph.errors import SceneError
 from solidsph.studies.frontier import Cost, Frontier
-from solidsph.studies.point import Point, shown
+from solidsph.studies.point import Point, format_setting
 
-# Told apart without colour, and by shape before fill.
+# Distinct without colour, by shape before fill.
 _SYMBOLS = (
     *("circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "star"),
     *("hexagon", "pentagon", "circle-open", "square-open", "diamond-open", "triangle-up-open"),
@@ -30,7 +31,7 @@ _GREY, _BLACK = "#a6a6a6", "#000000"
 
 @attrs.frozen
 class Expense:
-    """A cost that error can be held against."""
+    """A cost to plot errors against."""
 
     name: str
     unit: str
@@ -38,11 +39,11 @@ class Expense:
 
     @property
     def heading(self) -> str:
-        """Of its axis."""
+        """Title of its axis."""
         return f"{self.name} [{self.unit}]"
 
     def fits(self, frontier: Frontier) -> bool:
-        """Whether a logarithmic axis has a place for it, whatever the point."""
+        """Whether a logarithmic axis can show it for every finished point."""
         return all(0.0 < self.of(point) < inf for point in frontier.finished())
 
 
@@ -55,7 +56,7 @@ EXPENSES = (
 
 
 def library() -> str:
-    """Plotly's own script, in full: it is written into the page.
+    """Plotly's script, in full, to be written into the page.
 
     Raises:
         SceneError: Plotly is not installed.
@@ -65,20 +66,20 @@ def library() -> str:
 
 
 def drawable(point: Point) -> bool:
-    """Whether a point has an error that a logarithmic axis has a place for."""
+    """Whether a logarithmic axis can show the error of a point."""
     return point.finished and point.error > 0.0
 
 
 @attrs.frozen
 class Figures:
-    """Of one sweep: figures as tables of data, in which `customdata` is the number of a point."""
+    """Figures of a sweep as data, in which `customdata` is the number of a point."""
 
     frontier: Frontier
 
     def against(self, expense: Expense) -> Mapping[str, Any]:
-        """The error to be trusted against a cost: the front in black with a line, the rest grey."""
+        """Trusted error against a cost: the front in black with a line, the rest in grey."""
         front = [point for point in self.frontier.front(expense.of) if drawable(point)]
-        known = set(self.numbers(front))
+        known = self.frontier.numbers(front)
         others = [
             point
             for number, point in enumerate(self.frontier.points)
@@ -115,7 +116,7 @@ class Figures:
         )
 
     def against_spacing(self, expense: Expense) -> Mapping[str, Any]:
-        """Error against spacing, a line for every scheme; in black those on the front."""
+        """Error against spacing, a line for every scheme; those on the front in black."""
         symbols = self._symbols(expense)
         traces: list[dict[str, Any]] = []
         for scheme, points in self.frontier.schemes().items():
@@ -136,32 +137,37 @@ class Figures:
                     "name": _words(scheme) if on_front else "schemes off the front",
                     "legendgroup": _words(scheme) if on_front else "others",
                     "showlegend": on_front or first_grey,
-                    **self._spoken(there),
+                    **self._hover(there),
                 }
             )
-        order = _second_order(self.frontier.finished())
+        # Black is drawn over grey.
+        traces.sort(key=lambda trace: trace["line"]["color"], reverse=True)
+        if line := self.frontier.second_order():
+            traces.append(
+                {
+                    "x": line[0],
+                    "y": [100.0 * error for error in line[1]],
+                    "mode": "lines",
+                    "line": {"color": "#666666", "width": 1.0, "dash": "dot"},
+                    "name": "order 2",
+                    "hoverinfo": "skip",
+                }
+            )
         return self._figure(
-            # Black is drawn over grey.
-            [*sorted(traces, key=lambda t: t["line"]["color"], reverse=True), *order, _CHOSEN],
+            [*traces, _CHOSEN],
             "particle spacing [m]",
             "Error against spacing, by scheme",
         )
 
-    def numbers(self, points: Sequence[Point]) -> Sequence[int]:
-        """Places of these points in the sweep, by which the page knows them."""
-        places = {id(point): number for number, point in enumerate(self.frontier.points)}
-        return [places[id(point)] for point in points]
-
     def _symbols(self, expense: Expense) -> Mapping[str, str]:
-        """A mark for every scheme on the front; a scheme on several fronts keeps its own."""
-        all_marks = self._marks()
-        wanted = {self.frontier.scheme(point) for point in self.frontier.front(expense.of)}
-        return {scheme: mark for scheme, mark in all_marks.items() if scheme in wanted}
-
-    def _marks(self) -> Mapping[str, str]:
-        fronts = [self.frontier.front(expense.of) for expense in EXPENSES]
-        schemes = dict.fromkeys(self.frontier.scheme(p) for front in fronts for p in front)
-        return {scheme: _SYMBOLS[i % len(_SYMBOLS)] for i, scheme in enumerate(schemes)}
+        """Symbol of every scheme on a front; a scheme on several fronts has the same on all."""
+        fronts = {
+            other.name: [self.frontier.scheme(point) for point in self.frontier.front(other.of)]
+            for other in EXPENSES
+        }
+        schemes = dict.fromkeys(scheme for front in fronts.values() for scheme in front)
+        symbols = zip(schemes, cycle(_SYMBOLS), strict=False)
+        return {scheme: mark for scheme, mark in symbols if scheme in fronts[expense.name]}
 
     def _dots(
         self, points: Sequence[Point], expense: Expense, name: str, **look: Any
@@ -173,26 +179,27 @@ class Figures:
             "mode": "markers",
             "name": name,
             "text": [
-                _words(shown(point.settings.get(self.frontier.refining, ""))) for point in points
+                _words(format_setting(point.settings.get(self.frontier.refining, "")))
+                for point in points
             ],
             **look,
             **({"error_x": _repeats(points, look["marker"]["color"])} if bars else {}),
-            **self._spoken(points),
+            **self._hover(points),
         }
 
-    def _spoken(self, points: Sequence[Point]) -> dict[str, Any]:
+    def _hover(self, points: Sequence[Point]) -> dict[str, Any]:
         return {
-            "customdata": self.numbers(points),
-            "hovertext": [spoken(point) for point in points],
+            "customdata": self.frontier.numbers(points),
+            "hovertext": [hover_text(point) for point in points],
             "hoverinfo": "text",
         }
 
     def _figure(self, traces: Sequence[Any], across: str, title: str) -> Mapping[str, Any]:
-        quantity = next((p.quantity for p in self.frontier.points if p.quantity), "result")
+        quantity = self.frontier.quantity or "result"
         axis = {
             "type": "log",
             "tickformat": "~g",
-            "nticks": 3,  # and so 1, 2 and 5 of each decade where there are two
+            "nticks": 3,  # which gives 1, 2 and 5 of each of two decades
             "gridcolor": "#e6e6e6",
             "linecolor": _BLACK,
             "showline": True,
@@ -218,7 +225,7 @@ class Figures:
         return made
 
 
-# Where the page rings the point that was chosen: it is empty until then.
+# Ring around the point chosen in the page; empty at first.
 _CHOSEN: Mapping[str, Any] = {
     "x": [],
     "y": [],
@@ -230,9 +237,9 @@ _CHOSEN: Mapping[str, Any] = {
 }
 
 
-def spoken(point: Point) -> str:
-    """All that is known of a point, a line each, as Plotly's labels take it."""
-    lines = [f"{name}: {shown(value)}" for name, value in point.settings.items()]
+def hover_text(point: Point) -> str:
+    """All data of a point, a line each, as a label of Plotly."""
+    lines = [f"{name}: {format_setting(value)}" for name, value in point.settings.items()]
     lines += [
         f"error: {100.0 * point.error:.3g} % of {point.quantity or 'the result'}",
         f"wall time: {_range(point)}",
@@ -246,17 +253,16 @@ def spoken(point: Point) -> str:
 
 
 def _range(point: Point) -> str:
-    said = f"{point.time:.3g} s"
-    if len(point.seconds) > 1:
-        said += (
-            f", from {min(point.seconds):.3g} to {max(point.seconds):.3g} s in "
-            f"{len(point.seconds)} repeats"
-        )
-    return said
+    if len(point.seconds) == 1:
+        return f"{point.time:.3g} s"
+    return (
+        f"{point.time:.3g} s, from {min(point.seconds):.3g} to {max(point.seconds):.3g} s in "
+        f"{len(point.seconds)} repeats"
+    )
 
 
 def _repeats(points: Sequence[Point], color: str) -> dict[str, Any]:
-    """Bars from the quickest repeat to the slowest."""
+    """Error bars from the quickest repeat to the slowest."""
     return {
         "type": "data",
         "symmetric": False,
@@ -268,27 +274,8 @@ def _repeats(points: Sequence[Point], color: str) -> dict[str, Any]:
     }
 
 
-def _second_order(points: Sequence[Point]) -> Sequence[Mapping[str, Any]]:
-    """What second order is, below all errors."""
-    errors = [100.0 * point.error for point in points if drawable(point)]
-    spacings = [point.spacing for point in points if isfinite(point.spacing)]
-    if not errors or not spacings or not 0.0 < min(spacings) < max(spacings):
-        return []
-    coarse, fine, least = max(spacings), min(spacings), 0.7 * min(errors)
-    return [
-        {
-            "x": [coarse, fine],
-            "y": [least * (coarse / fine) ** 2, least],
-            "mode": "lines",
-            "line": {"color": "#666666", "width": 1.0, "dash": "dot"},
-            "name": "order 2",
-            "hoverinfo": "skip",
-        }
-    ]
-
-
 def _words(text: str) -> str:
-    """`text` as Plotly takes it: it knows tags, and no name for a quotation mark."""
+    """`text` escaped for Plotly, which knows tags but no entity for a quotation mark."""
     return escape(text, quote=False)
 
 

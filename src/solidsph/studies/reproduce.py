@@ -1,4 +1,4 @@
-"""Reproducing a paper: every case that shows one of its figures, and all pictures on one sheet."""
+"""Reproduction of a paper: the cases that show its figures, and all pictures on one sheet."""
 
 from __future__ import annotations
 
@@ -22,41 +22,41 @@ _COLUMNS = 3  # of the contact sheet
 
 @attrs.frozen
 class Reproduction:
-    """What the cases made of the figures that were asked for."""
+    """Results of the cases that reproduce the chosen figures."""
 
     results: Mapping[str, CaseResult]  # by case
-    pictures: Sequence[Path]  # those of these figures, in their order
-    sheet: Path | None  # all of them at once; None if there is no picture
+    pictures: Sequence[Path]  # of these figures, in their order
+    sheet: Path | None  # all of them in one picture; None if there are none
 
     @property
     def passed(self) -> bool:
-        """Whether every measurement came out as its source predicts."""
+        """Whether every measurement is as its source predicts."""
         return all(result.passed for result in self.results.values())
 
 
 def figures() -> Mapping[str, str]:
-    """The case that reproduces each figure or passage of the paper, figures first.
+    """Case that reproduces each figure or passage of the paper, figures first.
 
     Raises:
         SceneError: two cases claim one figure.
     """
-    found: dict[str, str] = {}
+    cases: dict[str, str] = {}
     for name in registry.names("cases"):
         for figure in registry.load("cases", name).figures:
-            if figure in found:
+            if figure in cases:
                 raise SceneError(
-                    f"cases {found[figure]!r} and {name!r} both reproduce {figure!r}; uninstall one"
+                    f"cases {cases[figure]!r} and {name!r} both reproduce {figure!r}; uninstall one"
                 )
-            found[figure] = name
-    return dict(sorted(found.items(), key=lambda pair: _place(pair[0])))
+            cases[figure] = name
+    return dict(sorted(cases.items(), key=lambda pair: _place(pair[0])))
 
 
 def reproduce(wanted: Sequence[str], folder: Path, begin: Begin) -> Reproduction:
-    """Run every case that shows one of the `wanted` figures, or any figure if there are none.
+    """Run every case that shows one of the `wanted` figures, by default all.
 
     Args:
         wanted: names of figures or passages, such as "fig-11" or "section-6-viscosity".
-        folder: where each case gets a folder of its own.
+        folder: for a folder of each case.
         begin: as in `run_case`.
 
     Raises:

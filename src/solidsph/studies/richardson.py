@@ -1,4 +1,4 @@
-"""Error bars where there is no reference: Richardson's extrapolation over three spacings."""
+"""Error bars without a reference, by Richardson extrapolation over three spacings."""
 
 from __future__ import annotations
 
@@ -11,51 +11,51 @@ from scipy.optimize import brentq
 
 _SAFETY = 1.25  # of the grid convergence index over three spacings (Roache 1994)
 
-# Observed orders beyond which powers of the spacing do not describe what is seen.
+# Range of observed orders in which a power of the spacing describes the results.
 _LOWEST, _HIGHEST = 0.5, 6.0
 
 
 @attrs.frozen
 class Extrapolation:
-    """What a sequence of results tends to, and how far the finest of them is from there."""
+    """Limit of a sequence of results, and the error bar of the finest."""
 
-    order: float  # observed, p of value - limit ~ spacing^p; nan if there is none
-    limit: float  # of spacing 0
-    index: float  # grid convergence index: the bar about the finest value, relative [-]
-    warning: str  # why not to trust it; empty if nothing speaks against it
+    order: float  # observed p of value - limit ~ spacing^p; nan if there is none
+    limit: float  # at spacing 0
+    index: float  # grid convergence index: relative error bar of the finest value [-]
+    warning: str  # reason not to trust it; empty if there is none
 
     @property
     def trusted(self) -> bool:
-        """Whether the sequence looks as it must in the asymptotic range."""
+        """Whether the sequence appears to be in the asymptotic range."""
         return not self.warning
 
 
-def extrapolated(spacings: Sequence[float], values: Sequence[float]) -> Extrapolation:
-    """Of the three finest of some results. Celik et al. (2008), J. Fluids Eng. 130, 078001.
+def extrapolate(spacings: Sequence[float], values: Sequence[float]) -> Extrapolation:
+    """Extrapolate the three finest results: Celik et al. (2008), J. Fluids Eng. 130, 078001.
 
-    With four or more results the order of the coarser three is compared with it.
+    With four or more results, the order of the preceding three must agree.
 
     Args:
         spacings: (k,) from coarse to fine [m], k >= 3.
         values: (k,) of one quantity.
 
     Raises:
-        ValueError: fewer than three, or spacings that do not fall.
+        ValueError: there are fewer than three, or spacings do not fall.
     """
     if len(spacings) != len(values) or len(spacings) < 3:
-        raise ValueError(f"three results at least are needed, got {len(values)}")
+        raise ValueError(f"at least three results are needed, got {len(values)}")
     if any(fine >= coarse for coarse, fine in pairwise(spacings)):
         raise ValueError(f"spacings must fall from coarse to fine, got {list(spacings)}")
-    found = _of_three(spacings[-3:], values[-3:])
-    if found.trusted and len(spacings) > 3:
+    result = _of_three(spacings[-3:], values[-3:])
+    if result.trusted and len(spacings) > 3:
         before = _of_three(spacings[-4:-1], values[-4:-1])
-        if not before.trusted or abs(before.order - found.order) > 0.5 * found.order:
+        if not before.trusted or abs(before.order - result.order) > 0.5 * result.order:
             return attrs.evolve(
-                found,
+                result,
                 warning="not yet in the asymptotic range: the observed order changes from "
-                f"{before.order:.2g} to {found.order:.2g}; refine further",
+                f"{before.order:.2g} to {result.order:.2g}; refine further",
             )
-    return found
+    return result
 
 
 def _of_three(spacings: Sequence[float], values: Sequence[float]) -> Extrapolation:
@@ -63,26 +63,28 @@ def _of_three(spacings: Sequence[float], values: Sequence[float]) -> Extrapolati
     coarse, fine = f3 - f2, f2 - f1
     if fine == 0.0:
         if coarse == 0.0:
-            return Extrapolation(nan, f1, 0.0, "all three are the same: nothing can be observed")
-        return Extrapolation(nan, f1, nan, "the last refinement changed nothing: look elsewhere")
+            return Extrapolation(nan, f1, 0.0, "all three are equal: nothing can be observed")
+        return Extrapolation(
+            nan, f1, nan, "the last refinement changed nothing: no order can be observed"
+        )
     largest = _SAFETY * max(abs(coarse), abs(fine)) / abs(f1) if f1 else nan
     if coarse * fine < 0.0:
         return Extrapolation(
             nan,
             f1,
             largest,
-            "the results swing: refinement crosses the answer, so that errors may be small by "
+            "the results oscillate: refinement crosses the limit, so that errors may be small by "
             "chance; the bar is the largest change",
         )
     order = _order(h2 / h1, h3 / h2, coarse / fine)
     if not _LOWEST <= order <= _HIGHEST:
-        said = f"{order:.2g}" if isfinite(order) else "none"
+        observed = f"{order:.2g}" if isfinite(order) else "none"
         return Extrapolation(
             order,
             f1,
             largest,
-            f"not in the asymptotic range: the observed order is {said}; refine further; the bar "
-            "is the largest change",
+            f"not in the asymptotic range: the observed order is {observed}; refine further; the "
+            "bar is the largest change",
         )
     change = fine / ((h2 / h1) ** order - 1.0)
     limit = f1 - change
@@ -92,7 +94,7 @@ def _of_three(spacings: Sequence[float], values: Sequence[float]) -> Extrapolati
 def _order(fine_ratio: float, coarse_ratio: float, changes: float) -> float:
     """p of r21^p (r32^p - 1) / (r21^p - 1) = (f3 - f2) / (f2 - f1); nan if there is none."""
 
-    def miss(p: float) -> float:
+    def residual(p: float) -> float:
         return (
             p * log(fine_ratio)
             + log((coarse_ratio**p - 1.0) / (fine_ratio**p - 1.0))
@@ -100,6 +102,6 @@ def _order(fine_ratio: float, coarse_ratio: float, changes: float) -> float:
         )
 
     low, high = 1e-3, 20.0
-    if miss(low) * miss(high) > 0.0:
+    if residual(low) * residual(high) > 0.0:
         return nan
-    return float(brentq(miss, low, high))
+    return float(brentq(residual, low, high))

@@ -1,4 +1,4 @@
-"""Runner: where the tasks of a sweep are carried out."""
+"""Runner: the place where the tasks of a sweep run."""
 
 from __future__ import annotations
 
@@ -9,46 +9,46 @@ from typing import TypeAlias, final
 
 import attrs
 
-from solidsph.studies.point import Point, measured
+from solidsph.studies.point import Point, run_point
 from solidsph.studies.task import Task
 
 
 @attrs.frozen
 class Lost:
-    """A task that gave no point, because its process died or its code is broken."""
+    """Outcome of a task whose process died or whose code is broken."""
 
     cause: str
 
     def point(self, task: Task) -> Point:
-        """A failed point in its place."""
+        """Failed point in place of the task's."""
         return Point(dict(task.settings), inf, outcome=self.cause)
 
 
 Outcomes: TypeAlias = Generator[tuple[Task, Point | Lost], None, None]
-"""Tasks as they end, in no order. Closing it ends what still runs."""
+"""Tasks with their outcomes as they end, in any order. Closing it ends those that still run."""
 
 
 class Runner(ABC):
-    """Carries out tasks, each once, wherever it is."""
+    """Runs every task once."""
 
     @abstractmethod
     def run(self, tasks: Sequence[Task]) -> Outcomes:
-        """Begin with the first tasks, and give each with what came of it as it ends."""
+        """Start the tasks in order, and yield each with its outcome when it ends."""
 
 
 @final
 @attrs.frozen
 class Inline(Runner):
-    """One after the other in this process, whose memory they share: for tests and tiny cases."""
+    """Runs tasks one after the other in this process, for tests and tiny cases."""
 
     def run(self, tasks: Sequence[Task]) -> Outcomes:
         for task in tasks:
-            yield task, tried(task)
+            yield task, run_task(task)
 
 
-def tried(task: Task) -> Point | Lost:
-    """Run the task in this process; an error that is no result of a run is told, not raised."""
+def run_task(task: Task) -> Point | Lost:
+    """Run the task in this process; an unexpected error is an outcome, and not raised."""
     try:
-        return measured(task.case, task.settings)
+        return run_point(task.case, task.settings)
     except Exception as cause:
         return Lost(f"{type(cause).__name__}: {cause}")

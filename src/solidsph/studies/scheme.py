@@ -1,9 +1,10 @@
-"""Scheme: the parts that decide which small deviations of a lattice grow, and how fast all move."""
+"""Scheme: the parts that decide the stability and speed of waves on a lattice."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import floor
+from typing import Any
 
 import attrs
 import numpy as np
@@ -21,61 +22,61 @@ from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import DEFAULT_INTEGRATOR, PartLike
 from solidsph.simulation import Simulation
 
-# A soft solid of usual proportions; only Poisson's ratio shows in units of its wave speed.
-_MATERIAL = {
-    "type": "neo-hookean",
-    "youngs_modulus": 1e6,
-    "poissons_ratio": 0.3,
-    "density": 1000.0,
+# Defaults by kind of part. The material is a soft solid; in units of its wave speed only Poisson's
+# ratio matters.
+_DEFAULTS: Mapping[str, Any] = {
+    "kernels": "modified-mollifier",
+    "formulations": "total-lagrangian",
+    "materials": {
+        "type": "neo-hookean",
+        "youngs_modulus": 1e6,
+        "poissons_ratio": 0.3,
+        "density": 1000.0,
+    },
+    "integrators": DEFAULT_INTEGRATOR,
 }
 
-# Transits of a spacing: so many steps that rounding them to a whole number does not show.
+# Duration in transits of a spacing; rounding so many steps to a whole number has no influence.
 _LONG = 1e4
 
-# In spacings: by rounding, a particle so far beyond the support may count as a neighbour.
+# Rounding may count a particle this far beyond the support as a neighbour [spacings].
 _EDGE = 1e-9
 
-# Particles of a block beyond which a certificate would take many minutes, and gigabytes.
+# Size of a block beyond which a certificate would take many minutes, and gigabytes.
 _MOST_PARTICLES = 120_000
 
 
-def _kernel(wanted: PartLike) -> Kernel:
-    kernel: Kernel = construct("kernels", wanted)
-    return kernel
+def _kernel(part: PartLike) -> Any:
+    return construct("kernels", part)
 
 
-def _formulation(wanted: PartLike) -> Formulation:
-    formulation: Formulation = construct("formulations", wanted)
-    return formulation
+def _formulation(part: PartLike) -> Any:
+    return construct("formulations", part)
 
 
-def _material(wanted: PartLike) -> Material:
-    material: Material = construct("materials", wanted)
-    return material
+def _material(part: PartLike) -> Any:
+    return construct("materials", part)
 
 
-def _integrator(wanted: PartLike) -> Integrator:
-    integrator: Integrator = construct("integrators", wanted)
-    return integrator
+def _integrator(part: PartLike) -> Any:
+    return construct("integrators", part)
 
 
 @attrs.frozen
 class Scheme:
-    """What small deviations on a lattice depend on, apart from its stretch.
+    """All that small deviations on a lattice depend on, apart from its stretch.
 
-    Every part is a name, a table with a `type`, or an object.
+    Every part is given by name, by a table with a `type`, or as an object.
     """
 
-    kernel: Kernel = attrs.field(factory=lambda: _kernel("modified-mollifier"), converter=_kernel)
-    cover: float = attrs.field()  # the kernel's own, unless it is given [spacings]
+    kernel: Kernel = attrs.field(default=_DEFAULTS["kernels"], converter=_kernel)
+    cover: float = attrs.field()  # by default the kernel's own [spacings]
     formulation: Formulation = attrs.field(
-        factory=lambda: _formulation("total-lagrangian"), converter=_formulation
+        default=_DEFAULTS["formulations"], converter=_formulation
     )
-    material: Material = attrs.field(factory=lambda: _material(_MATERIAL), converter=_material)
+    material: Material = attrs.field(default=_DEFAULTS["materials"], converter=_material)
     effects: Sequence[PartLike] = ()
-    integrator: Integrator = attrs.field(
-        factory=lambda: _integrator(DEFAULT_INTEGRATOR), converter=_integrator
-    )
+    integrator: Integrator = attrs.field(default=_DEFAULTS["integrators"], converter=_integrator)
     spacing: float = 1.0  # [m]
     time_step_factor: float = 0.5  # in use, of the CFL step [-]
 
@@ -85,10 +86,10 @@ class Scheme:
 
     @classmethod
     def of(cls, scene: Scene) -> Scheme:
-        """That of a scene, by its first body.
+        """Scheme of the first body of a scene.
 
         Raises:
-            SceneError: no material is named.
+            SceneError: the scene names no material.
         """
         body = next(iter(scene.bodies.values()))
         material = scene.material if body.material is None else body.material
@@ -107,13 +108,13 @@ class Scheme:
 
     @property
     def transit(self) -> float:
-        """Time in which a confined wave crosses a spacing, the unit of rates and steps [s]."""
+        """Transit time of a confined wave over a spacing, the unit of rates and steps [s]."""
         return self.spacing / self.material.wave_speed
 
     def depth(self, least_stretch: float = 1.0) -> int:
-        """Layers of particles about one that must be there for the surface not to be felt."""
-        # Forces from stresses, stresses from gradients: two supports. In the current configuration
-        # volumes by the crowding of neighbours are a third, and stretch moves neighbours.
+        """Layers around a particle within which the surface must not be."""
+        # Two supports: forces from stresses, stresses from gradients. In the current configuration
+        # volumes from the density of neighbours are a third, and compression adds neighbours.
         if self.formulation.configuration is Configuration.REFERENCE:
             reach = 2 * floor(self.cover + _EDGE) + 2 * bool(self.effects)
         else:
@@ -129,27 +130,28 @@ class Scheme:
         time_step_factor: float = 1.0,
         duration: float = _LONG,
     ) -> Simulation:
-        """A block of lattice about the origin.
+        """Block of lattice around the origin, built.
 
         Args:
             dimension: 1, 2 or 3.
             layers: of particles on either side of the middle one, along each axis.
-            boundaries: parts and the labels of their accounts; free by default.
+            boundaries: parts with the labels of their accounts; none by default.
             time_step_factor: of the CFL step.
-            duration: at least, in transits of a spacing; it is a whole number of steps.
+            duration: in transits of a spacing, rounded up to whole steps.
 
         Raises:
             SceneError: there would be too many particles.
             BuildError: parts do not fit each other.
         """
-        count = int(np.prod([2 * one + 1 for one in layers]))
+        count = int(np.prod([2 * n + 1 for n in layers]))
         if count > _MOST_PARTICLES:
             raise SceneError(
                 f"a block of {count} particles would be needed, more than {_MOST_PARTICLES}; "
                 "take a smaller cover, a milder compression, or fewer dimensions"
             )
-        lengths = [2.0 * one * self.spacing for one in layers]
-        shape = {"type": "box", "lengths": lengths, "origin": [-0.5 * one for one in lengths]}
+        lengths = [2.0 * n * self.spacing for n in layers]
+        origin = [-0.5 * length for length in lengths]
+        shape = {"type": "box", "lengths": lengths, "origin": origin}
         builder = (
             Simulation.builder()
             .body(
@@ -174,7 +176,7 @@ class Scheme:
 
 
 def stretched(simulation: Simulation, stretches: Sequence[float]) -> State:
-    """At rest in a uniform stretch along each axis."""
+    """State at rest in a uniform stretch along each axis."""
     return attrs.evolve(
         simulation.initial,
         positions=simulation.particles.positions * np.asarray(stretches),
@@ -183,5 +185,5 @@ def stretched(simulation: Simulation, stretches: Sequence[float]) -> State:
 
 
 def deformation(stretches: Sequence[float]) -> Array:
-    """F of that stretch, (d, d)."""
+    """Deformation gradient F (d, d) of stretches along the axes."""
     return np.diag(np.asarray(stretches, dtype=np.float64))

@@ -1,4 +1,4 @@
-"""Growth and critical step of small deviations over stretch and cover, on an endless bar."""
+"""Growth and critical step of small deviations of an endless bar, over stretch and cover."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from solidsph.studies.scheme import Scheme, stretched
 
 @attrs.frozen(eq=False)
 class StabilityMap:
-    """The fastest modes of an endless bar at uniform stretch."""
+    """Fastest modes of an endless bar at uniform stretch."""
 
     stretches: Array  # (s,) [-]
     covers: Array  # (c,) [spacings in the reference configuration]
-    rates: Array  # (c, s) growth of the fastest [e-foldings per wave transit of one spacing]
+    rates: Array  # (c, s) largest growth rates [e-foldings per wave transit of one spacing]
     factors: Array  # (c, s) largest stable time step over the CFL step [-]
-    seen: Array  # (c, s) stretch that the sums make of the uniform one: a small cover misses it [-]
-    connected: Mask  # (c, s) whether a particle has a neighbour where the sums are taken
+    seen: Array  # (c, s) stretch that the discrete gradient gives, inexact for small covers [-]
+    connected: Mask  # (c, s) whether particles have neighbours in the configuration of the sums
 
     @property
     def grows(self) -> Mask:
-        """Where it is unstable, (c, s)."""
+        """Where the bar is unstable, (c, s)."""
         grows: Mask = self.rates > GROWS
         return grows
 
@@ -37,7 +37,7 @@ class StabilityMap:
 def stability_map(
     scheme: Scheme, stretches: Sequence[float], covers: Sequence[float]
 ) -> StabilityMap:
-    """The map of a scheme, whose own cover does not count."""
+    """Stability map of a scheme; its own cover is ignored."""
     shape = (len(covers), len(stretches))
     rates, factors, seen = (np.full(shape, nan) for _ in range(3))
     for row, cover in enumerate(covers):
@@ -49,14 +49,14 @@ def stability_map(
         for column, stretch in enumerate(stretches):
             uniform = stretched(simulation, [stretch])
             try:
-                found = dispersion(simulation.dynamics, uniform)
+                waves = dispersion(simulation.dynamics, uniform)
                 F = simulation.dynamics.observe(uniform).deformation_gradients
-            except BuildError:  # a gradient that cannot be formed without neighbours
+            except BuildError:  # the gradient needs neighbours
                 continue
-            rates[row, column] = found.growth_rate * scheme.transit
-            factors[row, column] = limit / max(found.highest_frequency, 1e-300)
+            rates[row, column] = waves.growth_rate * scheme.transit
+            factors[row, column] = limit / max(waves.highest_frequency, 1e-300)
             seen[row, column] = F[len(F) // 2, 0, 0]
-    # In the current configuration neighbours move out of the support that was cut at the start.
+    # In the current configuration, stretch moves neighbours out of the support.
     current = scheme.formulation.configuration is Configuration.CURRENT
     spread = np.array(stretches) if current else np.ones(len(stretches))
     return StabilityMap(

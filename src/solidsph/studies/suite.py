@@ -1,4 +1,4 @@
-"""Suite: hard cases, run and judged; some of them must fail, or the rest proves nothing."""
+"""Suite of hard cases: trials that are run and graded. Some must fail, or it proves nothing."""
 
 from __future__ import annotations
 
@@ -17,44 +17,45 @@ from solidsph.errors import SceneError, SolidsphError
 from solidsph.registry import registry
 from solidsph.registry.construct import construct
 from solidsph.results.record import Record
+from solidsph.run.outcome import FINISHED
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Measurement, Trial
-from solidsph.studies.case_run import FINISHED, SceneRun, opened, run_scenes
-from solidsph.studies.varied import varied
+from solidsph.studies.case_run import SceneRun, open_records, run_scenes
+from solidsph.studies.variant import with_settings
 
-# Of the energy in play: beyond it energy comes from nowhere.
-RESIDUAL = 1e-3
+# Largest energy residual of a stable trial, over the energy in play.
+_RESIDUAL = 1e-3
 
 
 class Grade(Enum):
-    """What became of a trial."""
+    """Outcome of a trial."""
 
     STABLE = "stable"
-    DEGRADED = "degraded"  # it came through, but something is not as it must be
+    DEGRADED = "degraded"  # it finished, but a measurement or its energy is wrong
     FAILED = "failed"
 
 
 @attrs.frozen
 class Verdict:
-    """The grade of one trial, and why."""
+    """Grade of a trial, and the reason."""
 
     case: str
     trial: str
     grade: Grade
     reason: str
     seconds: float  # wall time, building included [s]
-    energy_residual: float  # largest, over the energy in play [-]; not a number if none moved
+    energy_residual: float  # largest, over the energy in play [-]; nan if nothing moved
     must_fail: str  # why it must fail; empty if it must not
-    known: str  # why it does not come through, where that is known
+    known: str  # why it is known not to be stable; empty if it should be
 
     @property
     def as_expected(self) -> bool:
-        """Whether it is stable; a negative control, or a known exception, is expected not to be."""
+        """Whether it is stable, or is not but must fail or is known to."""
         return (self.grade is Grade.STABLE) != bool(self.must_fail or self.known)
 
 
 def trials(names: Sequence[str] = ()) -> Iterator[tuple[str, str, Case, Trial]]:
-    """Case name, trial name, case and trial of all hard cases, or of those named.
+    """Case name, trial name, case and trial of all hard cases, or of the cases named.
 
     Raises:
         SceneError: a case of that name has no trials.
@@ -67,35 +68,40 @@ def trials(names: Sequence[str] = ()) -> Iterator[tuple[str, str, Case, Trial]]:
             yield name, label, cls(), trial
 
 
-def judged(
+def run_trial(
     name: str,
     label: str,
     case: Case,
     trial: Trial,
     folder: Path,
     *,
-    words: Mapping[str, Any] | None = None,
+    settings: Mapping[str, Any] | None = None,
     brief: bool = False,
 ) -> Verdict:
     """Run one trial and grade it.
 
     Args:
-        words: other words of its scenes, as `varied` takes them, such as another kernel.
-        brief: whether its short form is enough.
+        name: of the case.
+        label: of the trial.
+        case: to be run.
+        trial: its settings and expectations.
+        folder: for records.
+        settings: further ones, as `with_settings` takes them, such as another kernel.
+        brief: whether to run its short form.
     """
     begun = clock.perf_counter()
-    settings = {**trial.settings, **(trial.brief if brief else {}), **(words or {})}
+    chosen = {**trial.settings, **(trial.brief if brief else {}), **(settings or {})}
     residual = float("nan")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # hard cases are what warnings are for
-            wanted = varied(case, _understood(case, settings))
-            runs = run_scenes(wanted, folder)
-        conservative = {name for name, scene in wanted.scenes().items() if _has_energy(scene)}
-        with opened(runs) as records:
+            warnings.simplefilter("ignore")  # hard cases deserve their warnings
+            variant = with_settings(case, _understood(case, chosen))
+            runs = run_scenes(variant, folder)
+        conservative = {name for name, scene in variant.scenes().items() if _has_energy(scene)}
+        with open_records(runs) as records:
             residuals = [energy_residual(records[name]) for name in conservative]
-            residual = max((one for one in residuals if isfinite(one)), default=residual)
-            grade, reason = _graded(runs, wanted.measure(records), residual)
+            residual = max(filter(isfinite, residuals), default=residual)
+            grade, reason = _graded(runs, variant.measure(records), residual)
     except SolidsphError as cause:
         grade, reason = Grade.FAILED, " ".join(str(cause).split())
     return Verdict(
@@ -111,7 +117,7 @@ def judged(
 
 
 def _understood(case: Case, settings: Mapping[str, Any]) -> Mapping[str, Any]:
-    """`settings` as the case takes them: one without a strength of its own has an effect for it."""
+    """Settings in which "hourglass" is a parameter of the case, or else of the effect."""
     if "hourglass" not in settings or hasattr(case, "hourglass"):
         return settings
     rest = {name: value for name, value in settings.items() if name != "hourglass"}
@@ -124,29 +130,26 @@ def _graded(
     for run in runs:
         if run.outcome != FINISHED:
             return Grade.FAILED, run.outcome
-    for one in measurements:
-        if not one.passed:
-            should = "" if one.reference is None else f", should be {one.reference:.4g}"
-            said = f" ({one.verdict})" if one.verdict else ""
-            return Grade.DEGRADED, f"{one.quantity}: {one.value:.4g} {one.unit}{should}{said}"
-    if residual > RESIDUAL:
-        return Grade.DEGRADED, f"energy comes from nowhere: {100.0 * residual:.2g} % of it"
-    worst = max((one for one in measurements if one.error is not None), key=_error, default=None)
+    for m in measurements:
+        if not m.passed:
+            should = "" if m.reference is None else f", should be {m.reference:.4g}"
+            verdict = f" ({m.verdict})" if m.verdict else ""
+            return Grade.DEGRADED, f"{m.quantity}: {m.value:.4g} {m.unit}{should}{verdict}"
+    if residual > _RESIDUAL:
+        return Grade.DEGRADED, f"the energy balance is off by {100.0 * residual:.2g} %"
+    with_error = (m for m in measurements if m.error is not None)
+    worst = max(with_error, key=lambda m: m.error or 0.0, default=None)
     return Grade.STABLE, "" if worst is None else f"{worst.quantity}: error {worst.error:.2g}"
 
 
-def _error(measurement: Measurement) -> float:
-    return measurement.error or 0.0
-
-
 def _has_energy(scene: Scene) -> bool:
-    """Whether its forces derive from one: sums without an adjoint keep none."""
+    """Whether its forces conserve energy, as those of an adjoint divergence do."""
     adjoint: bool = construct("formulations", scene.formulation).divergence.adjoint
     return adjoint
 
 
 def energy_residual(record: Record) -> float:
-    """Largest residual of the energy ledger over the energy in play [-]; nan if nothing moved."""
+    """Largest residual of the energy balance over the energy in play [-]; nan if nothing moved."""
     history = {name: np.asarray(values) for name, values in record.history.items()}
     kinetic = history.get("kinetic energy [J]")
     if kinetic is None or not np.any(kinetic > 0.0):

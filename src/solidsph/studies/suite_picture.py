@@ -1,4 +1,4 @@
-"""The picture of a suite of hard cases: how long each took, and what became of it."""
+"""Picture of a suite of hard cases: wall time and grade of every trial."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from solidsph.studies.suite import Grade, Verdict
 
-# Told apart in grey too.
+# Distinct in grey too.
 _LOOKS: Mapping[Grade, Mapping[str, Any]] = {
     Grade.STABLE: {"facecolor": "0.75", "hatch": ""},
     Grade.DEGRADED: {"facecolor": "white", "hatch": "//"},
@@ -20,22 +20,22 @@ _LOOKS: Mapping[Grade, Mapping[str, Any]] = {
 
 
 def draw_suite(verdicts: Sequence[Verdict], title: str, path: Path) -> None:
-    """A bar for every trial; those that must fail are marked, those that surprise are in bold."""
+    """Draw a bar for every trial; those that must fail are marked, unexpected ones bold."""
     figure = Figure(figsize=(11.0, 1.2 + 0.27 * len(verdicts)), layout="constrained")
     axes = figure.add_subplot()
-    for row, one in enumerate(verdicts):
-        axes.barh(row, one.seconds, edgecolor="black", linewidth=0.8, **_LOOKS[one.grade])
-        mark = " (must fail)" if one.must_fail else " (known)" if one.known else ""
+    for row, v in enumerate(verdicts):
+        axes.barh(row, v.seconds, edgecolor="black", linewidth=0.8, **_LOOKS[v.grade])
+        mark = " (must fail)" if v.must_fail else " (known)" if v.known else ""
         axes.annotate(
-            f"{one.grade.value}{mark}" + ("" if one.as_expected else ": NOT as expected"),
-            (one.seconds, row),
+            f"{v.grade.value}{mark}" + ("" if v.as_expected else ": NOT as expected"),
+            (v.seconds, row),
             xytext=(4, 0),
             textcoords="offset points",
             va="center",
             fontsize=8,
-            fontweight="normal" if one.as_expected else "bold",
+            fontweight="normal" if v.as_expected else "bold",
         )
-    axes.set_yticks(range(len(verdicts)), [f"{one.case}: {one.trial}" for one in verdicts])
+    axes.set_yticks(range(len(verdicts)), [f"{v.case}: {v.trial}" for v in verdicts])
     axes.tick_params(axis="y", labelsize=8)
     axes.invert_yaxis()
     axes.margins(x=0.2, y=0.01)

@@ -1,4 +1,4 @@
-"""Sweeping over the configurations of a case: what is finished stays finished."""
+"""Sweeps over the configurations of a case, which keep what is finished."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from contextlib import closing
 
 import attrs
 
-from solidsph.studies.estimate import Estimate
 from solidsph.studies.journal import Journal
-from solidsph.studies.point import Point, together
+from solidsph.studies.point import Point, merge_repeats
+from solidsph.studies.remaining_time import RemainingTime
 from solidsph.studies.runner import Lost, Runner
 from solidsph.studies.task import Task
 
 
 @attrs.frozen
-class Standing:
-    """How far a sweep is."""
+class SweepStatus:
+    """Progress of a sweep."""
 
     total: int  # tasks asked for
     kept: int  # of them finished by earlier sweeps
     done: int  # of them ended in this one
-    seconds_left: float | None  # wall time [s]; None as long as nothing tells it
-    task: Task | None = None  # the one that has just ended
-    outcome: Point | Lost | None = None  # what came of it
+    seconds_left: float | None  # wall time [s]; None if unknown
+    task: Task | None = None  # that has just ended
+    outcome: Point | Lost | None = None  # of that task
 
     @property
     def remaining(self) -> int:
@@ -33,34 +33,34 @@ class Standing:
 
     @property
     def point(self) -> Point | None:
-        """What came of that task as a point, a failed one if it was lost."""
+        """Point of that task; a failed one if it was lost."""
         if isinstance(self.outcome, Lost):
             return None if self.task is None else self.outcome.point(self.task)
         return self.outcome
 
 
-Watch = Callable[[Standing], None]
-"""Called before the first task begins, and whenever one has ended."""
+StatusCallback = Callable[[SweepStatus], None]
+"""Called before the first task begins, and after every task."""
 
 
-def unwatched(standing: Standing) -> None:
+def ignore_status(standing: SweepStatus) -> None:
     pass
 
 
 def sweep(
-    tasks: Sequence[Task], runner: Runner, journal: Journal, watch: Watch = unwatched
+    tasks: Sequence[Task], runner: Runner, journal: Journal, watch: StatusCallback = ignore_status
 ) -> Sequence[Point]:
-    """Carry out `tasks`, but for those that the journal holds, and write each down as it ends.
+    """Run the `tasks` that are not in the journal, and add each to it when it ends.
 
-    It may be killed at any point: the same call goes on from there. A task that was lost, with its
-    process or by a fault of its code, is a failed point, and is tried again by the next sweep.
+    A sweep may be killed at any time; the same call continues it. A task that is lost, because its
+    process died or its code is broken, is a failed point, and is run again by the next sweep.
 
     Returns:
-        One point of all repeats of a configuration, in the order in which the tasks name them.
+        One point of all repeats of each configuration, in the order of the tasks.
 
     Raises:
         RecordError: another sweep is writing to the journal.
-        SceneError: a task cannot be handed to where the runner would carry it out.
+        SceneError: a task cannot be sent to the process that would run it.
     """
     wanted = {task.key: task for task in tasks}
     lost: dict[str, Lost] = {}
@@ -68,11 +68,11 @@ def sweep(
         points = dict(journal.points(tasks))
         kept = len(points)
         remaining = {key: task for key, task in wanted.items() if key not in points}
-        estimate = Estimate.of(tasks)
+        estimate = RemainingTime.of(tasks)
         for key, point in points.items():
             estimate.learn(wanted[key], point)
         done: list[Task] = []
-        watch(Standing(len(wanted), kept, 0, estimate.left(0.0, done, list(remaining.values()))))
+        watch(SweepStatus(len(wanted), kept, 0, estimate.left(0.0, done, list(remaining.values()))))
         begun = clock.perf_counter()
         with closing(runner.run(list(remaining.values()))) as outcomes:
             for task, outcome in outcomes:
@@ -86,7 +86,7 @@ def sweep(
                 del remaining[task.key]
                 elapsed = clock.perf_counter() - begun
                 left = estimate.left(elapsed, done, list(remaining.values()))
-                watch(Standing(len(wanted), kept, len(done), left, task, outcome))
+                watch(SweepStatus(len(wanted), kept, len(done), left, task, outcome))
     return _merged(list(wanted.values()), points, lost)
 
 
@@ -97,8 +97,8 @@ def _merged(
     for task in tasks:
         repeats.setdefault(task.configuration, []).append(task)
     return [
-        # A repeat that was lost is missing, as long as another was not.
-        together([points[task.key] for task in same if task.key in points])
+        # Lost repeats are left out if another finished.
+        merge_repeats([points[task.key] for task in same if task.key in points])
         if any(task.key in points for task in same)
         else lost[same[0].key].point(same[0])
         for same in repeats.values()

@@ -1,4 +1,4 @@
-"""Task: one run of one configuration of a case, under a key that every process finds the same."""
+"""Task: one run of one configuration of a case, with a key that is the same in every process."""
 
 from __future__ import annotations
 
@@ -19,59 +19,59 @@ import numpy as np
 from solidsph.errors import SceneError, SolidsphError
 from solidsph.registry import registry
 from solidsph.studies.case import Case
-from solidsph.studies.varied import varied
+from solidsph.studies.variant import with_settings
 
 
 @final
 @attrs.frozen
 class Task:
-    """A case to be run with these settings, and which of its repeats it is."""
+    """One repeat of a run of a case with these settings."""
 
     case: Case
-    settings: Mapping[str, Any] = attrs.field(factory=dict)  # as `varied` takes them
+    settings: Mapping[str, Any] = attrs.field(factory=dict)  # as `with_settings` takes them
     repeat: int = 0
 
     @cached_property
     def configuration(self) -> str:
-        """Hash of all that decides the outcome, but for which repeat it is.
+        """Hash of all that decides the outcome.
 
-        That is the case with its parameters, the settings, the scenes that follow from them, and
-        the versions of solidsph and of every distribution that a part in them comes from. A change
-        of code without a change of version is seen only as far as it changes the scenes.
+        It covers the case with its parameters, the settings, the resulting scenes, and the versions
+        of solidsph and of every distribution that provides a part. A change of code without a
+        change of version is noticed only if it changes the scenes.
 
         Raises:
-            SceneError: something in the case or in the settings has no lasting description.
+            SceneError: a value in the case or the settings has no lasting description.
         """
         described = {"case": plain(self.case), "settings": plain(self.settings)}
-        with suppress(SolidsphError):  # of refused settings, or scenes with functions in them
-            described["scenes"] = plain(varied(self.case, self.settings).scenes())
+        with suppress(SolidsphError):  # refused settings, or scenes with functions
+            described["scenes"] = plain(with_settings(self.case, self.settings).scenes())
         described["versions"] = _versions(set(_texts(described)))
         return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()[:32]
 
     @property
     def key(self) -> str:
-        """Its name in journals and between processes."""
+        """Identifier in journals and between processes."""
         return f"{self.configuration}-{self.repeat}"
 
 
 def plain(value: Any) -> Any:
-    """`value` as JSON knows it, the same in every process.
+    """`value` as data of JSON, the same in every process.
 
     Raises:
-        SceneError: it holds an object that only this process can tell from others.
+        SceneError: it contains an object whose identity is known to this process only.
     """
     if value is None or isinstance(value, (bool, int, str)):
         return value
     if isinstance(value, float):
-        return repr(float(value))  # digit by digit, and infinity too
+        return repr(float(value))  # exact, and for infinity too
     if isinstance(value, (np.ndarray, np.generic)):
         return plain(value.tolist())
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, Mapping):
-        return {str(name): plain(one) for name, one in value.items()}
+        return {str(name): plain(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
+        return [plain(item) for item in value]
     if isinstance(value, (type, FunctionType, BuiltinFunctionType)) and "<" not in _path(value):
         return _path(value)
     if attrs.has(type(value)):
@@ -93,16 +93,14 @@ def _path(named: Any) -> str:
 def _texts(described: Any) -> Iterator[str]:
     if isinstance(described, str):
         yield described
-    elif isinstance(described, Mapping):
-        for one in described.values():
-            yield from _texts(one)
-    elif isinstance(described, Sequence):
-        for one in described:
-            yield from _texts(one)
+    elif isinstance(described, (Mapping, Sequence)):
+        items = described.values() if isinstance(described, Mapping) else described
+        for item in items:
+            yield from _texts(item)
 
 
 def _versions(texts: set[str]) -> dict[str, str]:
-    """Of solidsph, and of who provides a part whose name or class is among `texts`."""
+    """Versions of solidsph and of the distributions of parts whose name or class is in `texts`."""
     used = {
         entry.distribution: entry.version
         for entry in _installed(os.environ.get(registry.RESTRICT))
@@ -113,5 +111,5 @@ def _versions(texts: set[str]) -> dict[str, str]:
 
 @cache
 def _installed(restriction: str | None) -> Sequence[registry.Entry]:
-    """Every part there is, read from the disk once a process and restriction."""
+    """Installed parts, read once per process and restriction."""
     return [entry for kind in registry.INTERFACES for entry in registry.available(kind)]

@@ -1,4 +1,4 @@
-// What a report does in the browser: plots, a table to sort and filter, scenes to look at.
+// Behaviour of a report in the browser: plots, a table to sort and filter, and scenes.
 "use strict";
 
 (() => {
@@ -18,7 +18,7 @@
 
   // --- plots -----------------------------------------------------------------------------------
 
-  // Figures in a narrow window give their legends a smaller font, so that the plot keeps its room.
+  // Legends have a smaller font in a narrow window, which leaves more room for the plot.
   const legendSize = () => (window.innerWidth < 700 ? 10 : 12);
 
   async function draw() {
@@ -31,7 +31,7 @@
     await ring();
   }
 
-  // A ring around the chosen point in both plots, in the trace that is left empty for it: the last.
+  // Ring around the chosen point in both plots: the last trace, which is empty otherwise.
   async function ring() {
     const places = chosen === null ? null : data.points[chosen].places;
     for (const [index, plot] of plots.entries()) {
@@ -113,7 +113,7 @@
 
   // --- table -----------------------------------------------------------------------------------
 
-  // Numbers before words, and what is not known last, whichever way.
+  // Numbers before words, and empty cells last, in either direction.
   function compare(a, b, sign) {
     const [x, y] = [a, b].map((cell) => cell.dataset.number);
     const [s, t] = [a, b].map((cell) => cell.textContent);
@@ -132,7 +132,7 @@
     body.append(...rows);
   }
 
-  // Rows that hold every word, in any column.
+  // Show the rows that contain every word, in any column.
   function filter() {
     const words = document.getElementById("filter").value.toLowerCase().split(/\s+/);
     let there = 0;
@@ -144,7 +144,7 @@
     document.getElementById("count").textContent = `${there} of ${rows.length}`;
   }
 
-  // --- what is listened to ---------------------------------------------------------------------
+  // --- events ----------------------------------------------------------------------------------
 
   for (const heading of document.querySelectorAll("#points thead th")) {
     heading.querySelector("button").addEventListener("click", () => sort(heading));
@@ -159,7 +159,7 @@
     button.addEventListener("click", () => choose(Number(button.dataset.expense)));
   }
   filter();
-  if (expense < 0) return; // no cost is known of every point: there is nothing to draw
+  if (expense < 0) return; // no cost is known for all points, so there is nothing to draw
   choose(expense).then(() => {
     for (const plot of plots) {
       plot.on("plotly_click", (event) => {

@@ -1,4 +1,4 @@
-"""Time left: what remains of a sweep takes as long as what is finished did, scaled."""
+"""Remaining time of a sweep, extrapolated from finished tasks."""
 
 from __future__ import annotations
 
@@ -10,47 +10,47 @@ import attrs
 import numpy as np
 
 from solidsph.errors import SolidsphError
-from solidsph.studies.case_run import FINISHED
+from solidsph.run.outcome import FINISHED
 from solidsph.studies.point import Point
 from solidsph.studies.task import Task
-from solidsph.studies.varied import varied
+from solidsph.studies.variant import with_settings
 
-# Of time with one over the spacing, as long as no two spacings have been timed: particles and
-# steps in two dimensions.
+# Power of one over the spacing by which time grows, until two spacings have been timed: particles
+# and steps in 2D.
 _EXPONENT = 3.0
-_STEEPEST = 6.0  # a fit to two noisy times may say anything
+_STEEPEST = 6.0  # limit of a fit to noisy times
 
 
 @attrs.frozen
-class Estimate:
-    """How long tasks take, from those that have been timed.
+class RemainingTime:
+    """Estimates of the times of tasks, from those that have been timed.
 
-    Known of a task is its spacing; times follow a power of it, fitted to what is finished. Other
-    settings count for nothing, unless the same configuration has been timed.
+    Time follows a power of the spacing that is fitted to finished tasks. Other settings count only
+    if the same configuration has been timed.
     """
 
     spacings: Mapping[str, float]  # of each configuration [m]; infinite if unknown
-    times: dict[str, list[float]] = attrs.field(factory=dict)  # of configurations [s]
+    times: dict[str, list[float]] = attrs.field(factory=dict)  # of each configuration [s]
 
     @classmethod
-    def of(cls, tasks: Sequence[Task]) -> Estimate:
-        """One that knows of no times yet."""
+    def of(cls, tasks: Sequence[Task]) -> RemainingTime:
+        """Estimate without any times yet."""
         first = {task.configuration: task for task in tasks}
         return cls({name: _spacing(task) for name, task in first.items()})
 
     def learn(self, task: Task, point: Point) -> None:
-        """Take note of how long a task took; one that failed says nothing."""
+        """Add the time of a task, unless it failed."""
         if point.outcome == FINISHED and isfinite(point.time):
             self.times.setdefault(task.configuration, []).append(point.time)
 
     def left(self, elapsed: float, done: Sequence[Task], remaining: Sequence[Task]) -> float | None:
-        """Wall time until all is finished [s]; None as long as there is nothing to go by.
+        """Wall time until all tasks are finished [s]; None if nothing has been timed.
 
         Args:
-            elapsed: wall time that `done` took, as many at a time as it will be [s].
-            done: what has ended in this time.
-            remaining: what has not. What is under way is taken for not begun, so that the first
-                estimates are long where many run at a time.
+            elapsed: wall time of `done`, with the same number of workers [s].
+            done: tasks that have ended in this time.
+            remaining: all others. Those under way count as not begun, so that early estimates are
+                too long with many workers.
         """
         if not remaining:
             return 0.0
@@ -61,7 +61,7 @@ class Estimate:
         return elapsed * sum(self._time(task, exponent) for task in remaining) / taken
 
     def _time(self, task: Task, exponent: float) -> float:
-        """Expected of one task by itself [s]."""
+        """Expected time of one task by itself [s]."""
         name = task.configuration
         if name in self.times:
             return median(self.times[name])
@@ -76,7 +76,7 @@ class Estimate:
         return median(scaled)
 
     def _ratio(self, other: str, spacing: float) -> float:
-        """How many times as fine `spacing` is [-]; 1 if nobody knows."""
+        """Spacing of another configuration over `spacing` [-]; 1 if unknown."""
         ratio = self.spacings[other] / spacing
         return ratio if isfinite(ratio) and ratio > 0.0 else 1.0
 
@@ -94,6 +94,6 @@ class Estimate:
 
 def _spacing(task: Task) -> float:
     try:
-        return varied(task.case, task.settings).resolution
+        return with_settings(task.case, task.settings).resolution
     except (SolidsphError, ValueError):
-        return inf  # refused settings, or no particles
+        return inf  # settings are refused, or there are no particles

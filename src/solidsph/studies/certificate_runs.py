@@ -1,7 +1,7 @@
-"""Runs that confirm a certificate: one wave in the middle of a block whose outer layers are held.
+"""Runs that confirm a certificate: one wave in a block whose outer layers are held.
 
-What the outer layers do reaches the middle no faster than waves go, so as long as a run is short
-enough for its block the middle moves as on the endless lattice.
+The held layers influence the middle no faster than waves travel. In a run that is short enough for
+its block, the middle moves as on the endless lattice.
 """
 
 from __future__ import annotations
@@ -18,29 +18,28 @@ from solidsph.simulation import Simulation
 from solidsph.studies.certificate import Certificate, Wave
 from solidsph.studies.scheme import stretched
 
-# Deviations at the start, in spacings: a million times the rounding of positions, and as far from
-# where the answer is no longer linear.
+# Initial deviation [spacings]: a million times the rounding of positions, and a millionth of what
+# is no longer linear.
 _START = 1e-9
 
-# Growth is watched over so many e-foldings.
+# E-foldings over which growth is measured.
 _FOLDINGS = 4.0
 
-# Steps at a part of the predicted critical one: two per cent above it, a wave grows by a factor of
-# 1.2 in each.
+# Steps of a run near the critical step: 2 % above it a wave grows by a factor of 1.2 in each.
 _STEPS = 60
 
-# Layers of particles that move, on either side of the middle, where the step is tried.
+# Moving layers on either side of the middle in runs near the critical step.
 _MOVING = {1: 24, 2: 14, 3: 8}
 
 
 def _advanced(simulation: Simulation, state: State, step: float) -> State:
-    # At the surface of the outer layers the state may be no state at all; they are held.
+    # At the surface of the held layers the state may not be finite; that does not matter.
     with np.errstate(all="ignore"):
         return simulation.integrator.advance(state, simulation.dynamics, step)
 
 
 def measured_growth(certificate: Certificate) -> float:
-    """Rate at which the certificate's fastest growing wave grows in a run [1/transit].
+    """Growth rate of the fastest growing wave in a run [1/transit].
 
     Raises:
         SolidsphError: no wave grows.
@@ -49,13 +48,12 @@ def measured_growth(certificate: Certificate) -> float:
         raise SolidsphError("no wave grows, so there is no growth to be run; take another stretch")
     wave = certificate.growing[0]
     duration = _FOLDINGS / wave.growth_rate  # [transits]
-    # No wave is faster than the material's, by as much as the stretch stiffens it: half as much.
-    # But fast growth is over before any has gone a spacing, while a particle feels others as far as
-    # it reaches at once, and theirs a little later.
+    # Waves are at most half again as fast as the material's, for the stiffening by stretch. Fast
+    # growth is over before a wave has crossed a spacing, but particles act at once over a support.
     layers = ceil(1.5 * duration * max(1.0, *certificate.stretches))
     layers += certificate.scheme.depth(min(certificate.stretches))
     simulation, start = _block(certificate, layers)
-    # A hundred steps, or what is stable: the scheme's own error is then (0.04)^2 / 24 and less.
+    # A hundred steps, or what is stable: the integrator's error is then at most 0.04^2 / 24.
     step = min(0.25 * certificate.critical_step, 0.01 * duration) * certificate.scheme.transit
     state, first = _begun(certificate, simulation, start, wave, step)
     for _ in range(ceil(duration * certificate.scheme.transit / step)):
@@ -65,8 +63,8 @@ def measured_growth(certificate: Certificate) -> float:
 
 
 def amplification(certificate: Certificate, part: float) -> float:
-    """How many times its start the wave of the highest frequency becomes in a run of many steps, at
-    a part of the predicted critical step."""
+    """Largest amplitude over the initial one of the wave of the highest frequency, in a run of
+    `_STEPS` steps at this part of the predicted critical step."""
     wave = certificate.fastest
     simulation, start = _block(certificate, _MOVING[certificate.dimension])
     step = part * certificate.critical_step * certificate.scheme.transit
@@ -77,13 +75,13 @@ def amplification(certificate: Certificate, part: float) -> float:
         state = _advanced(simulation, state, step)
         deviation = state.positions - start.positions
         largest = max(largest, float(np.abs(deviation).max()) / certificate.scheme.spacing)
-        if largest > 1e-2:  # beyond, nothing is linear any more
+        if largest > 1e-2:  # no longer linear
             break
     return largest / first
 
 
 def _block(certificate: Certificate, moving: int) -> tuple[Simulation, State]:
-    """Layers that move, within layers that are held at the uniform stretch."""
+    """Moving layers within layers that are held at the uniform stretch."""
     scheme, stretches = certificate.scheme, certificate.stretches
     held = scheme.depth(min(stretches))
     axes = "XYZ"[: certificate.dimension]
@@ -100,7 +98,7 @@ def _block(certificate: Certificate, moving: int) -> tuple[Simulation, State]:
 
 
 def _shape(certificate: Certificate, simulation: Simulation, wave: Wave) -> Array:
-    """The wave's displacement (n, d), of length 1 where it is largest."""
+    """Displacement (n, d) of a wave of unit amplitude."""
     places = simulation.particles.positions / certificate.scheme.spacing
     return np.cos(places @ wave.wave_vector)[:, None] * wave.polarisation
 
@@ -108,7 +106,7 @@ def _shape(certificate: Certificate, simulation: Simulation, wave: Wave) -> Arra
 def _begun(
     certificate: Certificate, simulation: Simulation, start: State, wave: Wave, step: float
 ) -> tuple[State, float]:
-    """The first state of a run in that wave, growing as predicted, and its amplitude [spacings]."""
+    """First state of a run that starts in a growing wave, and its amplitude [spacings]."""
     deviation = _START * certificate.scheme.spacing * _shape(certificate, simulation, wave)
     rate = wave.growth_rate / certificate.scheme.transit
     begun = attrs.evolve(
@@ -124,7 +122,7 @@ def _begun(
 def _amplitude(
     certificate: Certificate, simulation: Simulation, start: State, state: State, wave: Wave
 ) -> float:
-    """Of the wave in the deviation of the middle particle [spacings]."""
+    """Amplitude of the wave at the middle particle [spacings]."""
     middle = int(np.argmin(np.linalg.norm(simulation.particles.positions, axis=1)))
     deviation = (state.positions - start.positions)[middle] / certificate.scheme.spacing
     return abs(float(deviation @ wave.polarisation))

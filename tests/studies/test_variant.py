@@ -13,19 +13,19 @@ from solidsph.registry import registry
 from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 from solidsph.studies.case import Case
-from solidsph.studies.point import measured, together
-from solidsph.studies.varied import varied
+from solidsph.studies.point import merge_repeats, run_point
+from solidsph.studies.variant import with_settings
 from solidsph_cases.csm3 import Csm3
 
 
 def scene(**settings: Any) -> Scene:
-    return varied(Csm3(), {name.replace("__", "."): v for name, v in settings.items()}).scenes()[
-        "csm3"
-    ]
+    return with_settings(
+        Csm3(), {name.replace("__", "."): v for name, v in settings.items()}
+    ).scenes()["csm3"]
 
 
 def test_parameters_of_the_case_come_first() -> None:
-    assert varied(Csm3(), {"across": 9, "cover": 3.0}) == Csm3(across=9, cover=3.0)
+    assert with_settings(Csm3(), {"across": 9, "cover": 3.0}) == Csm3(across=9, cover=3.0)
 
 
 def test_other_words_change_the_scene_and_nothing_else() -> None:
@@ -41,38 +41,38 @@ def test_strengths_of_effects_are_changed_or_added() -> None:
     assert gravity == Csm3().scenes()["csm3"].effects[0]
     assert added.part == {"type": "hourglass-control", "strength": 0.3}
     case = Csm3(hourglass=0.5)
-    effects = varied(case, {"hourglass-control.strength": 0.2}).scenes()["csm3"].effects
+    effects = with_settings(case, {"hourglass-control.strength": 0.2}).scenes()["csm3"].effects
     assert {"type": "hourglass-control", "strength": 0.2} in [one.part for one in effects]
     assert len(effects) == 2
 
 
 def test_an_unknown_word_names_the_nearest() -> None:
     with pytest.raises(SceneError, match="did you mean 'gradient'"):
-        varied(Csm3(), {"gradent": "quadratic"})
+        with_settings(Csm3(), {"gradent": "quadratic"})
     with pytest.raises(SceneError, match="across"):
-        varied(Csm3(), {"across": 1})
+        with_settings(Csm3(), {"across": 1})
     with pytest.raises(SceneError, match="float64 or float32"):
         scene(precision="single")
 
 
 def test_a_point_counts_what_no_machine_changes() -> None:
     case = Csm3(across=3, duration=0.01, engine="matrix")
-    one, two = measured(case, {"cover": 2.2}), measured(case, {"cover": 2.2})
+    one, two = run_point(case, {"cover": 2.2}), run_point(case, {"cover": 2.2})
     assert attrs.evolve(one, seconds=(), peak_memory=0) == attrs.evolve(
         two, seconds=(), peak_memory=0
     )
-    built = Simulation.builder(varied(case, {"cover": 2.2}).scenes()["csm3"]).build()
+    built = Simulation.builder(with_settings(case, {"cover": 2.2}).scenes()["csm3"]).build()
     assert one.steps == built.steps
     assert one.pair_evaluations == built.steps * counted(built).visited
-    assert together([one, two]).seconds == (*one.seconds, *two.seconds)
+    assert merge_repeats([one, two]).seconds == (*one.seconds, *two.seconds)
 
 
 def test_what_goes_wrong_is_a_point_too() -> None:
     case = Csm3(across=3, duration=0.05, engine="matrix")
-    diverged = measured(case, {"time_step": 1.8e-4})
+    diverged = run_point(case, {"time_step": 1.8e-4})
     assert not diverged.finished
     assert "diverged" in diverged.outcome
-    refused = measured(case, {"cover": -1.0})
+    refused = run_point(case, {"cover": -1.0})
     assert not refused.finished
     assert "cover" in refused.outcome
 
@@ -85,10 +85,12 @@ def test_every_case_has_a_sensible_sweep(name: str) -> None:
     priced = case.priced()
     assert priced.sweep
     refining, *_ = priced.sweep
-    spacings = [varied(priced, {refining: value}).resolution for value in priced.sweep[refining]]
+    spacings = [
+        with_settings(priced, {refining: value}).resolution for value in priced.sweep[refining]
+    ]
     assert len(spacings) >= 2
     assert spacings == sorted(spacings, reverse=True)
     for axis, values in priced.sweep.items():
         assert len(values) == len(set(values)) >= 1
         for value in values:
-            varied(priced, {axis: value}).scenes()
+            with_settings(priced, {axis: value}).scenes()

@@ -1,4 +1,4 @@
-"""Folders for what is needed only as long as the process that made them lives."""
+"""Temporary folders that are removed even if their process is killed."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import time as clock
 from pathlib import Path
 
 _PREFIX = "solidsph-scratch-"
-_YOUNG = 60.0  # a folder may not be locked yet [s]
+_YOUNG = 60.0  # age below which a folder may not be locked yet [s]
 
 
-class Scratch:
-    """A folder that is removed by `close`, or else, after a kill, by whoever makes the next one."""
+class ScratchFolder:
+    """A folder that `close` removes; after a kill, the next one created removes it."""
 
     def __init__(self) -> None:
         _remove_abandoned(Path(tempfile.gettempdir()))
         self._folder = tempfile.TemporaryDirectory(prefix=_PREFIX)
         self.path = Path(self._folder.name)
         self._lock = os.open(self.path, os.O_RDONLY)
-        fcntl.flock(self._lock, fcntl.LOCK_EX)  # the system takes it back from whoever dies
+        fcntl.flock(self._lock, fcntl.LOCK_EX)  # released by the system when the process ends
 
     def close(self) -> None:
-        """Remove the folder and all that is in it."""
+        """Remove the folder with its contents."""
         self._folder.cleanup()
         os.close(self._lock)
 
@@ -36,7 +36,7 @@ def _remove_abandoned(place: Path) -> None:
                 continue
             lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
         except OSError:
-            continue  # somebody else's, or gone
+            continue  # of another user, or gone
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             shutil.rmtree(folder, ignore_errors=True)
