@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from solidsph.maths.arrays import Indices
-from solidsph.results.pictures import largest_principal
+from solidsph.maths.tensors import largest_principal
 from solidsph.results.record import Record
 from solidsph_cases._field_picture import show_field
 from solidsph_cases._turek_hron import ARC, RADIUS, Clamp, tip

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solidsph.maths.arrays import Array
-from solidsph.results.pictures import largest_principal
+from solidsph.maths.tensors import largest_principal
 from solidsph.results.record import Record
 from solidsph_cases._field_picture import show_field
 from solidsph_cases._sheet import MATERIAL, at_hole, extensions

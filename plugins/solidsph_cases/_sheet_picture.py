@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from solidsph.results.pictures import largest_principal
+from solidsph.maths.tensors import largest_principal
 from solidsph.results.record import Record
 from solidsph.studies.case import Measurement
 from solidsph_cases._field_picture import show_field

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 
-from solidsph.results.pictures import largest_principal
+from solidsph.maths.tensors import largest_principal
 from solidsph.results.record import Record
 from solidsph_cases._energy import total_energy
 from solidsph_cases._field_picture import show_field

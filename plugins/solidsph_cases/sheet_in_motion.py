@@ -13,7 +13,7 @@ import numpy as np
 from solidsph.errors import SceneError
 from solidsph.maths.arrays import Array
 from solidsph.registry.parameters import check_positive, number
-from solidsph.results.pictures import largest_principal
+from solidsph.maths.tensors import largest_principal
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_builder import SceneBuilder

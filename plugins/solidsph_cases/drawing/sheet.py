@@ -1,0 +1,197 @@
+"""Pictures as data: marks on panels, panels on a sheet, drawn when the sheet is saved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, final
+
+import attrs
+from numpy.typing import ArrayLike
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Mark: TypeAlias = "Callable[[Axes], Any]"
+"""Draws something on axes; returns what a colour bar needs, if it has colours."""
+
+
+def mark(method: str, *data: Any, **style: Any) -> Mark:
+    """A mark by that method of matplotlib's axes."""
+    return lambda axes: getattr(axes, method)(*data, **style)
+
+
+def line(x: ArrayLike, y: ArrayLike, style: str = "k-", **more: Any) -> Mark:
+    """A curve or markers, in the words of matplotlib's `plot`."""
+    return mark("plot", x, y, style, **more)
+
+
+def theory(x: ArrayLike, y: ArrayLike, label: str | None = "exact", **more: Any) -> Mark:
+    """A broad grey curve behind what is measured."""
+    return mark(
+        "plot", x, y, **{"color": "0.78", "linewidth": 4.0, "zorder": 1} | more, label=label
+    )
+
+
+def level(height: float, label: str = "", **style: Any) -> Mark:
+    """A line across the panel, with a label at its right end."""
+
+    def draw(axes: Axes) -> None:
+        axes.axhline(height, **{"color": "black", "linewidth": 0.9} | style)
+        if label:
+            place = {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points"}
+            axes.annotate(label, (0.99, height), xytext=(0, 3), ha="right", fontsize=9, **place)
+
+    return draw
+
+
+def zero(**style: Any) -> Mark:
+    """A faint line at zero."""
+    return level(0.0, **{"color": "0.8", "linewidth": 0.8, "zorder": 0} | style)
+
+
+def text(x: float, y: float, words: str, *, inside: bool = False, **style: Any) -> Mark:
+    """Words at a place of the data, or of the panel from 0 to 1 if `inside`."""
+
+    def draw(axes: Axes) -> None:
+        where = {"transform": axes.transAxes} if inside else {}
+        axes.text(x, y, words, **{"ha": "center", "va": "center", "fontsize": 9} | where | style)
+
+    return draw
+
+
+def arrow(tip: Sequence[float], tail: Sequence[float], style: str = "-|>", **more: Any) -> Mark:
+    """An arrow without words."""
+    return mark("annotate", "", tip, tail, arrowprops={"arrowstyle": style, **more})
+
+
+@final
+@attrs.frozen(eq=False)
+class Panel:
+    """One pair of axes.
+
+    `properties` are those of matplotlib's axes: xlabel, ylabel, xlim, ylim, xscale, aspect ...
+    """
+
+    marks: Sequence[Mark]
+    title: str = ""
+    legend: Mapping[str, Any] | None = None  # its style; None for no legend
+    grid: bool = False
+    projection: str | None = None
+    same_x: str = ""  # panels of one name have one scale
+    same_y: str = ""
+    properties: Mapping[str, Any] = attrs.field(factory=dict)
+
+    def draw(self, axes: Axes) -> Any:
+        """Draw all marks; returns what the last one with colours left for a colour bar."""
+        coloured = None
+        for one in self.marks:
+            made = one(axes)
+            coloured = made if hasattr(made, "set_clim") else coloured
+        axes.set(**self.properties)
+        if self.title:
+            axes.set_title(self.title, fontsize=10)
+        if self.grid:
+            axes.grid(color="0.92")
+        if self.legend is not None:
+            axes.legend(**{"frameon": False, "fontsize": 9} | dict(self.legend))
+        return coloured
+
+
+def panel(
+    *marks: Mark,
+    x: str = "",
+    y: str = "",
+    title: str = "",
+    legend: Mapping[str, Any] | None = None,
+    grid: bool = False,
+    projection: str | None = None,
+    same_x: str = "",
+    same_y: str = "",
+    **properties: Any,
+) -> Panel:
+    """A panel with the labels `x` and `y` of its axes, with units."""
+    labels = {"xlabel": x} if x else {}
+    labels |= {"ylabel": y} if y else {}
+    return Panel(marks, title, legend, grid, projection, same_x, same_y, {**labels, **properties})
+
+
+@final
+@attrs.frozen(eq=False)
+class Bar:
+    """A colour bar beside some panels, for the colours of the last one."""
+
+    label: str
+    panels: Sequence[Panel]
+    style: Mapping[str, Any] = attrs.field(factory=dict)
+
+
+BELOW: Mapping[str, Any] = {"location": "bottom", "shrink": 0.8, "aspect": 40}
+"""The style of a colour bar below its panel."""
+
+
+@final
+@attrs.frozen(eq=False)
+class Sheet:
+    """A picture: panels in rows. One that stands in a row several times is as wide as that."""
+
+    rows: Sequence[Sequence[Panel | None]]
+    size: tuple[float, float]  # [inches]
+    title: str = ""
+    widths: Sequence[float] | None = None  # of the columns, relative
+    heights: Sequence[float] | None = None
+    bars: Sequence[Bar] = ()
+    key: Panel | None = None  # whose legend stands below all
+    key_style: Mapping[str, Any] = attrs.field(factory=dict)
+
+    def save(self, path: Path) -> Path:
+        """Draw it into a file; returns the path."""
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=self.size, layout="constrained")
+        axes, coloured = self._axes(figure), {}
+        for one, where in axes.items():
+            coloured[one] = one.draw(where)
+        for bar in self.bars:
+            place = [axes[one] for one in bar.panels]
+            figure.colorbar(coloured[bar.panels[-1]], ax=place, label=bar.label, **bar.style)
+        if self.key is not None:
+            handles, labels = axes[self.key].get_legend_handles_labels()
+            place = {"loc": "outside lower center", "ncols": len(labels), "frameon": False}
+            figure.legend(handles, labels, **place | dict(self.key_style))
+        if self.title:
+            figure.suptitle(self.title, fontsize=11)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, dpi=150)
+        return path
+
+    def _axes(self, figure: Figure) -> Mapping[Panel, Axes]:
+        """Axes by panel; of those with one scale only the outermost have numbers."""
+        panels = list(dict.fromkeys(one for row in self.rows for one in row if one is not None))
+        names = [
+            ["." if one is None else str(panels.index(one)) for one in row] for row in self.rows
+        ]
+        made = figure.subplot_mosaic(
+            names,
+            width_ratios=self.widths,
+            height_ratios=self.heights,
+            per_subplot_kw={str(k): {"projection": p.projection} for k, p in enumerate(panels)},
+        )
+        axes = {one: made[str(k)] for k, one in enumerate(panels)}
+        for share in ("same_x", "same_y"):
+            first: dict[str, Axes] = {}
+            for one, where in axes.items():
+                if group := getattr(one, share):
+                    if (other := first.setdefault(group, where)) is not where:
+                        (where.sharex if share == "same_x" else where.sharey)(other)
+        for r, c in product(range(len(self.rows)), range(len(self.rows[0]))):
+            one = self.rows[r][c]
+            below = self.rows[r + 1][c] if r + 1 < len(self.rows) else None
+            left = self.rows[r][c - 1] if c else None
+            if one and one.same_x and below and below is not one and below.same_x == one.same_x:
+                axes[one].tick_params(labelbottom=False)
+            if one and one.same_y and left and left is not one and left.same_y == one.same_y:
+                axes[one].tick_params(labelleft=False)
+        return axes
