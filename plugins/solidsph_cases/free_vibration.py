@@ -111,7 +111,7 @@ class FreeVibration(Case):
         builder = (
             solid(self.title, "body", shape, spacing, SOFT, discretisation=lattice)
             .initial(displacement={"x": f"{self.amplitude * LENGTH!r}*cos({pi / LENGTH!r}*X)"})
-            .duration(self.periods * 2.0 * LENGTH / SOFT.wave_speed)
+            .duration(self.periods * (2.0 * LENGTH / SOFT.wave_speed))
             .outputs(min(_OUTPUTS, ceil(20 * self.periods)))
             .integrator(self.integrator, **steps)
         )
