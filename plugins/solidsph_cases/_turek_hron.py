@@ -103,7 +103,7 @@ def clamp_named(case: str, name: str) -> Clamp:
     return CLAMPS[name]
 
 
-def beam(clamp: Clamp, across: int, scheme: Scheme) -> SceneBuilder:
+def beam(title: str, clamp: Clamp, across: int, scheme: Scheme) -> SceneBuilder:
     """The beam under gravity, with so many particles across, on its boundary too.
 
     The clamp and the tip are then at their true places. With an even number across, the tip lies
@@ -113,7 +113,7 @@ def beam(clamp: Clamp, across: int, scheme: Scheme) -> SceneBuilder:
     tags = {"tip": f"X > {LENGTH - 0.1 * spacing!r} and abs(Y) < {0.6 * spacing!r}"}
     options = {"discretisation": clamp.discretisation, "tags": tags}
     builder = (
-        solid("", "beam", clamp.shape, spacing, _MATERIAL, **options)
+        solid(title, "beam", clamp.shape, spacing, _MATERIAL, **options)
         .boundary("clamp", where=clamp.face)
         .effect("body-force", acceleration={"y": -GRAVITY}, label="gravity")
     )

@@ -57,8 +57,8 @@ class Csm1(Case):
         return clamp_named("csm1", self.clamp)
 
     def scenes(self) -> Mapping[str, Scene]:
-        builder = beam(self.held, self.across, self).statics(load_steps=self.load_steps)
-        return {"csm1": builder.title(self.title).duration(1.0).scene()}
+        builder = beam(self.title, self.held, self.across, self).statics(load_steps=self.load_steps)
+        return {"csm1": builder.duration(1.0).scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record, held = records["csm1"], self.held

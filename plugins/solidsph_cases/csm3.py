@@ -80,9 +80,8 @@ class Csm3(Case):
 
     def scenes(self) -> Mapping[str, Scene]:
         builder = (
-            beam(self.held, self.across, self)
+            beam(self.title, self.held, self.across, self)
             .integrator(self.integrator, time_step_factor=self.time_step_factor)
-            .title(self.title)
             .duration(self.duration)
             .outputs(ceil(_RATE * self.duration))
         )

@@ -64,13 +64,27 @@ def outline(x: Array, **style: Any) -> Mark:
     return mark("plot", *x.T, ".", **{"color": "0.55", "markersize": 1.5} | style)
 
 
+def circle(radius: float, turns: float = 1.0) -> Array:
+    """Points on a circle about 0 from (radius, 0) on, (2, k)."""
+    turn = np.linspace(0.0, 2.0 * np.pi * turns, 200)
+    return radius * np.array([np.cos(turn), np.sin(turn)])
+
+
 def quarter_circle(radius: float) -> Array:
     """Points from (radius, 0) to (0, radius), (2, k)."""
-    turn = np.linspace(0.0, 0.5 * np.pi, 100)
-    return radius * np.array([np.cos(turn), np.sin(turn)])
+    return circle(radius, 0.25)
 
 
 def quarter_sheet(radius: float, width: float) -> Array:
     """The outline of a quarter of a square sheet with a hole, (2, k)."""
     x, y = quarter_circle(radius)[:, ::-1]
     return np.array([[*x, width, width, 0.0, 0.0], [*y, 0.0, width, width, radius]])
+
+
+def quarter_particles(record: Record, width: float) -> list[Mark]:
+    """Particles inside and on the boundary, in widths."""
+    x, surface = record.particles.positions / width, record.particles.tags["surface"]
+    return [
+        mark("plot", *x[~surface].T, "o", color="0.6", markersize=3.5, label="inside"),
+        mark("plot", *x[surface].T, "ko", markersize=4.5, label="on the boundary"),
+    ]
