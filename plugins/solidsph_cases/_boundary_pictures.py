@@ -156,7 +156,7 @@ def _by_cover(lines: Mapping[float, Line]) -> Sequence[Panel]:
             misses.setdefault(way, []).append(ways.miss(of, approximation))
             errors.setdefault(way, []).append(ways.largest_error(of, approximation))
     shared: dict[str, Any] = {"x": "cover [ps]", "xticks": covers, "grid": True}
-    margins = mark("margins", x=0.1, y=0.15)
+    margins = mark("margins", x=0.1)
     conditions = [
         mark(
             "annotate",
@@ -186,6 +186,7 @@ def _by_cover(lines: Mapping[float, Line]) -> Sequence[Panel]:
         *conditions,
         title="beside it, by cover, with W's condition",
         y="largest error of $\\langle f \\rangle$ beside it [m$^4$]",
+        ylim=(None, 5.0 * max(map(max, errors.values()))),  # room for the conditions
         **shared,
     )
     return at_end, beside
