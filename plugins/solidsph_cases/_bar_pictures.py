@@ -25,7 +25,7 @@ class Column:
     record: Record
     viscous: Record | None = None  # the same run with viscosity, if any
 
-    def panels(self, stations: Sequence[float], first: bool, end: float) -> list[Panel]:
+    def panels(self, stations: Sequence[float], end: float) -> list[Panel]:
         """One panel for each station, from 0 to `end` [s]."""
         times = np.linspace(0.0, float(self.record.times[-1]), 3000)
         panels = []
@@ -45,8 +45,8 @@ class Column:
                 panel(
                     *marks,
                     title="" if panels else self.heading,
-                    x="time [us]" if station == stations[-1] else "",
-                    y=f"T11 at {station:g} m\n[kPa]" if first else "",
+                    x="time [us]",
+                    y=f"T11 at {station:g} m\n[kPa]",
                     same_x="time",
                     same_y="stress",
                     xlim=(0.0, 1e6 * end),
@@ -58,7 +58,7 @@ class Column:
 def histories_sheet(columns: Sequence[Column], stations: Sequence[float], title: str) -> Sheet:
     """The bar; below it one row a station and one column a run, all on one scale."""
     end = max(float(column.record.times[-1]) for column in columns)
-    panels = [column.panels(stations, k == 0, end) for k, column in enumerate(columns)]
+    panels = [column.panels(stations, end) for column in columns]
     rows = [[_bar(stations)] * len(columns), *(list(row) for row in zip(*panels, strict=True))]
     count = int((~columns[0].record.particles.ghosts).sum())
     return Sheet(

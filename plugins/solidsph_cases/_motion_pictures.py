@@ -149,12 +149,12 @@ def waves(record: Record, sheet: Quarter) -> Sheet:
                 field(record, step, stress, **colours),
                 sheet.before,
                 title=f"t = {times[step]:.1f} W / c_p",
-                x="x [m]" if rows else "",
-                y="" if k else "y [m]",
+                x="x [m]",
+                y="y [m]",
                 same_x="x",
                 same_y="y",
             )
-            for k, (step, stress) in enumerate(zip(shown, stresses, strict=True))
+            for step, stress in zip(shown, stresses, strict=True)
         ]
         rows.append(panels)
         bars.append(Bar("largest principal\nCauchy stress [MPa]", panels, {"shrink": 0.9}))

@@ -101,27 +101,25 @@ class FallingEdge(Case):
         plain, corrected = (self.lines(gradient) for gradient in GRADIENTS)
         columns = []
         for figure, width in zip(figures, widths, strict=True):
-            label = {"same_x": figure, "x": "distance from the middle [ps]"}
-            first = not columns
-            title = f"{figure}: edge over {width} spacing{'s' if width > 1 else ''}"
-            field = _panel(
-                *(plain, width, edge, lambda line, f: line.smoothing @ f),
-                title=title,
-                same_x=figure,
-                y="$\\langle f \\rangle$ [1]" if first else "",
+            kinds = (
+                (plain, edge, lambda line, f: line.smoothing @ f, "f \\rangle$ [1]"),
+                (plain, _slope, _spaced_gradient, "f' \\rangle$, plain gradient [1/ps]"),
+                (corrected, _slope, _spaced_gradient, "f' \\rangle$, corrected gradient [1/ps]"),
             )
-            slopes = [
-                _panel(
-                    *(lines, width, _slope, lambda line, f: line.spacing * (line.gradient @ f)),
-                    y=f"$\\langle f' \\rangle$, {name} gradient [1/ps]" if first else "",
-                    **options,
-                )
-                for lines, name, options in (
-                    (plain, "plain", {"same_x": figure}),
-                    (corrected, "corrected", label),
-                )
-            ]
-            columns.append([field, *slopes])
+            columns.append(
+                [
+                    _panel(
+                        *(lines, width, exact, approximation),
+                        title=f"{figure}: edge over {width} spacing{'s' if width > 1 else ''}"
+                        if exact is edge
+                        else "",
+                        x="distance from the middle [ps]",
+                        y="" if columns else f"$\\langle {label}",
+                        same_x=figure,
+                    )
+                    for lines, exact, approximation, label in kinds
+                ]
+            )
         rows = list(zip(*columns, strict=True))
         title = f"Falling edges ({self.kernel}); Ismail & Reddy, {' and '.join(figures)}"
         return Sheet(rows, (12.0, 10.0), title, key=columns[0][-1], key_style=KEY)
@@ -270,6 +268,10 @@ def _table(lines: Mapping[str, Mapping[float, Line]], width: int) -> Curves:
 
 def _slope(line: Line, width: int) -> Array:
     return line.spacing * true_slope(line, width)
+
+
+def _spaced_gradient(line: Line, f: Array) -> Array:
+    return np.asarray(line.spacing * (line.gradient @ f))
 
 
 def _panel(

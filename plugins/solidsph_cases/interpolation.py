@@ -116,12 +116,12 @@ class Interpolation(Case):
                     self.complete(cells),
                     order,
                     "" if order else f"spacing {LENGTH / cells:g} m",
-                    x=x,
+                    x="x [m]",
                     same_x=f"{order}",
                 )
                 for order in ORDERS
             ]
-            for cells, x in ((self.fine, ""), (self.coarse, "x [m]"))
+            for cells in (self.fine, self.coarse)
         )
         spacing = f"spacing {LENGTH / self.fine:g} m ({self.kernel}); Ismail & Reddy, Fig. 3"
         ends = f"$(x - 1/2)^4$ without extra particles, {spacing}"

@@ -194,7 +194,7 @@ class NonlinearBar(Case):
             *marks,
             title=f"{'push' if pushed else 'pull'} at {speed:g} c_p: stretch {wave.stretch:.4f}, "
             f"t = {1e6 * end:.1f} us",
-            x="" if pushed else "X [m]",
+            x="X [m]",
             y="T11 / (lambda + 2 mu)" if first else "",
             same_x="X",
             ylim=sorted((1.9 * plateau, -0.6 * plateau)),

@@ -182,7 +182,7 @@ class TaylorBar(Case):
                     level(0.0, color="0.5", linewidth=1.0, zorder=0),
                     title=f"{1e6 * record.times[k]:.0f} us",
                     x="x [mm]",
-                    y="" if frames else "z [mm]",
+                    y="z [mm]",
                     same_y="z",
                     aspect="equal",
                     xlim=(-8.0, 8.0),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from itertools import product
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, final
 
@@ -80,7 +80,7 @@ class Panel:
     legend: Mapping[str, Any] | None = None  # its style; None for no legend
     grid: bool = False
     projection: str | None = None
-    same_x: str = ""  # panels of one name have one scale
+    same_x: str = ""  # panels of one name have one scale, and labels at the outermost of them
     same_y: str = ""
     properties: Mapping[str, Any] = attrs.field(factory=dict)
 
@@ -154,6 +154,7 @@ class Sheet:
         axes, coloured = self._axes(figure), {}
         for one, where in axes.items():
             coloured[one] = one.draw(where)
+        self._hide_inner_labels(axes)
         for bar in self.bars:
             place = [axes[one] for one in bar.panels]
             figure.colorbar(coloured[bar.panels[-1]], ax=place, label=bar.label, **bar.style)
@@ -168,7 +169,7 @@ class Sheet:
         return path
 
     def _axes(self, figure: Figure) -> Mapping[Panel, Axes]:
-        """Axes by panel; of those with one scale only the outermost have numbers."""
+        """Axes by panel, those of one scale tied together."""
         panels = list(dict.fromkeys(one for row in self.rows for one in row if one is not None))
         names = [
             ["." if one is None else str(panels.index(one)) for one in row] for row in self.rows
@@ -186,12 +187,17 @@ class Sheet:
                 if group := getattr(one, share):
                     if (other := first.setdefault(group, where)) is not where:
                         (where.sharex if share == "same_x" else where.sharey)(other)
-        for r, c in product(range(len(self.rows)), range(len(self.rows[0]))):
-            one = self.rows[r][c]
-            below = self.rows[r + 1][c] if r + 1 < len(self.rows) else None
-            left = self.rows[r][c - 1] if c else None
-            if one and one.same_x and below and below is not one and below.same_x == one.same_x:
-                axes[one].tick_params(labelbottom=False)
-            if one and one.same_y and left and left is not one and left.same_y == one.same_y:
-                axes[one].tick_params(labelleft=False)
         return axes
+
+    def _hide_inner_labels(self, axes: Mapping[Panel, Axes]) -> None:
+        """Leave the labels of a common scale to the lowest and to the leftmost panel."""
+        for upper, lower in pairwise(self.rows):
+            for one, below in zip(upper, lower, strict=True):
+                if one and below and one is not below and one.same_x and one.same_x == below.same_x:
+                    axes[one].tick_params(labelbottom=False)
+                    axes[one].set_xlabel("")
+        for row in self.rows:
+            for left, one in pairwise(row):
+                if one and left and one is not left and one.same_y and one.same_y == left.same_y:
+                    axes[one].tick_params(labelleft=False)
+                    axes[one].set_ylabel("")
