@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import final
+from typing import Any, final
 
 import attrs
 import numpy as np
@@ -28,14 +28,14 @@ class Column:
     def panels(self, stations: Sequence[float], end: float) -> list[Panel]:
         """One panel for each station, from 0 to `end` [s]."""
         times = np.linspace(0.0, float(self.record.times[-1]), 3000)
-        panels = []
+        panels: list[Panel] = []
         for station in stations:
             exact = 1e-3 * self.exact.stress(np.array(station), times)
             stress = 1e-3 * Histories.of(self.record, self.exact).at(station)
             marks = [
                 theory(1e6 * times, exact, linewidth=3.2),
                 line(1e6 * self.record.times, stress, linewidth=0.7, label="SPH"),
-                zero(color="0.85", linewidth=0.6),
+                zero(),
             ]
             if self.viscous is not None:
                 stress = 1e-3 * Histories.of(self.viscous, self.exact).at(station)
@@ -74,7 +74,7 @@ def _bar(stations: Sequence[float]) -> Panel:
     """Fig. 10: the pulse comes from the left, the right end is fixed."""
     wall = {"facecolor": "white", "edgecolor": "black", "hatch": "////"}
     rod = {"color": "0.85", "edgecolor": "black", "linewidth": 1.0}
-    names = {"ha": "right", "va": "top"}
+    names: dict[str, Any] = {"ha": "right", "va": "top"}
     return panel(
         mark("fill_between", [0.0, LENGTH], -0.25, 0.25, **rod),
         mark("fill_between", [LENGTH, LENGTH + 0.003], -0.6, 0.6, **wall),

@@ -194,4 +194,4 @@ def _by_cover(lines: Mapping[float, Line]) -> Sequence[Panel]:
 
 def _near_left_end(of: Line, kinds: Mask) -> Mask:
     """Which particles of these kinds are near the left end (n,)."""
-    return np.asarray(kinds & (of.X <= 1.5 * of.kernel.support_radius))
+    return np.asarray(kinds & (1.5 * of.kernel.support_radius >= of.X))

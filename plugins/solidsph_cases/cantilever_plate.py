@@ -110,7 +110,7 @@ class CantileverPlate(Case):
         shape = box(LENGTH, HEIGHT, origin=[0.0, -0.5 * HEIGHT])
         material = NeoHookean(YOUNGS_MODULUS, self.poissons_ratio, DENSITY)
         tags = {"tip": f"X > {LENGTH - 0.1 * spacing!r} and abs(Y) < {0.6 * spacing!r}"}
-        velocity = {"x": 0.0, "y": f"{self.tip_speed!r}*({mode_formula()})"}
+        velocity: dict[str, float | str] = {"x": 0.0, "y": f"{self.tip_speed!r}*({mode_formula()})"}
         options = {"discretisation": FITTED, "tags": tags}
         builder = (
             solid(self.title, "plate", shape, spacing, material, **options)

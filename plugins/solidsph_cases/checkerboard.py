@@ -75,9 +75,7 @@ class Checkerboard(Case):
         shape = box(*[side] * d)
         signs = "*".join(f"cos({pi / SPACING!r}*{name})" for name in "XYZ"[:d])
         builder = solid(self.title, "body", shape, SPACING, SOFT, discretisation=ON_BOUNDARY)
-        builder = builder.initial(
-            velocity={axis: f"{self.speed * c!r}*{signs}" for axis in "xyz"[:d]}
-        )
+        builder = builder.initial(velocity=dict.fromkeys("xyz"[:d], f"{self.speed * c!r}*{signs}"))
         return {"body": in_motion(builder, self, self.transits * side / c, 200).scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:

@@ -111,7 +111,10 @@ class Csm3(Case):
                     (f"amplitude of {name}", 500.0 * (most - least), "mm", 1e3 * amplitude, 0.05),
                 ]
             found.append(("frequency", f, "Hz", frequency, self.tolerance))
-        return [compared(record, *four, held.source, tolerance) for *four, tolerance in found]
+        return [
+            compared(record, quantity, value, unit, reference, held.source, tolerance)
+            for quantity, value, unit, reference, tolerance in found
+        ]
 
     def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
         """The beam at its lowest, and both components of the tip's displacement over time."""

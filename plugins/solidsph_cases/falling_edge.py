@@ -20,7 +20,7 @@ from solidsph_cases._moments import Moments, of_lattice
 from solidsph_cases._scheme import check_count
 from solidsph_cases._slopes import SlopeOfEdge
 from solidsph_cases.drawing.profiles import KEY, by_cover
-from solidsph_cases.drawing.sheet import Panel, Sheet, panel, theory
+from solidsph_cases.drawing.sheet import Mark, Panel, Sheet, panel, theory
 
 GRADIENTS = ("standard", "corrected")
 
@@ -99,7 +99,7 @@ class FallingEdge(Case):
     def _sheet(self, figures: Sequence[str], widths: Sequence[int]) -> Sheet:
         """A column a figure: the field, its plain and its corrected slope."""
         plain, corrected = (self.lines(gradient) for gradient in GRADIENTS)
-        columns = []
+        columns: list[Sequence[Panel]] = []
         for figure, width in zip(figures, widths, strict=True):
             kinds = (
                 (plain, edge, lambda line, f: line.smoothing @ f, "f \\rangle$ [1]"),
@@ -282,7 +282,8 @@ def _panel(
     **options: Any,
 ) -> Panel:
     """Near the edge: exact values at the particles, and the approximations of every cover."""
-    curves, marks = {}, []
+    curves = {}
+    marks: list[Mark] = []
     for cover, line in lines.items():
         places = (line.X - 0.5 * LENGTH) / line.spacing
         # As far as the largest support reaches beyond the kinks.

@@ -30,7 +30,7 @@ from solidsph_cases._moments import Moments, of_lattice
 from solidsph_cases._scheme import check_count
 from solidsph_cases._slopes import SlopeOfQuartic
 from solidsph_cases.drawing.profiles import KEY, by_cover
-from solidsph_cases.drawing.sheet import Panel, Sheet, panel, text, theory
+from solidsph_cases.drawing.sheet import Panel, Sheet, note, panel, theory
 
 ORDERS = {0: "f", 1: "f'", 2: "f''"}
 
@@ -300,12 +300,12 @@ def _panel(
     x = np.linspace(0.0, min(reach, LENGTH), 400)
     curves = {}
     for cover, line in lines.items():
-        shown = line.real & (line.X <= reach)
+        shown = line.real & (reach >= line.X)
         curves[cover] = line.X[shown], approximated(line, order)[shown]
     return panel(
         theory(x, F.deriv(order)(x)),
         *by_cover(curves),
-        text(0.5, 0.95, words, inside=True, va="top"),
+        note(words),
         y=f"$\\langle {ORDERS[order]} \\rangle$ [m$^{4 - order}$]",
         grid=True,
         **options,

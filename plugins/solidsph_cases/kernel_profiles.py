@@ -108,10 +108,11 @@ class KernelProfiles(Case):
             ("d ln w / d q^2 at q = 0", float(curvature), -1.0 / SMOOTHING_LENGTH**2),
         ):
             error = abs(value / reference - 1.0)
-            # The fit leaves out q^8, 1e-8 of q^2 at its end.
-            more = {"passed": error <= 1e-7, "paper": resembles}
-            name = f"{PAPERS}: {quantity}"
-            yield Measurement(name, value, "1", reference, source, error, **more)
+            passed = error <= 1e-7  # the fit leaves out q^8, 1e-8 of q^2 at its end
+            name, verdict = f"{PAPERS}: {quantity}", ""
+            yield Measurement(
+                name, value, "1", reference, source, error, verdict, passed, resembles
+            )
         r = np.linspace(0.0, 1.0, 2001)
         apart = np.abs(kernel.value(r) - gaussian(r)).max() / float(gaussian(np.zeros(1))[0])
         yield Measurement(
@@ -137,8 +138,10 @@ class KernelProfiles(Case):
             error = abs(mass / expected - 1.0)
             source = "eq. 2, less what a cut loses"
             paper = "normalised numerically" if name == PAPERS else ""
-            more = {"passed": error <= _QUADRATURE, "paper": paper}
-            yield Measurement(f"{name}: mass", mass, "1", expected, source, error, **more)
+            passed = error <= _QUADRATURE
+            yield Measurement(
+                f"{name}: mass", mass, "1", expected, source, error, "", passed, paper
+            )
             quantity = f"{name}: second moment over H^2, which smooths"
             yield Measurement(quantity, second, "1", source="adaptive quadrature")
 

@@ -29,7 +29,7 @@ from solidsph_cases._bar import (
 from solidsph_cases._compare import alone, compared, finished
 from solidsph_cases._finite_waves import FiniteWave, Law, Shock, law_of
 from solidsph_cases._scheme import check_count
-from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark, panel, text, theory
+from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark, note, panel, theory
 
 # The wave is watched until it has come so far: its exact solution knows no right end.
 _END = 0.9  # of the bar
@@ -186,7 +186,7 @@ class NonlinearBar(Case):
         ]
         if not finished(inviscid):
             words = f"without viscosity diverged at {1e6 * inviscid.times[-1]:.1f} us"
-            marks.append(text(0.5, 0.97, words, inside=True, va="top"))
+            marks.append(note(words))
         plateau = wave.stress / modulus
         pushed = wave.velocity > 0.0
         speed = abs(wave.velocity) / self.law.small_speed
@@ -221,7 +221,7 @@ class NonlinearBar(Case):
             mark("fill_between", -v, tails, heads, **fan),
             line(-v, [w.half_speed / c for w in fans], "k--", label="half of the fan"),
             mark("axhline", 1.0, **linear),
-            line(*np.transpose(measured), "ko", **sph),
+            mark("plot", *np.transpose(measured), "ko", **sph),
             x="velocity of the end / c_p   (pull < 0 < push)",
             y="wave speed / c_p",
             legend={"loc": "upper left", "fontsize": 10},

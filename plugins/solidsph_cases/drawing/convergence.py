@@ -54,9 +54,8 @@ def errors_panel(
         axes.set_yscale("log")
         for (order, values), style in zip(slopes.items(), (":", "--"), strict=True):
             axes.plot(spacings, values, style, color="0.6", linewidth=1.0, zorder=0)
-            place = {"ha": "right", "va": "center", "fontsize": 8, "color": "0.35"}
             end = (spacings[-1] * 0.98, values[-1])
-            axes.annotate(f"order {order:.3g}", end, **place)
+            axes.text(*end, f"order {order:.3g}", ha="right", va="center", fontsize=8, color="0.35")
         axes.set_ylim(lowest, 2.5 * largest)
         shown = _TICKS[(lowest < _TICKS) & (2.5 * largest > _TICKS)]
         axes.set_yticks(shown, [f"{tick:g}" for tick in shown])

@@ -32,7 +32,8 @@ def field(record: Record, step: int, values: Array, **style: Any) -> Mark:
     def draw(axes: Axes) -> Any:
         from matplotlib.tri import Triangulation
 
-        mesh = Triangulation(*record.positions[step].T, triangles(record))
+        x, y = record.positions[step].T
+        mesh = Triangulation(x, y, triangles(record))
         axes.set_aspect("equal")
         return axes.tripcolor(mesh, values, **{"shading": "gouraud", "cmap": "cividis"} | style)
 

@@ -30,36 +30,44 @@ def line(x: ArrayLike, y: ArrayLike, style: str = "k-", **more: Any) -> Mark:
 
 def theory(x: ArrayLike, y: ArrayLike, label: str | None = "exact", **more: Any) -> Mark:
     """A broad grey curve behind what is measured."""
-    return mark(
-        "plot", x, y, **{"color": "0.78", "linewidth": 4.0, "zorder": 1} | more, label=label
-    )
+    look = {"color": "0.78", "linewidth": 4.0, "zorder": 1, "label": label}
+    return mark("plot", x, y, **look | more)
 
 
 def level(height: float, label: str = "", **style: Any) -> Mark:
     """A line across the panel, with a label at its right end."""
+    look: dict[str, Any] = {"color": "black", "linewidth": 0.9} | style
 
     def draw(axes: Axes) -> None:
-        axes.axhline(height, **{"color": "black", "linewidth": 0.9} | style)
-        if label:
-            place = {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points"}
-            axes.annotate(label, (0.99, height), xytext=(0, 3), ha="right", fontsize=9, **place)
+        axes.axhline(height, **look)
+        axes.annotate(
+            label,
+            (0.99, height),
+            xycoords=axes.get_yaxis_transform(),
+            xytext=(0, 3),
+            textcoords="offset points",
+            ha="right",
+            fontsize=9,
+        )
 
     return draw
 
 
-def zero(**style: Any) -> Mark:
+def zero() -> Mark:
     """A faint line at zero."""
-    return level(0.0, **{"color": "0.8", "linewidth": 0.8, "zorder": 0} | style)
+    return level(0.0, color="0.82", linewidth=0.7, zorder=0)
 
 
-def text(x: float, y: float, words: str, *, inside: bool = False, **style: Any) -> Mark:
-    """Words at a place of the data, or of the panel from 0 to 1 if `inside`."""
+def text(x: float, y: float, words: str, **style: Any) -> Mark:
+    """Words at a place of the data."""
+    return mark("text", x, y, words, **{"ha": "center", "va": "center", "fontsize": 9} | style)
 
-    def draw(axes: Axes) -> None:
-        where = {"transform": axes.transAxes} if inside else {}
-        axes.text(x, y, words, **{"ha": "center", "va": "center", "fontsize": 9} | where | style)
 
-    return draw
+def note(words: str) -> Mark:
+    """Words at the top of the panel."""
+    return lambda axes: axes.text(
+        0.5, 0.95, words, transform=axes.transAxes, ha="center", va="top", fontsize=9
+    )
 
 
 def arrow(tip: Sequence[float], tail: Sequence[float], style: str = "-|>", **more: Any) -> Mark:
@@ -156,12 +164,12 @@ class Sheet:
             coloured[one] = one.draw(where)
         self._hide_inner_labels(axes)
         for bar in self.bars:
-            place = [axes[one] for one in bar.panels]
-            figure.colorbar(coloured[bar.panels[-1]], ax=place, label=bar.label, **bar.style)
+            beside = [axes[one] for one in bar.panels]
+            figure.colorbar(coloured[bar.panels[-1]], ax=beside, label=bar.label, **bar.style)
         if self.key is not None:
             handles, labels = axes[self.key].get_legend_handles_labels()
-            place = {"loc": "outside lower center", "ncols": len(labels), "frameon": False}
-            figure.legend(handles, labels, **place | dict(self.key_style))
+            place: dict[str, Any] = {"loc": "outside lower center", "ncols": len(labels)}
+            figure.legend(handles, labels, frameon=False, **place | dict(self.key_style))
         if self.title:
             figure.suptitle(self.title, fontsize=11)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -171,7 +179,7 @@ class Sheet:
     def _axes(self, figure: Figure) -> Mapping[Panel, Axes]:
         """Axes by panel, those of one scale tied together."""
         panels = list(dict.fromkeys(one for row in self.rows for one in row if one is not None))
-        names = [
+        names: Any = [
             ["." if one is None else str(panels.index(one)) for one in row] for row in self.rows
         ]
         made = figure.subplot_mosaic(
