@@ -189,12 +189,15 @@ class Sheet:
             per_subplot_kw={str(k): {"projection": p.projection} for k, p in enumerate(panels)},
         )
         axes = {one: made[str(k)] for k, one in enumerate(panels)}
-        for share in ("same_x", "same_y"):
-            first: dict[str, Axes] = {}
-            for one, where in axes.items():
-                if group := getattr(one, share):
-                    if (other := first.setdefault(group, where)) is not where:
-                        (where.sharex if share == "same_x" else where.sharey)(other)
+        first: dict[tuple[str, str], Axes] = {}
+        for one, where in axes.items():
+            for name, group, share in (
+                ("x", one.same_x, where.sharex),
+                ("y", one.same_y, where.sharey),
+            ):
+                other = first.setdefault((name, group), where)
+                if group and other is not where:
+                    share(other)
         return axes
 
     def _hide_inner_labels(self, axes: Mapping[Panel, Axes]) -> None:
