@@ -27,7 +27,7 @@ from solidsph_cases._bar import (
     with_viscosity,
 )
 from solidsph_cases._compare import alone, compared, finished
-from solidsph_cases._finite_waves import FiniteWave, Law, Shock, law_of
+from solidsph_cases._finite_waves import FiniteWave, Law, law_of
 from solidsph_cases._scheme import check_count
 from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark, note, panel, theory
 
@@ -188,12 +188,10 @@ class NonlinearBar(Case):
             words = f"without viscosity diverged at {1e6 * inviscid.times[-1]:.1f} us"
             marks.append(note(words))
         plateau = wave.stress / modulus
-        pushed = wave.velocity > 0.0
-        speed = abs(wave.velocity) / self.law.small_speed
+        speed, kind = abs(wave.velocity) / self.law.small_speed, "push" if wave.is_shock else "pull"
         return panel(
             *marks,
-            title=f"{'push' if pushed else 'pull'} at {speed:g} c_p: stretch {wave.stretch:.4f}, "
-            f"t = {1e6 * end:.1f} us",
+            title=f"{kind} at {speed:g} c_p: stretch {wave.stretch:.4f}, t = {1e6 * end:.1f} us",
             x="X [m]",
             y="T11 / (lambda + 2 mu)" if first else "",
             same_x="X",
@@ -241,9 +239,8 @@ class NonlinearBar(Case):
     def _compared(
         self, name: str, wave: FiniteWave, record: Record, inviscid: Record
     ) -> list[Measurement]:
-        shock = isinstance(wave, Shock)
-        source = _SHOCK if shock else _FAN
-        of = "of the shock" if shock else "of half the plateau in the fan"
+        source = _SHOCK if wave.is_shock else _FAN
+        of = "of the shock" if wave.is_shock else "of half the plateau in the fan"
         speed, stress = half_speed(record, wave), plateau(record, wave)
         over, without = overshoot(record, wave), overshoot(inviscid, wave)
         error = f"{name}: root mean square error of the profile at the end, relative"
@@ -260,7 +257,7 @@ class NonlinearBar(Case):
             ),
             alone(record, error, profile_error(record, wave)),
         ]
-        if isinstance(wave, Shock):
+        if wave.is_shock:
             found.append(self._power(name, wave, record))
         return [
             *found,
@@ -273,7 +270,7 @@ class NonlinearBar(Case):
             ),
         ]
 
-    def _power(self, name: str, shock: Shock, record: Record) -> Measurement:
+    def _power(self, name: str, shock: FiniteWave, record: Record) -> Measurement:
         """Power that the shock takes; nothing of it is in the viscosity's formula."""
         found = compared(
             record,

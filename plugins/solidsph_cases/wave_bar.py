@@ -29,7 +29,7 @@ from solidsph_cases._bar import (
 )
 from solidsph_cases._bar_histories import SOURCE, Histories
 from solidsph_cases._bar_pictures import Column, histories_sheet
-from solidsph_cases._bar_waves import FREE, HELD, BarWaves, Pulse, Smooth, Square
+from solidsph_cases._bar_waves import FREE, HELD, BarWaves, Pulse, smooth_pulse, square_pulse
 from solidsph_cases._compare import alone, finished
 from solidsph_cases._scheme import ON_BOUNDARY, check_all_positive, check_count, solid
 from solidsph_cases._wave_measures import STATIONS, TRAVELLING
@@ -131,7 +131,7 @@ class WaveBar(Case):
     @property
     def pulses(self) -> tuple[Pulse, Pulse]:
         """Smooth and square."""
-        return Smooth(self.pulse), Square(self.pulse)
+        return smooth_pulse(self.pulse), square_pulse(self.pulse)
 
     def exact(self, reading: Reading, pulse: Pulse, left: float = FREE) -> BarWaves:
         """The solution of one scene; `left` says what the left end is after the pulse."""
