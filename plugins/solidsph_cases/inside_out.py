@@ -46,7 +46,7 @@ class InsideOut(Case):
         spacing = 1.0 / (self.particles - 1)
         middle = spacing * (self.particles // 2)
         near = self.size * spacing
-        tags = {"piece": "*".join(f"(abs({axis} - {middle!r}) < {near!r})" for axis in "XY")}
+        tags = {"piece": " and ".join(f"abs({axis} - {middle!r}) < {near!r}" for axis in "XY")}
         options = {"discretisation": ON_BOUNDARY, "tags": tags}
         builder = (
             solid(self.title, "square", box(1.0, 1.0), spacing, SOFT, **options)
