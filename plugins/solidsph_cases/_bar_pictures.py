@@ -12,7 +12,7 @@ from solidsph.results.record import Record
 from solidsph_cases._bar import LENGTH
 from solidsph_cases._bar_histories import Histories
 from solidsph_cases._bar_waves import BarWaves
-from solidsph_cases.drawing.sheet import Panel, Sheet, arrow, line, mark, panel, text, theory, zero
+from solidsph_cases.drawing.sheet import Panel, Sheet, arrow, line, mark, text, theory, zero
 
 
 @final
@@ -42,7 +42,7 @@ class Column:
                 style = {"color": "tab:red", "linewidth": 1.4, "label": "SPH with viscosity"}
                 marks.append(line(1e6 * self.viscous.times, stress, "--", **style))
             panels.append(
-                panel(
+                Panel(
                     *marks,
                     title="" if panels else self.heading,
                     x="time [us]",
@@ -75,7 +75,7 @@ def _bar(stations: Sequence[float]) -> Panel:
     wall = {"facecolor": "white", "edgecolor": "black", "hatch": "////"}
     rod = {"color": "0.85", "edgecolor": "black", "linewidth": 1.0}
     names: dict[str, Any] = {"ha": "right", "va": "top"}
-    return panel(
+    return Panel(
         mark("fill_between", [0.0, LENGTH], -0.25, 0.25, **rod),
         mark("fill_between", [LENGTH, LENGTH + 0.003], -0.6, 0.6, **wall),
         arrow((0.0, 0.0), (-0.012, 0.0), color="black", linewidth=1.5),

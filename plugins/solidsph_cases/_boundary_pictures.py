@@ -18,7 +18,6 @@ from solidsph_cases.drawing.sheet import (
     arrow,
     line,
     mark,
-    panel,
     text,
     theory,
 )
@@ -100,7 +99,7 @@ def _way(way: str, x: ArrayLike, values: ArrayLike) -> Mark:
 def _along(*marks: Mark, **options: Any) -> Panel:
     """A panel over the distance from the boundary."""
     boundary = mark("axvline", 0.0, color="0.85", linewidth=1.0, zorder=0)
-    return panel(*marks, boundary, x="distance from the boundary [ps]", grid=True, **options)
+    return Panel(*marks, boundary, x="distance from the boundary [ps]", grid=True, **options)
 
 
 def _region(of: Line) -> Panel:
@@ -126,7 +125,7 @@ def _region(of: Line) -> Panel:
             (of.real & ~at_ends, "ko", "black", "interior particles"),
         )
     ]
-    return panel(
+    return Panel(
         mark("axvspan", left, right, color="0.95", zorder=0),
         *(mark("axvline", end, color="0.7", linewidth=1.0, zorder=0) for end in ends),
         mark("fill_between", left + r, W, color="0.85", zorder=1),
@@ -171,7 +170,7 @@ def _by_cover(lines: Mapping[float, Line]) -> Sequence[Panel]:
         )
         for cover, of in lines.items()
     ]
-    at_end = panel(
+    at_end = Panel(
         *(_way(way, covers, values) for way, values in misses.items()),
         mark("set_yscale", "symlog", linthresh=1e-4),
         margins,
@@ -179,7 +178,7 @@ def _by_cover(lines: Mapping[float, Line]) -> Sequence[Panel]:
         y="miss of $\\langle f \\rangle$ at the boundary [m$^4$]",
         **shared,
     )
-    beside = panel(
+    beside = Panel(
         mark("set_yscale", "log"),
         *(_way(way, covers, values) for way, values in errors.items()),
         margins,

@@ -13,7 +13,7 @@ from solidsph.registry.construct import construct
 from solidsph.studies.case import Curves, Measurement
 from solidsph_cases._line import Line, complete_line, irregular_line
 from solidsph_cases._moments import of_continuum
-from solidsph_cases.drawing.sheet import Sheet, line, mark, panel, theory
+from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark, theory
 
 ON_LATTICE = "on a lattice"
 TRAPEZOIDAL = "irregular, trapezoidal weights"
@@ -178,13 +178,13 @@ def pictures(kernel: str, f: Polynomial) -> Sheet:
         label = f"{name}: order {slope(ratio, error):.2f}"
         discretisation.append(line(ratio, error, style, label=label))
     log = (mark("loglog"), mark("grid", color="0.93", which="both"))
-    left = panel(
+    left = Panel(
         *(*log, *smoothing),
         x="support radius h [m]",
         y="error by smoothing at x = 0",
         legend={},
     )
-    right = panel(
+    right = Panel(
         *(*log, *discretisation),
         x="spacing over support radius dx/h [1]",
         y="error of $\\langle 1 \\rangle$ [1]",

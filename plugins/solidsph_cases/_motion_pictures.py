@@ -20,12 +20,12 @@ from solidsph_cases.drawing.sheet import (
     BELOW,
     Bar,
     Mark,
+    Panel,
     Sheet,
     arrow,
     level,
     line,
     mark,
-    panel,
     text,
 )
 
@@ -54,7 +54,7 @@ def problem(record: Record, sheet: Quarter) -> Sheet:
     """A quarter of the sheet, its particles, what holds it and what pulls it."""
     a = sheet.radius / sheet.width
     pulls = (arrow((1.17, y), (1.03, y), color="black") for y in np.linspace(0.05, 0.95, 7))
-    body = panel(
+    body = Panel(
         *quarter_particles(record, sheet.width),
         line(*quarter_sheet(a, 1.0), linewidth=1.0),
         *pulls,
@@ -88,7 +88,7 @@ def final_stress(
     white = {"color": "white", "arrowprops": {"arrowstyle": "->", "color": "white"}}
     offset = {"xytext": (38, 14), "textcoords": "offset points", "fontsize": 10}
     place = ramped.positions[-1][top]
-    body = panel(
+    body = Panel(
         field(ramped, -1, stress),
         sheet.before,
         mark("annotate", f"{stress[top]:.1f} MPa", place, **offset, **white),
@@ -112,7 +112,7 @@ def final_stress(
         label = f"equilibrium: {1e-6 * peak:.1f} MPa"
         below.append(level(1e-6 * peak, label, linestyle="--"))
     end = max(float(record.times[-1]) for record in (sudden, ramped)) / sheet.crossing
-    extending = panel(
+    extending = Panel(
         *above,
         y="mean u_x of the edge / W",
         same_x="time",
@@ -120,7 +120,7 @@ def final_stress(
         ylim=(0.0, 1.3 * float(extensions(sudden).max()) / sheet.width),
         legend={"loc": "upper right", "ncols": 2},
     )
-    stressing = panel(
+    stressing = Panel(
         *below,
         x="time [W / c_p]",
         y="largest stress [MPa]",
@@ -145,7 +145,7 @@ def waves(record: Record, sheet: Quarter) -> Sheet:
             "vmax": max(float(stress.max()) for stress in stresses),
         }
         panels = [
-            panel(
+            Panel(
                 field(record, step, stress, **colours),
                 sheet.before,
                 title=f"t = {times[step]:.1f} W / c_p",

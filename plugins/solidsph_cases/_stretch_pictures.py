@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from solidsph_cases._stretch_history import History, StressCurve
-from solidsph_cases.drawing.sheet import Mark, Panel, Sheet, line, mark, panel
+from solidsph_cases.drawing.sheet import Mark, Panel, Sheet, line, mark
 
 _MARKERS = "osD^v<>"
 _STYLES = ("-", "--", "-.", ":")
@@ -44,7 +44,7 @@ def stress_over_stretch(
         _mean(name, history, _MARKERS[k % len(_MARKERS)])
         for k, (name, history) in enumerate(histories.items())
     ]
-    left = panel(
+    left = Panel(
         *marks,
         x="stretch of the whole, $\\lambda_1$",
         y="Cauchy stress $\\sigma_{11}$ [MPa]",
@@ -68,7 +68,7 @@ def _swings(bar: History) -> Panel:
     swings = 100.0 * (bar.stresses[begun] / static[:, None] - 1.0)
     least, most = swings.min(axis=1), swings.max(axis=1)
     middle = {"color": "0.45", "linewidth": 0.8, "label": "its middle"}
-    return panel(
+    return Panel(
         mark(
             "fill_between", stretches, least, most, color="0.85", label="all particles of the bar"
         ),

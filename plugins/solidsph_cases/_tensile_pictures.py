@@ -8,7 +8,7 @@ import numpy as np
 
 from solidsph.results.record import Record
 from solidsph_cases._bar import along, displacements
-from solidsph_cases.drawing.sheet import Mark, Panel, Sheet, line, mark, panel, text
+from solidsph_cases.drawing.sheet import Mark, Panel, Sheet, line, mark, text
 
 
 def configuration(record: Record, stretch: float, perturbation: float) -> Sheet:
@@ -23,7 +23,7 @@ def configuration(record: Record, stretch: float, perturbation: float) -> Sheet:
             *(line([at, at], [y - 0.3, y + 0.3], linewidth=3.0) for at in places[[0, -1]]),
             text(-0.02 * end, y, name, ha="right", fontsize=10),
         ]
-    bar = panel(
+    bar = Panel(
         *marks,
         lambda axes: axes.spines[["left", "right", "top"]].set_visible(False),
         title="particles; both ends (bars) are held, the centre one is displaced",
@@ -32,7 +32,7 @@ def configuration(record: Record, stretch: float, perturbation: float) -> Sheet:
         ylim=(-0.6, 1.6),
         yticks=[],
     )
-    below = panel(
+    below = Panel(
         line(X, (stretch - 1.0) * X, "-", color="0.55", linewidth=1.0, label="uniform stretch"),
         line(X, u, "ko", markersize=3, label="at the start"),
         mark(
@@ -78,7 +78,7 @@ def _motions(form: str, record: Record, transit: float) -> list[Panel]:
         for k in range(middle - 3, middle + 4)
     ]
     time = "time after the perturbation [wave transits of the bar]"
-    every = panel(
+    every = Panel(
         line(times, u, "-", color="0.55", linewidth=0.6),
         line(times, u[:, middle], linewidth=1.4),
         title=f"{form}: all {count} particles, the centre one bold",
@@ -87,7 +87,7 @@ def _motions(form: str, record: Record, transit: float) -> list[Panel]:
         same_x="left",
         same_y="every",
     )
-    few = panel(
+    few = Panel(
         *seven,
         title=f"{form}: the middle seven",
         x=time,

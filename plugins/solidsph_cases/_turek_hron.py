@@ -17,7 +17,7 @@ from solidsph.scene.scene_builder import SceneBuilder
 from solidsph_builtin.materials.saint_venant_kirchhoff import SaintVenantKirchhoff
 from solidsph_cases._scheme import FITTED, ON_BOUNDARY, Scheme, box, solid, with_scheme
 from solidsph_cases.drawing.fields import LARGEST_STRESS, field, outline, principal_stress
-from solidsph_cases.drawing.sheet import BELOW, Bar, Mark, Panel, line, panel
+from solidsph_cases.drawing.sheet import BELOW, Bar, Mark, Panel, line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -139,7 +139,7 @@ def extremum(times: Array, values: Array, index: int) -> tuple[float, float]:
 
 def beam_panel(record: Record, step: int, held: Clamp, title: str, *marks: Mark) -> Panel:
     """The beam coloured by stress, what holds it, and where it was without its weight."""
-    return panel(
+    return Panel(
         outline(record.particles.positions[record.particles.tagged("surface")], color="0.75"),
         _disc if held is ARC else line([0.0, 0.0], [-0.03, 0.03], "-", color="0.4", linewidth=3.0),
         field(record, step, principal_stress(record, step, 1e-3)),

@@ -22,7 +22,7 @@ from solidsph.studies.case import Case, Measurement, Trial
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 from solidsph_cases._compare import compared
 from solidsph_cases._scheme import FITTED, box, check_all_positive, check_count, in_motion, solid
-from solidsph_cases.drawing.sheet import Sheet, line, panel, theory, zero
+from solidsph_cases.drawing.sheet import Panel, Sheet, line, theory, zero
 
 LENGTH = 0.2  # [m]
 HEIGHT = 0.02  # [m]
@@ -156,7 +156,7 @@ class CantileverPlate(Case):
         u = (record.positions[largest] - particles.positions)[middle, 1]
         x = np.linspace(0.0, LENGTH, 200)
         mode = Expression.parse(mode_formula(), ("X",))({"X": x})
-        shape = panel(
+        shape = Panel(
             theory(x, mode, "beam theory"),
             line(X, u / tip[largest], "ko", markersize=4, label="mid-plane"),
             x="X [m]",
@@ -168,7 +168,7 @@ class CantileverPlate(Case):
         times = np.linspace(0.0, float(record.times[-1]), 400)
         swing = 1e3 * float(np.abs(tip).max()) * np.sin(2.0 * np.pi * times / period)
         label = f"tip: T = {measured.value:.4f} s (natural: {natural.value:.4f} s)"
-        history = panel(
+        history = Panel(
             theory(times, swing, f"reference: T = {period:.4f} s"),
             line(record.times, 1e3 * tip, "ko", markersize=4, label=label),
             zero(),

@@ -22,7 +22,7 @@ from solidsph_builtin.materials.linear_elastic import LinearElastic
 from solidsph_cases._compare import compared, finished, vanishing
 from solidsph_cases._energy import residual_over_start
 from solidsph_cases._scheme import box, check_all_positive, check_count, with_scheme
-from solidsph_cases.drawing.sheet import Sheet, line, panel
+from solidsph_cases.drawing.sheet import Panel, Sheet, line
 
 LENGTH = 1.0  # of each bar [m]
 MATERIAL = LinearElastic(youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
@@ -170,14 +170,14 @@ class CollidingBars(Case):
         first, second = self.mean_velocities(record).T / self.velocity
         part = 0.5 * np.clip(t, 0.0, 2.0)
         law = {"color": "tab:orange", "linestyle": "--", "linewidth": 1.5}
-        force = panel(
+        force = Panel(
             line(t, record.history[_FORCE] / self.plateau, linewidth=1.0, label="simulated"),
             line(t, (t > 0.0) & (t < 2.0), "-", **law, label="waves of two bars"),
             x="time since the contact [L / c]",
             y="force of contact [rho c v A / 2]",
             legend={},
         )
-        velocity = panel(
+        velocity = Panel(
             line(t, 1.0 - part, "-", **law, zorder=0),
             line(t, part, "-", **law, zorder=0),
             line(t, first, label="first bar"),

@@ -20,7 +20,7 @@ from solidsph_cases._compare import finished, vanishing
 from solidsph_cases._energy import residual_over_start, smallest_volume_ratio
 from solidsph_cases._scheme import check_all_positive, check_count, with_scheme
 from solidsph_cases.drawing.fields import scatter
-from solidsph_cases.drawing.sheet import Bar, Sheet, line, panel
+from solidsph_cases.drawing.sheet import Bar, Panel, Sheet, line
 
 INNER, OUTER = 0.03, 0.04  # radii [m]
 YOUNGS_MODULUS, POISSONS_RATIO, DENSITY = 1e7, 0.3975, 1010.0  # [Pa], [-], [kg/m^3]
@@ -180,7 +180,7 @@ class CollidingRings(Case):
         (left, bottom), (right, top) = places.min(axis=0) - 2.0, places.max(axis=0) + 2.0
         span = max(abs(float(J[k].min()) - 1.0) for k in shown)
         frames = [
-            panel(
+            Panel(
                 scatter(
                     *(1e3 * record.positions[k], J[k], "coolwarm_r"),
                     vmin=1.0 - span,
@@ -196,7 +196,7 @@ class CollidingRings(Case):
             for k in shown
         ]
         start = history["kinetic energy [J]"][0]
-        energies = panel(
+        energies = Panel(
             *(
                 line(times, history[f"{name} [J]"] / start, "-", label=name.split(" ")[label])
                 for name, label in (
@@ -212,7 +212,7 @@ class CollidingRings(Case):
         )
         v = self.mean_velocities(record)[:, :, 0] / self.velocity
         names = ("western ring", "eastern ring")
-        speeds = panel(
+        speeds = Panel(
             *(line(times, v[:, k], "-", label=name) for k, name in enumerate(names)),
             x="t [ms]",
             y="mean velocity over that before [-]",

@@ -26,7 +26,7 @@ from solidsph_cases._turek_hron import (
     tip,
 )
 from solidsph_cases.drawing.fields import outline
-from solidsph_cases.drawing.sheet import Sheet, line, panel
+from solidsph_cases.drawing.sheet import Panel, Sheet, line
 
 # The first minimum comes at 0.456 s, the second at 1.37 s.
 _FIRST_HALF = 0.7  # [s]
@@ -130,7 +130,7 @@ class Csm3(Case):
         )
         minimum = 1e3 * held.first_minimum
         label = f"reference: {minimum:.2f} mm at {held.first_minimum_time:g} s"
-        history = panel(
+        history = Panel(
             line(record.times, u[:, 0], "--", color="0.45", label="$u_x$ of the tip"),
             line(record.times, u[:, 1], label="$u_y$ of the tip"),
             line(held.first_minimum_time, minimum, "ko", mfc="none", ms=10, label=label),

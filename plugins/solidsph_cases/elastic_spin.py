@@ -20,7 +20,7 @@ from solidsph_cases._compare import finished, vanishing
 from solidsph_cases._energy import total_energy
 from solidsph_cases._scheme import FITTED, box, check_all_positive, check_count, in_motion, solid
 from solidsph_cases.drawing.fields import LARGEST_STRESS, field, outline, principal_stress
-from solidsph_cases.drawing.sheet import Bar, Sheet, line, mark, panel
+from solidsph_cases.drawing.sheet import Bar, Panel, Sheet, line, mark
 
 SIDE = 1.0  # [m]
 RUBBER = NeoHookean(youngs_modulus=17e6, poissons_ratio=0.3, density=1100.0)
@@ -115,7 +115,7 @@ class ElasticSpin(Case):
         """The square at the end; momentum, energy and distances over the turns."""
         record = records["spin"]
         turns = record.times * ANGULAR_VELOCITY / (2.0 * np.pi)
-        body = panel(
+        body = Panel(
             field(record, -1, principal_stress(record, -1)),
             outline(record.positions[0][record.particles.tagged("surface")]),
             title=f"after {turns[-1]:.4g} turns (dots: at the start)",
@@ -129,7 +129,7 @@ class ElasticSpin(Case):
             "smallest distance\n[spacings]": smallest_distance(record),
         }
         histories = [
-            panel(
+            Panel(
                 line(turns, values, linewidth=0.9),
                 mark("ticklabel_format", axis="y", scilimits=(-2, 2), useMathText=True),
                 x="" if row < 2 else "time [turns]",

@@ -20,7 +20,7 @@ from solidsph_cases._moments import Moments, of_lattice
 from solidsph_cases._scheme import check_count
 from solidsph_cases._slopes import SlopeOfEdge
 from solidsph_cases.drawing.profiles import KEY, by_cover
-from solidsph_cases.drawing.sheet import Mark, Panel, Sheet, panel, theory
+from solidsph_cases.drawing.sheet import Mark, Panel, Sheet, theory
 
 GRADIENTS = ("standard", "corrected")
 
@@ -291,4 +291,4 @@ def _panel(
         curves[cover] = places[near], approximation(line, edge(line, width))[near]
         if not marks:
             marks.append(theory(places[near], exact(line, width)[near]))
-    return panel(*marks, *by_cover(curves), grid=True, **options)
+    return Panel(*marks, *by_cover(curves), grid=True, **options)

@@ -26,7 +26,7 @@ from solidsph_cases._scheme import (
     with_scheme,
 )
 from solidsph_cases.drawing.fields import scatter
-from solidsph_cases.drawing.sheet import Bar, Sheet, level, line, panel
+from solidsph_cases.drawing.sheet import Bar, Panel, Sheet, level, line
 
 RADIUS = 1.0  # R, of the foot [m]
 MATERIAL = LinearElastic(youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
@@ -161,7 +161,7 @@ class Hertz(Case):
         width, peak = self.expected(record)
         along = np.linspace(0.0, width, 200)
         hertz = 1e-3 * peak * np.sqrt(1.0 - (along / width) ** 2)
-        pressures = panel(
+        pressures = Panel(
             line(x, 1e-3 * p, "ko", markersize=4.0, label="simulated"),
             line(along, hertz, "-", color="tab:orange", label="Hertz"),
             x="x [m]",
@@ -172,7 +172,7 @@ class Hertz(Case):
         places = record.positions[-1]
         near = np.all(places < 3.0 * width, axis=1)
         stress = record.field("cauchy_stress")[-1][near, 1, 1] / peak
-        field = panel(
+        field = Panel(
             scatter(places[near], stress, "viridis", s=10),
             level(0.0, linewidth=1.0),
             x="x [m]",

@@ -30,7 +30,7 @@ from solidsph_cases._moments import Moments, of_lattice
 from solidsph_cases._scheme import check_count
 from solidsph_cases._slopes import SlopeOfQuartic
 from solidsph_cases.drawing.profiles import KEY, by_cover
-from solidsph_cases.drawing.sheet import Panel, Sheet, note, panel, theory
+from solidsph_cases.drawing.sheet import Panel, Sheet, note, theory
 
 ORDERS = {0: "f", 1: "f'", 2: "f''"}
 
@@ -302,7 +302,7 @@ def _panel(
     for cover, line in lines.items():
         shown = line.real & (reach >= line.X)
         curves[cover] = line.X[shown], approximated(line, order)[shown]
-    return panel(
+    return Panel(
         theory(x, F.deriv(order)(x)),
         *by_cover(curves),
         note(words),

@@ -18,7 +18,7 @@ from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Curves, Measurement
 from solidsph_cases._moments import of_continuum
 from solidsph_cases.drawing.profiles import STYLES
-from solidsph_cases.drawing.sheet import Sheet, line, mark, panel, theory
+from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark, theory
 
 PAPERS = "modified-mollifier"
 
@@ -57,7 +57,7 @@ class KernelProfiles(Case):
         found = kernels()
         r, q = np.linspace(-1.0, 1.0, 801), np.linspace(0.0, 0.95, 400)
         others = [name for name in found if name != PAPERS]
-        left = panel(
+        left = Panel(
             theory(r, gaussian(r), "Gaussian, smoothing length H/3"),
             line(r, found[PAPERS].value(np.abs(r)), linewidth=1.8, label=PAPERS),
             *(
@@ -76,7 +76,7 @@ class KernelProfiles(Case):
             grid=True,
         )
         kernel = found[PAPERS].kernel
-        right = panel(
+        right = Panel(
             theory(q**2, -1.0 - 9.0 * q**2, "$-1 - 9 q^2$"),
             line(q**2, np.log(kernel.profile(q, kernel.params)), linewidth=1.8, label="ln w"),
             x="$q^2$, with q = r / H [1]",

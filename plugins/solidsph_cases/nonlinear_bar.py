@@ -29,7 +29,7 @@ from solidsph_cases._bar import (
 from solidsph_cases._compare import alone, compared, finished
 from solidsph_cases._finite_waves import FiniteWave, Law, law_of
 from solidsph_cases._scheme import check_count
-from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark, note, panel, theory
+from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark, note, theory
 
 # The wave is watched until it has come so far: its exact solution knows no right end.
 _END = 0.9  # of the bar
@@ -189,7 +189,7 @@ class NonlinearBar(Case):
             marks.append(note(words))
         plateau = wave.stress / modulus
         speed, kind = abs(wave.velocity) / self.law.small_speed, "push" if wave.is_shock else "pull"
-        return panel(
+        return Panel(
             *marks,
             title=f"{kind} at {speed:g} c_p: stretch {wave.stretch:.4f}, t = {1e6 * end:.1f} us",
             x="X [m]",
@@ -214,7 +214,7 @@ class NonlinearBar(Case):
             for name, wave in self.waves.items()
         ]
         sph = {"markerfacecolor": "white", "ms": 7, "label": "SPH, level of half the plateau"}
-        return panel(
+        return Panel(
             line(v, [w.head / c for w in shocks], label="shock"),
             mark("fill_between", -v, tails, heads, **fan),
             line(-v, [w.half_speed / c for w in fans], "k--", label="half of the fan"),

@@ -32,7 +32,7 @@ from solidsph_cases._sheet import (
 )
 from solidsph_cases.drawing.convergence import by_spacing, errors_panel
 from solidsph_cases.drawing.fields import LARGEST_STRESS, quarter_circle, quarter_particles
-from solidsph_cases.drawing.sheet import Panel, Sheet, level, line, mark, panel
+from solidsph_cases.drawing.sheet import Panel, Sheet, level, line, mark
 
 ROWS_ALONG, ROWS_UP_TO, NO_ROWS = ARRANGEMENTS = (
     "rows along the hole",
@@ -207,7 +207,7 @@ class SheetConvergence(Case):
                 "spacing / W",
                 "error of the edge's mean u_x [%]",
             )
-            stress = panel(
+            stress = Panel(
                 *by_spacing(self.spacings, peaks, ticks),
                 level(peak, f"reference: {peak:.2f} MPa", **style),
                 x="spacing / W",
@@ -221,7 +221,7 @@ class SheetConvergence(Case):
 
     def _arrangement(self, name: str, record: Record) -> Panel:
         shown = min(1.0, 2.5 * self.hole_ratio)
-        return panel(
+        return Panel(
             *quarter_particles(record, self.width),
             line(*quarter_circle(self.hole_ratio), linewidth=0.8),
             mark("set_aspect", "equal"),

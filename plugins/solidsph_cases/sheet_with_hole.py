@@ -31,7 +31,7 @@ from solidsph_cases._sheet import (
     whole,
 )
 from solidsph_cases.drawing.fields import LARGEST_STRESS, circle, field, principal_stress
-from solidsph_cases.drawing.sheet import BELOW, Bar, Sheet, line, mark, panel
+from solidsph_cases.drawing.sheet import BELOW, Bar, Panel, Sheet, line, mark
 
 # So small is a load under which the sheet is linear, and a hole to which its edges are far.
 _SMALL_LOAD = 1e-3  # of Young's modulus
@@ -154,7 +154,7 @@ class SheetWithHole(Case):
         stress = principal_stress(record, -1)
         edge = W * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
         before = {"color": "0.4", "linewidth": 1.0}
-        body = panel(
+        body = Panel(
             field(record, -1, stress),
             mark("plot", *circle(a), ":", **before),
             mark("plot", *edge.T, ":", **before),
@@ -174,7 +174,7 @@ class SheetWithHole(Case):
         if peak is not None:
             style = {"markersize": 12, "mfc": "none", "mec": "0.3", "mew": 1.8}
             marks.append(line(a / W, peak, "s", label=f"reference peak: {peak:.2f} MPa", **style))
-        profile = panel(
+        profile = Panel(
             *marks,
             x="Y / W",
             y=f"{LARGEST_STRESS} [MPa]",

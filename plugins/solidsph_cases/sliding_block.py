@@ -17,7 +17,7 @@ from solidsph.studies.case import Case, Curves, Measurement, Trial
 from solidsph_cases._compare import compared, finished, vanishing
 from solidsph_cases._energy import residual_over_work
 from solidsph_cases._scheme import SOFT, box, check_all_positive, check_count, solid, with_scheme
-from solidsph_cases.drawing.sheet import Sheet, line, mark, panel
+from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark
 
 LENGTH, HEIGHT = 0.2, 0.1  # [m]
 GRAVITY = 9.81  # [m/s^2]
@@ -154,7 +154,7 @@ class SlidingBlock(Case):
         slides, sticks = records["slides"], records["sticks"]
         t = slides.times
         law = self.acceleration(self.steep) * self.moved(t)
-        ways = panel(
+        ways = Panel(
             line(t, self.way(slides), label=f"{self.steep:g} degrees"),
             line(t, law, "--", color="tab:orange", label="Coulomb's law"),
             line(sticks.times, self.way(sticks), "k:", label=f"{self.flat:g} degrees"),
@@ -165,7 +165,7 @@ class SlidingBlock(Case):
         turn = np.radians(-self.steep)
         R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
         ends = np.array([[-0.05, 0.0], [slides.positions[-1][:, 0].max() + 0.05, 0.0]])
-        block = panel(
+        block = Panel(
             mark("plot", *(R @ slides.positions[0].T), "o", color="0.7", markersize=3.0),
             mark("plot", *(R @ slides.positions[-1].T), "o", color="black", markersize=3.0),
             mark("plot", *(R @ ends.T), "k-", linewidth=1.0),

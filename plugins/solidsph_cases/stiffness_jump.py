@@ -20,7 +20,7 @@ from solidsph.studies.case import Case, Measurement, Trial
 from solidsph_cases._compare import compared, finished
 from solidsph_cases._energy import residual_over_start, smallest_volume_ratio
 from solidsph_cases._scheme import SOFT, box, check_all_positive, check_count, with_scheme
-from solidsph_cases.drawing.sheet import Sheet, line, mark, panel
+from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark
 
 LENGTH = 0.5  # of both the layer and the slab [m]
 
@@ -146,7 +146,7 @@ class StiffnessJump(Case):
         u, t = self.swing(record) / LENGTH, record.times / self.period
         swing = np.abs(u).max() * np.sin(2.0 * np.pi * t)
         label = "a rod with a mass, same amplitude"
-        motion = panel(
+        motion = Panel(
             line(t, u, label="simulated"),
             line(t, swing, "--", color="tab:orange", label=label),
             mark("margins", y=0.25),
@@ -158,7 +158,7 @@ class StiffnessJump(Case):
         sigma = record.field("cauchy_stress")[int(np.argmax(u))][:, 0, 0]
         sigma = sigma / (SOFT.density * SOFT.wave_speed**2)
         layer = X < LENGTH
-        stress = panel(
+        stress = Panel(
             line(X[layer], sigma[layer], "k.", markersize=4, label="layer"),
             line(X[~layer], sigma[~layer], "x", color="tab:blue", label="slab"),
             mark("axvline", LENGTH, color="0.6", linewidth=0.8),

@@ -19,7 +19,7 @@ from solidsph_builtin.materials.j2_plasticity import J2Plasticity
 from solidsph_cases._compare import finished, vanishing
 from solidsph_cases._scheme import check_all_positive, check_count, in_motion
 from solidsph_cases.drawing.fields import scatter
-from solidsph_cases.drawing.sheet import Bar, Mark, Panel, Sheet, level, line, mark, panel
+from solidsph_cases.drawing.sheet import Bar, Mark, Panel, Sheet, level, line, mark
 
 RADIUS, LENGTH = 3.2e-3, 32.4e-3  # [m]
 COPPER = J2Plasticity(
@@ -177,7 +177,7 @@ class TaylorBar(Case):
         for k in (round(part * (len(record.times) - 1)) for part in _SHOWN):
             x = 1e3 * record.positions[k][cut][:, [0, 2]]
             frames.append(
-                panel(
+                Panel(
                     scatter(x, strains[k][cut], "inferno", s=9, **range_),
                     level(0.0, color="0.5", linewidth=1.0, zorder=0),
                     title=f"{1e6 * record.times[k]:.0f} us",
@@ -212,7 +212,7 @@ class TaylorBar(Case):
                 mark("axhspan", low, high, color="tab:blue", alpha=0.3),
                 mark("annotate", "published at the end", place, va=va, **words),
             ]
-        return panel(*marks, x="time [us]", y=label)
+        return Panel(*marks, x="time [us]", y=label)
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         record = records["bar"]

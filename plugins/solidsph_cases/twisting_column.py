@@ -19,7 +19,7 @@ from solidsph_cases._compare import finished, vanishing
 from solidsph_cases._energy import energy_kept, smallest_volume_ratio
 from solidsph_cases._scheme import FITTED, box, check_all_positive, check_count, in_motion, solid
 from solidsph_cases.drawing.fields import scatter
-from solidsph_cases.drawing.sheet import Bar, Sheet, line, mark, panel, zero
+from solidsph_cases.drawing.sheet import Bar, Panel, Sheet, line, mark, zero
 
 SIDE, HEIGHT = 1.0, 6.0  # [m]
 
@@ -133,7 +133,7 @@ class TwistingColumn(Case):
         speeds = np.linalg.norm(record.field("velocity")[:], axis=2)
         colours = {"vmin": 0.0, "vmax": float(speeds[shown].max()), "depthshade": False}
         frames = [
-            panel(
+            Panel(
                 scatter(record.positions[k][edge], speeds[k][edge], "viridis", s=10, **colours),
                 mark("set_box_aspect", (1.0, 1.0, 4.0)),
                 title=f"t = {times[k]:.3g} s",
@@ -150,7 +150,7 @@ class TwistingColumn(Case):
             for k in shown
         ]
         degrees = np.degrees(self.angles(record))
-        history = panel(line(times, degrees), zero(), x="time [s]", y="twist of the top [degrees]")
+        history = Panel(line(times, degrees), zero(), x="time [s]", y="twist of the top [degrees]")
         title = f"{self.title}: {record.particles.count} particles"
         bars = [Bar("speed [m/s]", frames[-1:], {"shrink": 0.5})]
         sheet = Sheet([[*frames, history, history]], (13.0, 6.5), title, bars=bars)

@@ -18,7 +18,7 @@ from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Curves, Measurement
 from solidsph.studies.spectrum import spectrum
 from solidsph_cases._scheme import ON_BOUNDARY, check_count
-from solidsph_cases.drawing.sheet import Mark, Sheet, line, mark, panel
+from solidsph_cases.drawing.sheet import Mark, Panel, Sheet, line, mark
 
 # A growth by less than this in the time of a wave across a spacing is rounding of the spectrum.
 _NO_GROWTH = 1e-4
@@ -137,13 +137,13 @@ class Upwinding(Case):
             ]
 
         wave = {"color": "0.7", "linewidth": 3.0, "zorder": 0, "label": "a wave of two spacings"}
-        growth = panel(
+        growth = Panel(
             *curves("growth"),
             x="skew of the kernel [-]",
             y="fastest growth [wave speed / spacing]",
             legend={},
         )
-        seen = panel(
+        seen = Panel(
             *curves("alternating motion"),
             mark("axhline", _ALTERNATING, **wave),
             x="skew of the kernel [-]",

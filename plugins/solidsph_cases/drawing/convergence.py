@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solidsph.maths.arrays import Array
-from solidsph_cases.drawing.sheet import Mark, Panel, mark, panel
+from solidsph_cases.drawing.sheet import Mark, Panel, mark
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,4 +62,4 @@ def errors_panel(
         axes.set_yticks([], minor=True)
 
     marks = by_spacing(spacings, errors, ticks)
-    return panel(*marks, draw_slopes, x=x, y=y, legend={"loc": "upper left"})
+    return Panel(*marks, draw_slopes, x=x, y=y, legend={"loc": "upper left"})

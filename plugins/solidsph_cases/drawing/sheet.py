@@ -76,21 +76,38 @@ def arrow(tip: Sequence[float], tail: Sequence[float], style: str = "-|>", **mor
 
 
 @final
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, init=False)
 class Panel:
-    """One pair of axes.
-
-    `properties` are those of matplotlib's axes: xlabel, ylabel, xlim, ylim, xscale, aspect ...
-    """
+    """One pair of axes."""
 
     marks: Sequence[Mark]
-    title: str = ""
-    legend: Mapping[str, Any] | None = None  # its style; None for no legend
-    grid: bool = False
-    projection: str | None = None
-    same_x: str = ""  # panels of one name have one scale, and labels at the outermost of them
-    same_y: str = ""
-    properties: Mapping[str, Any] = attrs.field(factory=dict)
+    title: str
+    legend: Mapping[str, Any] | None  # its style; None for no legend
+    grid: bool
+    projection: str | None
+    same_x: str  # panels of one name have one scale, and labels at the outermost of them
+    same_y: str
+    properties: Mapping[str, Any]
+
+    def __init__(
+        self,
+        *marks: Mark,
+        x: str = "",
+        y: str = "",
+        title: str = "",
+        legend: Mapping[str, Any] | None = None,
+        grid: bool = False,
+        projection: str | None = None,
+        same_x: str = "",
+        same_y: str = "",
+        **properties: Any,
+    ) -> None:
+        """A panel with the labels `x` and `y` of its axes, with units.
+
+        `properties` are those of matplotlib's axes: xlim, ylim, xscale, aspect ...
+        """
+        named = {"xlabel": x, "ylabel": y, **properties}
+        self.__attrs_init__(marks, title, legend, grid, projection, same_x, same_y, named)
 
     def draw(self, axes: Axes) -> Any:
         """Draw all marks; returns what the last one with colours left for a colour bar."""
@@ -106,24 +123,6 @@ class Panel:
         if self.legend is not None:
             axes.legend(**{"frameon": False, "fontsize": 9} | dict(self.legend))
         return coloured
-
-
-def panel(
-    *marks: Mark,
-    x: str = "",
-    y: str = "",
-    title: str = "",
-    legend: Mapping[str, Any] | None = None,
-    grid: bool = False,
-    projection: str | None = None,
-    same_x: str = "",
-    same_y: str = "",
-    **properties: Any,
-) -> Panel:
-    """A panel with the labels `x` and `y` of its axes, with units."""
-    labels = {"xlabel": x} if x else {}
-    labels |= {"ylabel": y} if y else {}
-    return Panel(marks, title, legend, grid, projection, same_x, same_y, {**labels, **properties})
 
 
 @final
