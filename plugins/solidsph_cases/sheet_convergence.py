@@ -34,11 +34,8 @@ from solidsph_cases.drawing.convergence import by_spacing, errors_panel
 from solidsph_cases.drawing.fields import LARGEST_STRESS, quarter_circle, quarter_particles
 from solidsph_cases.drawing.sheet import Panel, Sheet, level, line, mark
 
-ROWS_ALONG, ROWS_UP_TO, NO_ROWS = ARRANGEMENTS = (
-    "rows along the hole",
-    "rows up to the hole",
-    "no rows",
-)
+ROWS_ALONG, NO_ROWS = "rows along the hole", "no rows"
+ARRANGEMENTS = (ROWS_ALONG, "rows up to the hole", NO_ROWS)
 
 
 @final
@@ -144,7 +141,7 @@ class SheetConvergence(Case):
                     self._peak(record, f"{name}, W/{count}"),
                 ]
             if self.known:
-                measured.append(self._order(runs, name))
+                measured.append(self._order(records, name))
         return measured
 
     def accuracy(self, measurements: Sequence[Measurement]) -> Measurement:
@@ -169,20 +166,20 @@ class SheetConvergence(Case):
         verdict = ", ".join(word for word in words if word)
         return attrs.evolve(found, verdict=verdict, passed=found.passed and distance.passed)
 
-    def _errors(self, runs: Sequence[Record]) -> Array:
-        """Relative errors of the displacement, (k,)."""
-        values = np.array([extensions(record)[-1] for record in runs])
+    def errors(self, records: Mapping[str, Record], name: str) -> Array:
+        """Relative errors of the displacement, one for each of `across`, (k,)."""
+        values = np.array([extensions(record)[-1] for record in self._runs(records, name)])
         return np.abs(values / self.width / EXTENSION - 1.0)
 
-    def _order(self, runs: Sequence[Record], name: str) -> Measurement:
-        errors = self._errors(runs)
+    def _order(self, records: Mapping[str, Record], name: str) -> Measurement:
+        errors = self.errors(records, name)
         falls = bool(np.all(np.diff(errors) < 0.0))
         return Measurement(
             f"{name}: order of the displacement's error in the spacing",
             float(-np.polyfit(np.log(self.across), np.log(errors), 1)[0]),
             "1",
             verdict="falls at every refinement" if falls else "does NOT fall at every refinement",
-            passed=falls and finished(*runs),
+            passed=falls and finished(*self._runs(records, name)),
         )
 
     def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
@@ -194,7 +191,7 @@ class SheetConvergence(Case):
             errors, peaks = {}, {}
             for name in ARRANGEMENTS:
                 runs = self._runs(records, name)
-                errors[name] = 100.0 * self._errors(runs)
+                errors[name] = 100.0 * self.errors(records, name)
                 peaks[name] = np.array([1e-6 * largest_stresses(record)[-1] for record in runs])
             ticks = [f"1/{count}" for count in self.across]
             peak = 1e-6 * PEAK
@@ -238,7 +235,7 @@ class SheetConvergence(Case):
         table = {"spacing over W [1]": self.spacings}
         for name in ARRANGEMENTS:
             runs = self._runs(records, name)
-            table[f"{name}: error of u_x [1]"] = self._errors(runs)
+            table[f"{name}: error of u_x [1]"] = self.errors(records, name)
             peaks = [largest_stresses(record)[-1] for record in runs]
             table[f"{name}: largest principal Cauchy stress [Pa]"] = np.array(peaks)
         return {"errors": table}
