@@ -1,4 +1,4 @@
-"""The paper's bar of section 5.1, which the cases of waves have in common."""
+"""The paper's bar of section 5.1, and quantities along any bar."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from math import nan
 
 import numpy as np
 
-from solidsph.maths.arrays import Array
+from solidsph.maths.arrays import Array, Indices
 from solidsph.results.record import Record
 from solidsph.scene.scene_builder import SceneBuilder
-from solidsph.simulation import Simulation
-from solidsph_cases._scheme import Scheme, with_scheme
+from solidsph_builtin.materials.neo_hookean import NeoHookean
+from solidsph_cases._scheme import ON_BOUNDARY, MovingScheme, solid, with_scheme
 
 LENGTH = 0.15  # [m]
 YOUNGS_MODULUS = 200e9  # [Pa]
@@ -18,24 +18,13 @@ POISSONS_RATIO = 0.3  # [-]
 DENSITY = 8000.0  # [kg/m^3]
 
 
-def bar(title: str, *, particles: int, poissons_ratio: float, scheme: Scheme) -> SceneBuilder:
+def bar(title: str, *, particles: int, poissons_ratio: float, scheme: MovingScheme) -> SceneBuilder:
     """A bar in one dimension, in uniaxial strain, with a particle on each end."""
-    builder = (
-        Simulation.builder()
-        .title(title)
-        .body(
-            "bar",
-            shape={"type": "interval", "length": LENGTH},
-            spacing=LENGTH / (particles - 1),
-            discretisation={"type": "lattice", "on_boundary": True},
-        )
-        .material(
-            "neo-hookean",
-            youngs_modulus=YOUNGS_MODULUS,
-            poissons_ratio=poissons_ratio,
-            density=DENSITY,
-        )
-    )
+    shape = {"type": "interval", "length": LENGTH}
+    material = NeoHookean(YOUNGS_MODULUS, poissons_ratio, DENSITY)
+    spacing = LENGTH / (particles - 1)
+    builder = solid(title, "bar", shape, spacing, material, discretisation=ON_BOUNDARY)
+    builder = builder.integrator(scheme.integrator, time_step_factor=scheme.time_step_factor)
     return with_scheme(builder, scheme)
 
 
@@ -46,10 +35,21 @@ def with_viscosity(builder: SceneBuilder, linear: float, quadratic: float) -> Sc
     )
 
 
+def in_order(record: Record) -> Indices:
+    """The bar's particles from left to right, without ghosts, (n,)."""
+    particles = record.particles
+    real = np.flatnonzero(~particles.ghosts)
+    return np.asarray(real[np.argsort(particles.positions[real, 0])], dtype=np.intp)
+
+
 def along(record: Record) -> Array:
     """X of the bar's particles from left to right, (n,) [m]."""
-    particles = record.particles
-    return np.sort(particles.positions[~particles.ghosts, 0])
+    return np.asarray(record.particles.positions[in_order(record), 0])
+
+
+def displacements(record: Record) -> Array:
+    """Of the same particles at every time, (t, n) [m]."""
+    return np.asarray(record.positions[:][:, in_order(record), 0] - along(record))
 
 
 def stress_along(record: Record) -> Array:
@@ -57,11 +57,7 @@ def stress_along(record: Record) -> Array:
 
     In uniaxial strain it is P11 as well: the area across the bar does not change.
     """
-    particles = record.particles
-    real = np.flatnonzero(~particles.ghosts)
-    order = real[np.argsort(particles.positions[real, 0])]
-    stress: Array = record.field("cauchy_stress")[:][:, order, 0, 0]
-    return stress
+    return np.asarray(record.field("cauchy_stress")[:][:, in_order(record), 0, 0])
 
 
 def first_rise(places: Array, values: Array, level: float) -> float:

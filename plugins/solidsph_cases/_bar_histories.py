@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol, final
+from collections.abc import Callable, Sequence
+from typing import TypeAlias, final
 
 import attrs
 import numpy as np
 
-from solidsph.maths.arrays import Array
+from solidsph.maths.arrays import Array, Mask
 from solidsph.results.record import Record
 from solidsph.studies.case import Measurement
 from solidsph_cases._bar import LENGTH, along, first_rise, stress_along
@@ -35,18 +35,21 @@ class Histories:
 
     def at(self, station: float) -> Array:
         """Stress of the particle at a station [Pa]."""
-        history: Array = self.stress[:, int(np.argmin(np.abs(self.X - station)))]
-        return history
+        return np.asarray(self.stress[:, int(np.argmin(np.abs(self.X - station)))])
 
     def height(self, station: float) -> float:
         """Exact stress of the first passage: at the wall both waves add [Pa]."""
         doubled = 2.0 if station == LENGTH else 1.0
         return doubled * self.exact.stress_height
 
+    def _passage(self, begin: float) -> Mask:
+        """Times while the pulse passes that arrives at `begin` [s], (t,)."""
+        end = begin + self.exact.pulse.duration
+        return np.asarray((self.times >= begin) & (self.times <= end))
+
     def peak(self, station: float) -> tuple[float, float]:
         """Peak of the first passage and what it should be [Pa]."""
-        begin = station / self.exact.speed
-        shown = (self.times >= begin) & (self.times <= begin + self.exact.pulse.duration)
+        shown = self._passage(station / self.exact.speed)
         return float(self.at(station)[shown].min(initial=0.0)), self.height(station)
 
     def peak_of_passage(self, station: float, passage: int) -> tuple[float, float]:
@@ -54,8 +57,7 @@ class Histories:
         with its sign, and what it should be [Pa]."""
         turns, leftward = divmod(passage, 2)
         way = 2.0 * LENGTH * (turns + leftward) + (-station if leftward else station)
-        begin = way / self.exact.speed
-        shown = (self.times >= begin) & (self.times <= begin + self.exact.pulse.duration)
+        shown = self._passage(way / self.exact.speed)
         height = self.exact.left**turns * self.exact.stress_height
         seen = self.at(station)[shown] * np.sign(height)
         return float(seen.max(initial=0.0) * np.sign(height)), height
@@ -79,8 +81,7 @@ class Histories:
 
     def overshoot(self, station: float) -> float:
         """By how much the first passage exceeds its height, over it."""
-        begin = station / self.exact.speed
-        shown = (self.times >= begin) & (self.times <= begin + self.exact.pulse.duration)
+        shown = self._passage(station / self.exact.speed)
         return float((self.at(station)[shown] / self.height(station)).max() - 1.0)
 
     def worst(
@@ -102,12 +103,9 @@ class Histories:
         station = max(stations, key=error)
         if len(stations) > 1:
             quantity += f", worst at {station:g} m"
-        return compared(
-            self.record, quantity, *found[station][:1], unit, found[station][1], SOURCE, tolerance
-        )
+        value, reference = found[station]
+        return compared(self.record, quantity, value, unit, reference, SOURCE, tolerance)
 
 
-class Read(Protocol):
-    """A number of a station's history, and what it should be."""
-
-    def __call__(self, histories: Histories, station: float, /) -> tuple[float, float]: ...
+Read: TypeAlias = Callable[[Histories, float], tuple[float, float]]
+"""A number of the history at a station, and what it should be."""

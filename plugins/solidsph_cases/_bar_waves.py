@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from math import ceil
-from typing import ClassVar, final
+from typing import final
 
 import attrs
 import numpy as np
@@ -15,80 +15,38 @@ FREE = -1.0  # a wave that returns to a free end comes back with the other sign 
 HELD = 1.0  # and from one that is held with the same
 
 
-class Pulse(ABC):
+@final
+@attrs.frozen
+class Pulse:
     """A pulse of unit height that begins at t = 0."""
 
-    name: ClassVar[str]
+    name: str
     duration: float  # [s]
-
-    @abstractmethod
-    def value(self, times: Array) -> Array:
-        """The pulse at `times` [s]."""
-
-    @property
-    @abstractmethod
-    def formula(self) -> str:
-        """The same in the words of scenes."""
-
-    @property
-    @abstractmethod
-    def integral_formula(self) -> str:
-        """Its integral from 0 to t in the words of scenes [s]."""
-
-    @property
-    @abstractmethod
-    def half_height(self) -> float:
-        """When it first passes a half [s]."""
+    value: Callable[[Array], Array]  # at times [s]
+    formula: str  # the same in the words of scenes
+    integral_formula: str  # its integral from 0 to t [s]
+    half_height: float  # when it first passes a half [s]
 
 
-@final
-@attrs.frozen
-class Smooth(Pulse):
+def smooth_pulse(duration: float) -> Pulse:
     """sin^2(pi t / duration): its slope is continuous."""
+    T, t = f"{duration!r}", f"min(t, {duration!r})"
 
-    name: ClassVar[str] = "smooth"
-    duration: float  # [s]
+    def value(times: Array) -> Array:
+        return np.asarray(np.sin(np.pi * np.clip(times, 0.0, duration) / duration) ** 2)
 
-    def value(self, times: Array) -> Array:
-        t = np.clip(times, 0.0, self.duration)
-        return np.asarray(np.sin(np.pi * t / self.duration) ** 2)
-
-    @property
-    def formula(self) -> str:
-        return f"sin(pi*min(t, {self.duration!r})/{self.duration!r})**2"
-
-    @property
-    def integral_formula(self) -> str:
-        t = f"min(t, {self.duration!r})"
-        return f"({t}/2 - {self.duration!r}/(4*pi)*sin(2*pi*{t}/{self.duration!r}))"
-
-    @property
-    def half_height(self) -> float:
-        return 0.25 * self.duration
+    integral = f"({t}/2 - {T}/(4*pi)*sin(2*pi*{t}/{T}))"
+    return Pulse("smooth", duration, value, f"sin(pi*{t}/{T})**2", integral, 0.25 * duration)
 
 
-@final
-@attrs.frozen
-class Square(Pulse):
+def square_pulse(duration: float) -> Pulse:
     """1 for as long as it lasts."""
 
-    name: ClassVar[str] = "square"
-    duration: float  # [s]
+    def value(times: Array) -> Array:
+        return np.asarray((times >= 0.0) & (times < duration), dtype=np.float64)
 
-    def value(self, times: Array) -> Array:
-        return np.asarray((times >= 0.0) & (times < self.duration), dtype=np.float64)
-
-    @property
-    def formula(self) -> str:
-        return f"(t < {self.duration!r})"
-
-    @property
-    def integral_formula(self) -> str:
-        return f"min(t, {self.duration!r})"
-
-    @property
-    def half_height(self) -> float:
-        return 0.0
+    formula, integral = f"(t < {duration!r})", f"min(t, {duration!r})"
+    return Pulse("square", duration, value, formula, integral, 0.0)
 
 
 @final

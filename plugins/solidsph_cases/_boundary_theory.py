@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike
 
 from solidsph.maths.arrays import Array, Indices
 from solidsph_cases import _boundary_ways as ways
-from solidsph_cases._line import LENGTH, Line
+from solidsph_cases._line import LENGTH, F, Line
 from solidsph_cases._moments import of_lattice
-from solidsph_cases.interpolation import F
 
 
 def values_at_left_end(line: Line) -> Mapping[str, float]:

@@ -1,4 +1,4 @@
-"""Ways to give a function's smoothed value or slope at the ends of a line, by the handlers."""
+"""Ways to give a function's smoothed value or slope at the ends of a line, and their errors."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from solidsph_builtin.boundaries.exact_dirichlet import ExactDirichlet
 from solidsph_builtin.boundaries.full_dirichlet import FullDirichlet
 from solidsph_builtin.boundaries.ghost_extension import GhostExtension
 from solidsph_builtin.boundaries.literal_dirichlet import LiteralDirichlet
-from solidsph_cases._line import LENGTH, Line
-from solidsph_cases.interpolation import F
+from solidsph_cases._line import LENGTH, F, Line
 
 NO_GHOSTS = "no ghosts"
 ENDS_SOLVED = "no ghosts, eq. 11 with the interior"
@@ -44,6 +43,33 @@ def beside(line: Line) -> Mask:
     near = line.real & (depth < line.kernel.support_radius)
     near[ends(line)] = False
     return near
+
+
+def smoothed(line: Line, carried: Array) -> Array:
+    """The approximation of what the particles carry (n,)."""
+    return np.asarray(line.smoothing @ carried)
+
+
+def largest_error(line: Line, approximation: Array, order: int = 0) -> float:
+    """Of f or its slope at the particles beside the ends [m^4, m^3]."""
+    return float(np.abs(approximation - F.deriv(order)(line.X))[beside(line)].max())
+
+
+def miss(line: Line, approximation: Array) -> float:
+    """How far <f> is above f at the left end [m^4]."""
+    left = ends(line)[0]
+    return float(approximation[left] - F(line.X[left]))
+
+
+def block_size(line: Line) -> int:
+    """Number of particles of a boundary and the ghosts beyond it."""
+    return int(ends(line)[0]) + 1
+
+
+def block_condition(line: Line) -> float:
+    """Condition number of W's block of the left end and the ghosts beyond it [-]."""
+    count = block_size(line)
+    return float(np.linalg.cond(line.smoothing[:count, :count].toarray()))
 
 
 def carried_values(line: Line) -> Mapping[str, Array]:

@@ -1,4 +1,4 @@
-"""A measured number beside its reference, as every benchmark states it."""
+"""Measured numbers beside their references."""
 
 from __future__ import annotations
 
@@ -13,6 +13,11 @@ FINISHED = "finished"
 ROUNDING = 1e-9
 
 
+def finished(*records: Record) -> bool:
+    """True if all these runs came to their end."""
+    return all(record.outcome == FINISHED for record in records)
+
+
 def compared(
     record: Record,
     quantity: str,
@@ -22,30 +27,45 @@ def compared(
     source: str,
     tolerance: float,
 ) -> Measurement:
-    """`value` against `reference`; None stands alone. Only a run that finished can pass.
+    """`value` against `reference`, or alone if that is None. Only a run that finished can pass.
 
     Args:
         tolerance: largest relative error that passes [-].
     """
     value = float(value)
-    complete = record.outcome == FINISHED and isfinite(value)
+    complete = finished(record) and isfinite(value)
     if reference is None:
-        return Measurement(
-            quantity, value, unit, verdict="" if complete else record.outcome, passed=complete
-        )
+        verdict = "" if complete else record.outcome
+        return Measurement(quantity, value, unit, verdict=verdict, passed=complete)
     error = abs(value / reference - 1.0)
     within = error <= tolerance
     verdict = f"{'within' if within else 'NOT within'} {100.0 * tolerance:g} %"
     return Measurement(
-        quantity=quantity,
-        value=value,
-        unit=unit,
-        reference=reference,
-        source=source,
-        error=error,
+        *(quantity, value, unit, reference, source, error),
         verdict=verdict if complete else record.outcome,
         passed=within and complete,
     )
+
+
+def alone(record: Record, quantity: str, value: float) -> Measurement:
+    """A number [-] without a reference."""
+    return compared(record, quantity, value, "1", None, "", 0.0)
+
+
+def vanishing(
+    record: Record,
+    quantity: str,
+    value: float,
+    tolerance: float,
+    source: str,
+    *,
+    unit: str = "1",
+    verdict: str = "",
+) -> Measurement:
+    """`value` against 0; its size is its error, which passes up to `tolerance`."""
+    error = abs(float(value))
+    passed = finished(record) and error <= tolerance
+    return Measurement(quantity, float(value), unit, 0.0, source, error, verdict, passed)
 
 
 def closed_form(
@@ -57,21 +77,13 @@ def closed_form(
     paper: str,
     allowed: float = ROUNDING,
 ) -> Measurement:
-    """A number [-] that no run made, beside its closed form, which it has but for rounding.
+    """A number [-] that needs no run, beside its closed form, which it equals up to rounding.
 
     Args:
         allowed: largest error that passes, relative to the reference or to 1 if that is smaller.
     """
     value, reference = float(value), float(reference)
     error = abs(value - reference) / max(abs(reference), 1.0)
-    return Measurement(
-        quantity=quantity,
-        value=value,
-        unit="1",
-        reference=reference,
-        source=source,
-        error=error,
-        verdict="as the closed form" if error <= allowed else "NOT as the closed form",
-        passed=error <= allowed,
-        paper=paper,
-    )
+    passed = error <= allowed
+    verdict = "as the closed form" if passed else "NOT as the closed form"
+    return Measurement(quantity, value, "1", reference, source, error, verdict, passed, paper)

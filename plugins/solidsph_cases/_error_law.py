@@ -10,9 +10,10 @@ from numpy.polynomial import Polynomial
 from solidsph.interfaces.smoothing_kernel import smoothing_kernel
 from solidsph.maths.arrays import Array
 from solidsph.registry.construct import construct
-from solidsph.studies.case import Measurement
+from solidsph.studies.case import Curves, Measurement
 from solidsph_cases._line import Line, complete_line, irregular_line
 from solidsph_cases._moments import of_continuum
+from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark, theory
 
 ON_LATTICE = "on a lattice"
 TRAPEZOIDAL = "irregular, trapezoidal weights"
@@ -51,28 +52,19 @@ def smoothing_errors(kernel: str, f: Polynomial) -> Iterator[Measurement]:
         # Of a quartic, a h^2 + b h^4 is all there is.
         (a, _), *_ = np.linalg.lstsq(np.column_stack([h**2, h**4]), errors[:, order])
         coefficient = float(a) / (factor * float(f.deriv(order + 2)(0.0)))
-        error = abs(coefficient / reference - 1.0)
-        yield Measurement(
-            quantity=f"eq. 13: m_2 / h^2 by the error of {name}",
-            value=coefficient,
-            unit="1",
-            reference=reference,
-            source="second moment of the kernel by quadrature",
-            error=error,
-            passed=error <= _MOMENT_TOLERANCE,
-            paper=_PAPER,
-        )
+        source = "second moment of the kernel by quadrature"
+        passed = abs(coefficient / reference - 1.0) <= _MOMENT_TOLERANCE
+        yield _row(f"m_2 / h^2 by the error of {name}", coefficient, reference, source, passed)
         fitted = slope(h, errors[:, order])
-        yield Measurement(
-            quantity=f"eq. 13: order in h, {name}",
-            value=fitted,
-            unit="1",
-            reference=2.0,
-            source="Taylor's series",
-            error=abs(fitted / 2.0 - 1.0),
-            passed=abs(fitted - 2.0) <= _SMOOTHING_ORDER_TOLERANCE,
-            paper=_PAPER,
-        )
+        passed = abs(fitted - 2.0) <= _SMOOTHING_ORDER_TOLERANCE
+        yield _row(f"order in h, {name}", fitted, 2.0, "Taylor's series", passed)
+
+
+def _row(quantity: str, value: float, reference: float, source: str, passed: bool) -> Measurement:
+    error = abs(value / reference - 1.0)
+    return Measurement(
+        f"eq. 13: {quantity}", value, "1", reference, source, error, passed=passed, paper=_PAPER
+    )
 
 
 def smoothing_data(kernel: str, f: Polynomial) -> tuple[Array, Array]:
@@ -99,54 +91,36 @@ def discretisation_errors(kernel: str) -> Iterator[Measurement]:
     data = discretisation_data(kernel)
     fitted = slope(*data[ON_LATTICE])
     yield Measurement(
-        quantity=f"eq. 13: order in dx/h, {ON_LATTICE}",
-        value=fitted,
-        unit="1",
+        f"eq. 13: order in dx/h, {ON_LATTICE}",
+        fitted,
+        "1",
         source="Poisson's formula: no fixed order for a kernel that is smooth to all orders",
         verdict="faster than the paper's" if fitted > 2.0 else "not faster than the paper's",
         paper=_PAPER,
     )
-    fitted = slope(*data[TRAPEZOIDAL])
-    yield Measurement(
-        quantity=f"eq. 13: order in dx/h, {TRAPEZOIDAL}",
-        value=fitted,
-        unit="1",
-        reference=2.5,
-        source="sums of independent errors: at least",
-        error=abs(fitted / 2.5 - 1.0),
-        passed=fitted >= 2.5 - _ORDER_TOLERANCE,
-        paper=_PAPER,
-    )
-    fitted = slope(*data[EQUAL])
-    yield Measurement(
-        quantity=f"eq. 13: order in dx/h, {EQUAL}",
-        value=fitted,
-        unit="1",
-        reference=1.5,
-        source="sums of independent errors",
-        error=abs(fitted / 1.5 - 1.0),
-        passed=abs(fitted - 1.5) <= _ORDER_TOLERANCE,
-        paper=_PAPER,
-    )
+    fitted, source = slope(*data[TRAPEZOIDAL]), "sums of independent errors: at least"
+    passed = fitted >= 2.5 - _ORDER_TOLERANCE
+    yield _row(f"order in dx/h, {TRAPEZOIDAL}", fitted, 2.5, source, passed)
+    fitted, source = slope(*data[EQUAL]), "sums of independent errors"
+    passed = abs(fitted - 1.5) <= _ORDER_TOLERANCE
+    yield _row(f"order in dx/h, {EQUAL}", fitted, 1.5, source, passed)
 
 
 def discretisation_data(kernel: str) -> Mapping[str, tuple[Array, Array]]:
     """dx/h (k,) and the error of <1> (k,), by arrangement of the particles."""
-    lattice = [[complete_line(kernel, c, round(c / _SUPPORT))] for c in _COVERS]
-    trapezoidal, equal = (
-        [
-            [
-                irregular_line(kernel, c, round(c / _SUPPORT), seed=seed, own_cells=own_cells)
-                for seed in range(_SEEDS)
-            ]
-            for c in _IRREGULAR_COVERS
+
+    def irregular(cover: float, own_cells: bool) -> Sequence[Line]:
+        cells = round(cover / _SUPPORT)
+        return [
+            irregular_line(kernel, cover, cells, seed=seed, own_cells=own_cells)
+            for seed in range(_SEEDS)
         ]
-        for own_cells in (True, False)
-    )
+
+    lattice = [[complete_line(kernel, c, round(c / _SUPPORT))] for c in _COVERS]
     return {
         ON_LATTICE: _errors_of_mass(lattice),
-        TRAPEZOIDAL: _errors_of_mass(trapezoidal),
-        EQUAL: _errors_of_mass(equal),
+        TRAPEZOIDAL: _errors_of_mass([irregular(c, True) for c in _IRREGULAR_COVERS]),
+        EQUAL: _errors_of_mass([irregular(c, False) for c in _IRREGULAR_COVERS]),
     }
 
 
@@ -182,3 +156,52 @@ def _errors_of_mass(levels: Sequence[Sequence[Line]]) -> tuple[Array, Array]:
 def slope(x: Array, y: Array) -> float:
     """Slope of log |y| over log x, by least squares."""
     return float(np.polyfit(np.log(x), np.log(np.abs(y)), 1)[0])
+
+
+def pictures(kernel: str, f: Polynomial) -> Sheet:
+    """The term in h^2 beside the second moment, and the term in dx/h by arrangement."""
+    h, errors = smoothing_data(kernel, f)
+    m_2 = second_moment(kernel) * h**2
+    smoothing = []
+    for order, (name, factor, style) in enumerate(
+        zip(("f", "f'", "f''"), (0.5, 0.5, 1.0), ("ko", "ks", "k^"), strict=True)
+    ):
+        term = np.abs(factor * m_2 * f.deriv(order + 2)(0.0))
+        label = f"error of ${name}$ [m$^{4 - order}$]"
+        smoothing.append(theory(h, term, None if order else "$h^2$ term"))
+        smoothing.append(line(h, np.abs(errors[:, order]), style, label=label))
+    ratio = np.array([0.08, 0.4])
+    discretisation = [theory(ratio, 0.3 * ratio**2, "paper: order 2")]
+    for (name, (ratio, error)), style in zip(
+        discretisation_data(kernel).items(), ("ko-", "ks--", "k^:"), strict=True
+    ):
+        label = f"{name}: order {slope(ratio, error):.2f}"
+        discretisation.append(line(ratio, error, style, label=label))
+    log = (mark("loglog"), mark("grid", color="0.93", which="both"))
+    left = Panel(
+        *(*log, *smoothing),
+        x="support radius h [m]",
+        y="error by smoothing at x = 0",
+        legend={},
+    )
+    right = Panel(
+        *(*log, *discretisation),
+        x="spacing over support radius dx/h [1]",
+        y="error of $\\langle 1 \\rangle$ [1]",
+        legend={},
+    )
+    return Sheet([[left, right]], (12.0, 5.0), f"The error law ({kernel}); Ismail & Reddy, eq. 13")
+
+
+def tables(kernel: str, f: Polynomial) -> Mapping[str, Curves]:
+    """The same as tables."""
+    h, errors = smoothing_data(kernel, f)
+    smoothing = {"h [m]": h}
+    for order, name in enumerate(("f", "f'", "f''")):
+        smoothing[f"error of {name} [m^{4 - order}]"] = errors[:, order]
+    discretisation = {}
+    for name, (ratio, error) in discretisation_data(kernel).items():
+        label = name.replace(",", "")  # a comma ends a column of the file
+        discretisation[f"dx/h {label} [1]"] = ratio
+        discretisation[f"error of <1> {label} [1]"] = error
+    return {"eq-13-smoothing": smoothing, "eq-13-discretisation": discretisation}

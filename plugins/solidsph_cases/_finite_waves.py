@@ -7,7 +7,6 @@ in which what comes later is slower. Both are functions of X / t, with X the ref
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from math import exp, log
 from typing import final
 
@@ -66,7 +65,7 @@ class Law:
         """Velocity up to which a pull is a fan alone; beyond it a shock follows the fan [m/s]."""
         return self.fan_velocity(self.last_concave)
 
-    def pushed(self, velocity: float) -> Shock:
+    def pushed(self, velocity: float) -> FiniteWave:
         """What an end sends that is moved into the bar at `velocity` > 0 [m/s].
 
         With [P] = -rho U [v] and [v] = -U [s] for a wave to the right: rho v^2 = P(s) (s - 1).
@@ -80,9 +79,9 @@ class Law:
         while excess(low) < 0.0:
             low *= 0.5
         s = float(brentq(excess, low, 1.0 - 1e-12, xtol=1e-15, rtol=_EXACT))
-        return Shock(self, velocity, s)
+        return FiniteWave(self, velocity, s)
 
-    def pulled(self, velocity: float) -> Fan:
+    def pulled(self, velocity: float) -> FiniteWave:
         """What an end sends that is moved away from the bar at `velocity` > 0 [m/s].
 
         Raises:
@@ -99,15 +98,26 @@ class Law:
             return self.fan_velocity(s) - velocity
 
         s = float(brentq(excess, 1.0, self.last_concave, xtol=1e-15, rtol=_EXACT))
-        return Fan(self, -velocity, s)
+        return FiniteWave(self, -velocity, s)
 
 
-class FiniteWave(ABC):
-    """A wave into a bar at rest whose end at X = 0 moves at a constant velocity."""
+@final
+@attrs.frozen
+class FiniteWave:
+    """A wave into a bar at rest whose end at X = 0 moves at a constant velocity.
+
+    A shock, pushed, jumps from rest to `stretch` < 1 at the speed U = velocity / (1 - stretch). A
+    fan, pulled, is a simple wave: X / t = c(s), v = -integral of c from 1 to `stretch`.
+    """
 
     law: Law
     velocity: float  # of the end, positive into the bar [m/s]
     stretch: float  # behind the wave
+
+    @property
+    def is_shock(self) -> bool:
+        """True for a push, False for a pull."""
+        return self.velocity > 0.0
 
     @property
     def stress(self) -> float:
@@ -115,100 +125,53 @@ class FiniteWave(ABC):
         return float(self.law.stress(self.stretch))
 
     @property
-    @abstractmethod
     def head(self) -> float:
         """Speed of its first part [m/s]."""
+        return self.velocity / (1.0 - self.stretch) if self.is_shock else self.law.small_speed
 
     @property
-    @abstractmethod
     def tail(self) -> float:
         """Speed of its last part, behind which all is uniform [m/s]."""
+        return self.head if self.is_shock else float(self.law.speed(self.stretch))
 
     @property
-    @abstractmethod
     def half_speed(self) -> float:
         """Speed of the level of half the stress behind the wave [m/s]."""
+        if self.is_shock:
+            return self.head
 
-    @abstractmethod
-    def stretches(self, speeds: Array) -> Array:
-        """Stretch at X / t = `speeds` [m/s]."""
+        def excess(s: float) -> float:
+            return float(self.law.stress(s)) - 0.5 * self.stress
 
-    def stresses(self, speeds: Array) -> Array:
-        """P [Pa] at X / t = `speeds` [m/s]."""
-        return self.law.stress(self.stretches(speeds))
-
-
-@final
-@attrs.frozen
-class Shock(FiniteWave):
-    """A jump from rest to `stretch` < 1 at the speed U = velocity / (1 - stretch)."""
-
-    law: Law
-    velocity: float
-    stretch: float
-
-    @property
-    def head(self) -> float:
-        return self.velocity / (1.0 - self.stretch)
-
-    @property
-    def tail(self) -> float:
-        return self.head
-
-    @property
-    def half_speed(self) -> float:
-        return self.head
+        return float(self.law.speed(brentq(excess, 1.0, self.stretch, xtol=1e-15, rtol=_EXACT)))
 
     @property
     def dissipation(self) -> float:
-        """Power that the shock takes from the mechanical energy, per area [W/m^2].
+        """Power that a shock takes from the mechanical energy, per area [W/m^2].
 
         What the end supplies, -P v, less what the shock leaves behind, U (psi + rho v^2 / 2).
         """
         kept = self.law.energy(self.stretch) + 0.5 * self.law.density * self.velocity**2
         return -self.stress * self.velocity - self.head * kept
 
-    def stretches(self, speeds: Array) -> Array:
-        return np.where(speeds < self.head, self.stretch, 1.0)
-
-
-@final
-@attrs.frozen
-class Fan(FiniteWave):
-    """A simple wave from rest to `stretch` > 1: X / t = c(s), v = -integral of c from 1 to s."""
-
-    law: Law
-    velocity: float
-    stretch: float
-
-    @property
-    def head(self) -> float:
-        return self.law.small_speed
-
-    @property
-    def tail(self) -> float:
-        return float(self.law.speed(self.stretch))
-
-    @property
-    def half_speed(self) -> float:
-        def excess(s: float) -> float:
-            return float(self.law.stress(s)) - 0.5 * self.stress
-
-        return float(self.law.speed(brentq(excess, 1.0, self.stretch, xtol=1e-15, rtol=_EXACT)))
+    def stresses(self, speeds: Array) -> Array:
+        """P [Pa] at X / t = `speeds` [m/s]."""
+        return self.law.stress(self.stretches(speeds))
 
     def stretches(self, speeds: Array) -> Array:
-        flat = np.clip(np.ravel(speeds), self.tail, self.head)
-        found = [self._at(float(speed)) for speed in flat]
-        return np.reshape(found, np.shape(speeds))
+        """Stretch at X / t = `speeds` [m/s]."""
+        head, tail = self.head, self.tail
 
-    def _at(self, speed: float) -> float:
-        if speed >= self.head:
-            return 1.0
-        if speed <= self.tail:
-            return self.stretch
-        return float(
-            brentq(lambda s: float(self.law.speed(s)) - speed, 1.0, self.stretch, rtol=_EXACT)
-        )
+        def at(speed: float) -> float:
+            if speed < tail:
+                return self.stretch
+            if speed >= head:
+                return 1.0
+            return float(
+                brentq(lambda s: float(self.law.speed(s)) - speed, 1.0, self.stretch, rtol=_EXACT)
+            )
+
+        return np.reshape([at(float(speed)) for speed in np.ravel(speeds)], np.shape(speeds))
 
 
 def law_of(youngs_modulus: float, poissons_ratio: float, density: float) -> Law:

@@ -1,4 +1,4 @@
-"""A line of particles and its sums as matrices: what the figures of interpolation are made of."""
+"""A line of particles, its sums as matrices, and the function that they interpolate."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 import attrs
 import numpy as np
+from numpy.polynomial import Polynomial
 from scipy.sparse import csr_array
 
 from solidsph.engines.matrix import operators
@@ -16,8 +17,12 @@ from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.simulation import Simulation
+from solidsph_cases._scheme import ON_BOUNDARY
 
 LENGTH = 1.0  # of the range that is looked at [m]
+
+# Ismail & Reddy, section 3, after Zhang & Batra (2004).
+F = Polynomial([-0.5, 1.0]) ** 4
 
 _JITTER = 0.25  # of an irregular line [spacings]
 
@@ -44,14 +49,13 @@ def complete_line(
     By default they are enough for a gradient of a gradient.
     """
     ghosts = supports * ceil(cover)
-    arrangement = {"type": "lattice", "on_boundary": True, "ghosts": ghosts}
+    arrangement = {**ON_BOUNDARY, "ghosts": ghosts}
     return line(kernel, cover, LENGTH / cells, arrangement, gradient=gradient)
 
 
 def bare_line(kernel: str, cover: float, cells: int, *, gradient: str = "standard") -> Line:
     """The same without extra particles; the first and the last have half a cell each."""
-    arrangement = {"type": "lattice", "on_boundary": True}
-    return line(kernel, cover, LENGTH / cells, arrangement, gradient=gradient)
+    return line(kernel, cover, LENGTH / cells, ON_BOUNDARY, gradient=gradient)
 
 
 def whole_line(kernel: str, cover: float, cells: int) -> Line:
@@ -121,9 +125,9 @@ def line(
 
 
 def left_by_the_cut(line: Line) -> tuple[float, float]:
-    """How much <x'> and <1> hang on whether neighbours at just the support radius count.
+    """How much <x'> and <1> depend on whether neighbours at just the support radius count.
 
-    That is decided by rounding, and shows only if the kernel is cut where it is not zero.
+    Rounding decides that; it shows only if the kernel is cut where it is not zero.
     """
     H = line.kernel.support_radius
     within = np.array([np.nextafter(H, 0.0)])

@@ -1,37 +1,32 @@
-"""One gradient of one known function: what of the cases of interpolation is held against cost."""
+"""The slope of one known function by one gradient: what of interpolation is held against cost."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, ClassVar, final
+from typing import final
 
 import attrs
 import numpy as np
-from numpy.polynomial import Polynomial
 
 from solidsph.maths.arrays import Array
 from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Measurement
-from solidsph_cases._line import LENGTH, Line, bare_line, complete_line
+from solidsph_cases._line import LENGTH, F, Line, bare_line, complete_line
 from solidsph_cases._scheme import check_count
 
 _COVERS = (1.5, 2.2, 2.5, 3.5, 5.5)
-
-# (x - 1/2)^4
-_QUARTIC = Polynomial([-0.5, 1.0]) ** 4
 
 
 @final
 @attrs.frozen
 class SlopeOfQuartic(Case):
-    """f' of (x - 1/2)^4 on (0, 1), without extra particles: its ends are in it."""
+    """f' of (x - 1/2)^4 on (0, 1), without extra particles, so that its ends count."""
 
-    title: ClassVar[str] = "Slope of a quartic"
-    source: ClassVar[str] = "its derivative"
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+    title = "Slope of a quartic"
+    source = "its derivative"
+    sweep = {
         "cells": (10, 20, 40, 80, 160),
         "gradient": ("standard", "difference", "corrected", "quadratic"),
         "cover": _COVERS,
@@ -54,10 +49,7 @@ class SlopeOfQuartic(Case):
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         line = bare_line(self.kernel, self.cover, self.cells, gradient=self.gradient)
-        return [_missed(line, _QUARTIC(line.X), _QUARTIC.deriv()(line.X))]
-
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        return []
+        return [_missed(line, F(line.X), F.deriv()(line.X))]
 
 
 @final
@@ -65,9 +57,9 @@ class SlopeOfQuartic(Case):
 class SlopeOfEdge(Case):
     """f' of an edge that falls smoothly over a fifth of (0, 1), with ghosts on either side."""
 
-    title: ClassVar[str] = "Slope of a falling edge"
-    source: ClassVar[str] = "its derivative"
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+    title = "Slope of a falling edge"
+    source = "its derivative"
+    sweep = {
         "cells": (15, 31, 61, 121, 241),
         "gradient": ("standard", "corrected", "quadratic"),
         "cover": _COVERS,
@@ -94,18 +86,10 @@ class SlopeOfEdge(Case):
         s = (line.X - 0.5 * LENGTH) / width
         return [_missed(line, 0.5 * (1.0 - np.tanh(s)), -0.5 / width / np.cosh(s) ** 2)]
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        return []
-
 
 def _missed(line: Line, values: Array, slopes: Array) -> Measurement:
-    """Root mean square error of the slope over (0, 1), over that of the true one."""
+    """Root mean square error of the slope over (0, 1), over that of the true slope."""
     miss = (line.gradient @ values - slopes)[line.real]
     error = float(np.sqrt(np.mean(miss**2) / np.mean(slopes[line.real] ** 2)))
-    return Measurement(
-        quantity="root mean square error of the slope, relative",
-        value=error,
-        unit="1",
-        source="its derivative",
-        error=error,
-    )
+    quantity = "root mean square error of the slope, relative"
+    return Measurement(quantity, error, "1", source="its derivative", error=error)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from itertools import pairwise
 from math import nan
+from pathlib import Path
+from typing import final
 
 import attrs
 from scipy.optimize import brentq
@@ -51,3 +54,20 @@ def _scheme(form: str, poissons_ratio: float, cover: float) -> Scheme:
         formulation={"type": form, "gradient": "difference", "divergence": "plain"},
         material=attrs.evolve(unit, youngs_modulus=1.0 / unit.wave_speed**2),
     )
+
+
+@final
+@attrs.frozen(eq=False)
+class GrowthMaps:
+    """The picture of some maps, by form."""
+
+    maps: Mapping[str, StabilityMap]
+    title: str
+    cover: tuple[float, str]  # that is marked, and its name
+
+    def save(self, path: Path) -> Path:
+        """Draw it into a file; returns the path."""
+        from solidsph.studies.stability_picture import draw_growth
+
+        draw_growth(self.maps, path, title=self.title, mark=self.cover)
+        return path

@@ -1,6 +1,8 @@
-"""How stress and stretch of a pulled body go on in time."""
+"""Stress and stretch of a pulled body over time."""
 
 from __future__ import annotations
+
+from typing import final
 
 import attrs
 import numpy as np
@@ -10,6 +12,7 @@ from solidsph.results.record import Record
 from solidsph_cases import _stretch_theory as theory
 
 
+@final
 @attrs.frozen
 class StressCurve:
     """sigma_11 over the stretch, with the stretch across held."""
@@ -23,6 +26,7 @@ class StressCurve:
         return theory.cauchy_stress(stretches, self.across, self.lam, self.mu)
 
 
+@final
 @attrs.frozen(eq=False)
 class History:
     """Real particles over time, beside the static curve."""
@@ -32,7 +36,7 @@ class History:
     stresses: Array  # (t, n) sigma_11 of every particle [Pa]
     local: Array  # (t, n) stretch of every particle along the pull [-]
     shares: Array  # (n,) of the particles in the volume [-]
-    middle: int  # the particle amid the body
+    middle: int  # the particle in the middle of the body
     curve: StressCurve
 
     @classmethod
@@ -57,8 +61,12 @@ class History:
     @property
     def mean(self) -> Array:
         """Over all particles, by volume, (t,) [Pa]."""
-        mean: Array = self.stresses @ self.shares
-        return mean
+        return np.asarray(self.stresses @ self.shares)
+
+    @property
+    def static(self) -> Array:
+        """The static curve at the stretches of the whole, (t,) [Pa]."""
+        return self.curve(self.stretches)
 
     @property
     def amid(self) -> Array:
@@ -68,19 +76,18 @@ class History:
     def averaged(self, length: float, density: float, limit: float) -> tuple[Array, Array]:
         """Stretches (k,) and the mean stress about each (k,) [Pa], up to a stretch's `limit`.
 
-        What the mean misses of the curve is averaged over the time in which a small wave, at that
-        stretch, passes the body there and back: the period of its slowest vibration. Where it does
-        not fit into the run, or a particle has met the limit, there is none.
+        The difference of the mean and the curve is averaged over the time in which a small wave,
+        at that stretch, passes the body there and back: the period of its slowest vibration. Where
+        it does not fit into the run, or a particle has met the limit, there is none.
         """
         beyond = np.flatnonzero(self.local.max(axis=1) >= limit)
         end = self.times[beyond[0] if len(beyond) else -1]
         inside = self.stretches < limit
         t, s = self.times[inside], self.stretches[inside]
-        stiffness = np.array(
-            [theory.stiffness(x, self.curve.across, self.curve.lam, self.curve.mu) for x in s]
-        )
+        law = (self.curve.across, self.curve.lam, self.curve.mu)
+        stiffness = np.array([theory.stiffness(x, *law) for x in s])
         half = length / np.sqrt(stiffness / density)
-        missed = self.mean - self.curve(self.stretches)
+        missed = self.mean - self.static
         steps = 0.5 * (missed[1:] + missed[:-1]) * np.diff(self.times)
         integral = np.concatenate([[0.0], np.cumsum(steps)])
         whole = (t - half >= 0.0) & (t + half <= end)

@@ -1,11 +1,11 @@
-"""The elastic beam of Turek and Hron's structure tests, and the two ways to hold it."""
+"""The elastic beam of Turek and Hron's structure tests, the two ways to hold it, its picture."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -14,8 +14,13 @@ from solidsph.errors import SceneError
 from solidsph.maths.arrays import Array
 from solidsph.results.record import Record
 from solidsph.scene.scene_builder import SceneBuilder
-from solidsph.simulation import Simulation
-from solidsph_cases._scheme import Scheme, with_scheme
+from solidsph_builtin.materials.saint_venant_kirchhoff import SaintVenantKirchhoff
+from solidsph_cases._scheme import FITTED, ON_BOUNDARY, Scheme, box, solid, with_scheme
+from solidsph_cases.drawing.fields import LARGEST_STRESS, field, outline, principal_stress
+from solidsph_cases.drawing.sheet import BELOW, Bar, Mark, Panel, line
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 SOURCE = "Turek & Hron (2006), Proposal for numerical benchmarking, section 4.2"
 OURS = "quadratic finite elements refined towards the clamp, extrapolated"
@@ -41,13 +46,13 @@ class Clamp:
     oscillation: tuple[float, float, float, float, float] | None
 
 
-_ON_BOUNDARY = {"type": "lattice", "on_boundary": True}
-_BOX = {"type": "box", "lengths": [LENGTH, HEIGHT], "origin": [0.0, -0.5 * HEIGHT]}
+_BOX = box(LENGTH, HEIGHT, origin=[0.0, -0.5 * HEIGHT])
+_MATERIAL = SaintVenantKirchhoff(youngs_modulus=1.4e6, poissons_ratio=0.4, density=1000.0)
 
 STRAIGHT = Clamp(
     face="left",
     shape=_BOX,
-    discretisation={"type": "fitted-moments", "of": _ON_BOUNDARY},
+    discretisation=FITTED,
     source=OURS,
     rest=(-7.087e-3, -65.568e-3),
     first_minimum=-128.66e-3,
@@ -62,18 +67,14 @@ ARC = Clamp(
     face="rim",
     shape={
         "type": "difference",
-        "of": {
-            "type": "box",
-            "lengths": [LENGTH - _CORNER, HEIGHT],
-            "origin": [_CORNER, -0.5 * HEIGHT],
-        },
+        "of": box(LENGTH - _CORNER, HEIGHT, origin=[_CORNER, -0.5 * HEIGHT]),
         "minus": {"type": "disc", "radius": RADIUS, "centre": [-RADIUS, 0.0]},
     },
     discretisation={
         "type": "fitted-moments",
         "of": {
             "type": "mapped",
-            "of": _ON_BOUNDARY,
+            "of": ON_BOUNDARY,
             "before": _BOX,
             # Each row is stretched a little, from the arc to the free end.
             "to": {"x": f"X + (sqrt({RADIUS**2!r} - Y*Y) - {RADIUS!r})*(1 - X/{LENGTH!r})"},
@@ -102,39 +103,27 @@ def clamp_named(case: str, name: str) -> Clamp:
     return CLAMPS[name]
 
 
-def beam(clamp: Clamp, across: int, scheme: Scheme) -> SceneBuilder:
+def beam(title: str, clamp: Clamp, across: int, scheme: Scheme) -> SceneBuilder:
     """The beam under gravity, with so many particles across, on its boundary too.
 
-    The clamp and the tip are then where they are in truth. With an even number across, the tip
-    lies halfway between two particles.
+    The clamp and the tip are then at their true places. With an even number across, the tip lies
+    halfway between two particles.
     """
     spacing = HEIGHT / (across - 1)
-    return with_scheme(
-        Simulation.builder()
-        .body(
-            "beam",
-            shape=clamp.shape,
-            spacing=spacing,
-            discretisation=clamp.discretisation,
-            tags={"tip": f"X > {LENGTH - 0.1 * spacing!r} and abs(Y) < {0.6 * spacing!r}"},
-        )
-        .material(
-            "saint-venant-kirchhoff", youngs_modulus=1.4e6, poissons_ratio=0.4, density=1000.0
-        )
+    tags = {"tip": f"X > {LENGTH - 0.1 * spacing!r} and abs(Y) < {0.6 * spacing!r}"}
+    options = {"discretisation": clamp.discretisation, "tags": tags}
+    builder = (
+        solid(title, "beam", clamp.shape, spacing, _MATERIAL, **options)
         .boundary("clamp", where=clamp.face)
-        .effect("body-force", acceleration={"y": -GRAVITY}, label="gravity"),
-        scheme,
+        .effect("body-force", acceleration={"y": -GRAVITY}, label="gravity")
     )
+    return with_scheme(builder, scheme)
 
 
 def tip(record: Record) -> Array:
     """Displacement of mid-height at the free end at every time, (t, 2) [m]."""
-    particles = record.particles
-    chosen = particles.tagged("tip")
-    u: Array = record.positions[:][:, chosen].mean(axis=1) - particles.positions[chosen].mean(
-        axis=0
-    )
-    return u
+    X, chosen = record.particles.positions, record.particles.tagged("tip")
+    return np.asarray(record.positions[:][:, chosen].mean(axis=1) - X[chosen].mean(axis=0))
 
 
 def extremum(times: Array, values: Array, index: int) -> tuple[float, float]:
@@ -146,3 +135,27 @@ def extremum(times: Array, values: Array, index: int) -> tuple[float, float]:
     if a == 0.0:
         return float(times[index]), float(values[index])
     return float(times[index] - 0.5 * b / a), float(c - 0.25 * b**2 / a)
+
+
+def beam_panel(record: Record, step: int, held: Clamp, title: str, *marks: Mark) -> Panel:
+    """The beam coloured by stress, what holds it, and where it was without its weight."""
+    return Panel(
+        outline(record.particles.positions[record.particles.tagged("surface")], color="0.75"),
+        _disc if held is ARC else line([0.0, 0.0], [-0.03, 0.03], "-", color="0.4", linewidth=3.0),
+        field(record, step, principal_stress(record, step, 1e-3)),
+        *marks,
+        title=title,
+        x="x [m]",
+        y="y [m]",
+    )
+
+
+def stress_bar(body: Panel) -> Bar:
+    """The colour bar below the beam."""
+    return Bar(f"{LARGEST_STRESS} [kPa]", [body], {**BELOW, "shrink": 0.6})
+
+
+def _disc(axes: Axes) -> None:
+    from matplotlib.patches import Circle
+
+    axes.add_patch(Circle((-RADIUS, 0.0), RADIUS, facecolor="0.8", edgecolor="0.4"))

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import Any, ClassVar, final
+from typing import final
 
 import attrs
 import numpy as np
 
 from solidsph.errors import SceneError
-from solidsph.maths.arrays import Array
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Curves, Measurement
 from solidsph_cases import _boundary_theory as theory
 from solidsph_cases import _boundary_ways as ways
+from solidsph_cases._boundary_pictures import boundary_sheet
+from solidsph_cases._boundary_ways import block_condition, block_size, largest_error, miss, smoothed
 from solidsph_cases._compare import ROUNDING, closed_form
-from solidsph_cases._line import LENGTH, Line, check_covers, complete_line, left_by_the_cut
+from solidsph_cases._line import LENGTH, F, Line, check_covers, complete_line, left_by_the_cut
 from solidsph_cases._scheme import check_count
-from solidsph_cases.interpolation import F
+from solidsph_cases.drawing.sheet import Sheet
 
 _MOMENTS = "moments of the kernel on an endless lattice"
 _DENSE = "sums written out and dense algebra"
@@ -56,13 +56,10 @@ class BoundaryValues(Case):
     smoothed slope. Each way through the handlers that scenes use. The largest cover is measured.
     """
 
-    title: ClassVar[str] = "Boundary values and slopes, by the ways to impose them"
-    source: ClassVar[str] = "Ismail & Reddy, section 2.3, Fig. 2, eqs. 11, 12"
-    figures: ClassVar[tuple[str, ...]] = ("fig-2",)
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
-        "cells": (20, 40, 80),
-        "covers": ((2.5,), (3.5,), (5.5,)),
-    }
+    title = "Boundary values and slopes, by the ways to impose them"
+    source = "Ismail & Reddy, section 2.3, Fig. 2, eqs. 11, 12"
+    figures = ("fig-2",)
+    sweep = {"cells": (20, 40, 80), "covers": ((2.5,), (3.5,), (5.5,))}
 
     kernel: str = "modified-mollifier"
     covers: Sequence[float] = (1.5, 2.5, 3.5, 4.5, 5.5)  # [spacings]
@@ -100,12 +97,9 @@ class BoundaryValues(Case):
             *_slopes(line),
         ]
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._boundary_picture import draw_boundary
-
-        path = folder / "fig-2-boundary-values.png"
-        draw_boundary(self.lines(), self.kernel, path)
-        return [path]
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """Fig. 2 and what the ways make of the values and slopes."""
+        return {"fig-2-boundary-values": boundary_sheet(self.lines(), self.kernel)}
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         lines = self.lines()
@@ -180,7 +174,7 @@ def _values(line: Line, cover: str) -> Iterator[Measurement]:
 
 def _blocks(line: Line) -> Iterator[Measurement]:
     """How well the blocks of boundary and ghosts can be inverted."""
-    count = _block_size(line)
+    count = block_size(line)
     yield closed_form(
         f"condition of W's block of the boundary and {count - 1} ghosts",
         block_condition(line),
@@ -249,29 +243,6 @@ def _row(
     return attrs.evolve(measured, unit=f"m^{power}")
 
 
-def smoothed(line: Line, carried: Array) -> Array:
-    """The approximation of what the particles carry (n,)."""
-    result: Array = line.smoothing @ carried
-    return result
-
-
-def largest_error(line: Line, approximation: Array, order: int = 0) -> float:
-    """Of f or its slope at the particles beside the ends [m^4, m^3]."""
-    near = ways.beside(line)
-    return float(np.abs(approximation - F.deriv(order)(line.X))[near].max())
-
-
-def _block_size(line: Line) -> int:
-    """A boundary particle and the ghosts beyond it."""
-    return int(ways.ends(line)[0]) + 1
-
-
-def block_condition(line: Line) -> float:
-    """Term number of W's block of the left end and the ghosts beyond it [-]."""
-    count = _block_size(line)
-    return float(np.linalg.cond(line.smoothing[:count, :count].toarray()))
-
-
 def _table(line: Line) -> Curves:
     """What every particle carries and what becomes of it, ghosts on both sides first and last."""
     table = {
@@ -303,9 +274,3 @@ def _table_by_cover(lines: Mapping[float, Line]) -> Curves:
         for name, value in row.items():
             columns.setdefault(name, []).append(value)
     return {name: np.array(values) for name, values in columns.items()}
-
-
-def miss(line: Line, approximation: Array) -> float:
-    """How far <f> is above f at the left end [m^4]."""
-    left = ways.ends(line)[0]
-    return float(approximation[left] - F(line.X[left]))

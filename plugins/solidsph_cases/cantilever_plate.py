@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from math import ceil, cos, cosh, nan, pi, sin, sinh, sqrt
-from pathlib import Path
-from typing import Any, ClassVar, final
+from typing import final
 
 import attrs
 import numpy as np
 from scipy.optimize import least_squares
 
 from solidsph.maths.arrays import Array
-from solidsph.registry.parameters import check_positive, number
+from solidsph.maths.formulas import Expression
+from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 from solidsph.statics import frequencies
 from solidsph.studies.case import Case, Measurement, Trial
+from solidsph_builtin.materials.neo_hookean import NeoHookean
 from solidsph_cases._compare import compared
-from solidsph_cases._scheme import check_count, with_scheme
+from solidsph_cases._scheme import FITTED, box, check_all_positive, check_count, in_motion, solid
+from solidsph_cases.drawing.sheet import Panel, Sheet, line, theory, zero
 
 LENGTH = 0.2  # [m]
 HEIGHT = 0.02  # [m]
@@ -53,14 +56,14 @@ class CantileverPlate(Case):
     gives the period, and so do, independently, the natural frequencies of the same operators.
     """
 
-    title: ClassVar[str] = "An oscillating cantilever plate"
-    source: ClassVar[str] = "Landau & Lifshitz, Theory of Elasticity; Gray, Monaghan & Swift (2001)"
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+    title = "An oscillating cantilever plate"
+    source = "Landau & Lifshitz, Theory of Elasticity; Gray, Monaghan & Swift (2001)"
+    sweep = {
         "across": (5, 7, 11, 15),
         "gradient": ("consistent", "quadratic", "corrected"),
         "cover": (1.8, 2.2, 2.6),
     }
-    trials: ClassVar[Mapping[str, Trial]] = {
+    trials = {
         "Poisson's ratio 0.4999": Trial(
             {"poissons_ratio": 0.4999, "across": 7, "tolerance": 0.05},
             {"across": 4, "engine": "matrix", "tolerance": 0.1},
@@ -74,7 +77,7 @@ class CantileverPlate(Case):
     kernel: str = "cubic-spline"
     cover: float = number(default=2.2)  # [spacings]
     gradient: str = "quadratic"
-    hourglass: float = number(default=0.0)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.0)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
     time_step_factor: float = number(default=0.6)  # of the CFL step
@@ -82,12 +85,13 @@ class CantileverPlate(Case):
 
     def __attrs_post_init__(self) -> None:
         check_count("cantilever-plate", "across", self.across, 3)
-        for name, unit in (
-            ("speed", "bulk sound speeds"),
-            ("periods", "periods of a thin plate"),
-            ("tolerance", "parts of one"),
-        ):
-            check_positive("cantilever-plate", name, getattr(self, name), unit)
+        check_all_positive(
+            "cantilever-plate",
+            self,
+            speed="bulk sound speeds",
+            periods="periods of a thin plate",
+            tolerance="parts of one",
+        )
 
     @property
     def thin_plate_period(self) -> float:
@@ -103,52 +107,31 @@ class CantileverPlate(Case):
 
     def scenes(self) -> Mapping[str, Scene]:
         spacing = HEIGHT / (self.across - 1)
-        builder = with_scheme(
-            Simulation.builder()
-            .title(self.title)
-            .body(
-                "plate",
-                shape={
-                    "type": "box",
-                    "lengths": [LENGTH, HEIGHT],
-                    "origin": [0.0, -0.5 * HEIGHT],
-                },
-                spacing=spacing,
-                discretisation={
-                    "type": "fitted-moments",
-                    "of": {"type": "lattice", "on_boundary": True},
-                },
-                tags={"tip": f"X > {LENGTH - 0.1 * spacing!r} and abs(Y) < {0.6 * spacing!r}"},
-            )
-            .material(
-                "neo-hookean",
-                youngs_modulus=YOUNGS_MODULUS,
-                poissons_ratio=self.poissons_ratio,
-                density=DENSITY,
-            )
+        shape = box(LENGTH, HEIGHT, origin=[0.0, -0.5 * HEIGHT])
+        material = NeoHookean(YOUNGS_MODULUS, self.poissons_ratio, DENSITY)
+        tags = {"tip": f"X > {LENGTH - 0.1 * spacing!r} and abs(Y) < {0.6 * spacing!r}"}
+        velocity: dict[str, float | str] = {"x": 0.0, "y": f"{self.tip_speed!r}*({mode_formula()})"}
+        options = {"discretisation": FITTED, "tags": tags}
+        builder = (
+            solid(self.title, "plate", shape, spacing, material, **options)
             .boundary("clamp", where="left")
-            .initial(velocity={"x": 0.0, "y": f"{self.tip_speed!r}*({mode_formula()})"})
-            .integrator(self.integrator, time_step_factor=self.time_step_factor)
-            .duration(self.periods * self.thin_plate_period)
-            .outputs(ceil(_OUTPUTS * self.periods)),
-            self,
+            .initial(velocity=velocity)
         )
-        return {"plate": builder.scene()}
+        duration, outputs = self.periods * self.thin_plate_period, ceil(_OUTPUTS * self.periods)
+        return {"plate": in_motion(builder, self, duration, outputs).scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["plate"]
         known = _SOLID.get(self.poissons_ratio)
         reference = self.thin_plate_period if known is None else known
         source = _THIN_SOURCE if known is None else _SOLID_SOURCE
-        found = {
-            "period, from the tip's history": period_of(
-                record.times, tip_deflection(record), self.thin_plate_period
-            ),
-            "period, from natural frequencies": self.natural_period(),
-        }
+        compare = partial(
+            compared, unit="s", reference=reference, source=source, tolerance=self.tolerance
+        )
+        period = period_of(record.times, tip_deflection(record), self.thin_plate_period)
         return [
-            compared(record, name, value, "s", reference, source, self.tolerance)
-            for name, value in found.items()
+            compare(record, "period, from the tip's history", period),
+            compare(record, "period, from natural frequencies", self.natural_period()),
         ]
 
     def natural_period(self) -> float:
@@ -160,12 +143,42 @@ class CantileverPlate(Case):
         smooth = np.flatnonzero(modes.smoothness > _SMOOTH)
         return float(2.0 * pi / modes.angular_frequencies[smooth[0]]) if len(smooth) else nan
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._plate_picture import draw_plate
-
-        path = folder / "cantilever-plate.png"
-        draw_plate(records["plate"], self.measure(records), self.title, path)
-        return [path]
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """The deflection of the mid-plane when it is largest, and the tip over time."""
+        record = records["plate"]
+        particles, tip = record.particles, tip_deflection(record)
+        largest, spacing = int(np.argmax(np.abs(tip))), float(particles.spacings[0])
+        # The row at mid-height, or the one just above it.
+        height = particles.positions[:, 1]
+        middle = np.flatnonzero((height > -0.1 * spacing) & (height < 0.6 * spacing))
+        middle = middle[:: max(1, len(middle) // 30)]
+        X = particles.positions[middle, 0]
+        u = (record.positions[largest] - particles.positions)[middle, 1]
+        x = np.linspace(0.0, LENGTH, 200)
+        mode = Expression.parse(mode_formula(), ("X",))({"X": x})
+        shape = Panel(
+            theory(x, mode, "beam theory"),
+            line(X, u / tip[largest], "ko", markersize=4, label="mid-plane"),
+            x="X [m]",
+            y="deflection over that of the tip",
+            legend={"loc": "upper left"},
+        )
+        measured, natural = self.measure(records)
+        period = measured.reference or nan
+        times = np.linspace(0.0, float(record.times[-1]), 400)
+        swing = 1e3 * float(np.abs(tip).max()) * np.sin(2.0 * np.pi * times / period)
+        label = f"tip: T = {measured.value:.4f} s (natural: {natural.value:.4f} s)"
+        history = Panel(
+            theory(times, swing, f"reference: T = {period:.4f} s"),
+            line(record.times, 1e3 * tip, "ko", markersize=4, label=label),
+            zero(),
+            x="time [s]",
+            y="deflection of the tip [mm]",
+            legend={"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 2},
+        )
+        title = f"{self.title}: {particles.count} particles"
+        sheet = Sheet([[shape, history]], (11.0, 4.4), title, widths=(1.0, 1.3))
+        return {"cantilever-plate": sheet}
 
 
 def mode_formula() -> str:
@@ -182,10 +195,8 @@ def mode_formula() -> str:
 
 def tip_deflection(record: Record) -> Array:
     """u_y of mid-height at the free end at every time, (t,) [m]."""
-    particles = record.particles
-    tip = particles.tagged("tip")
-    u: Array = record.positions[:][:, tip, 1].mean(axis=1) - particles.positions[tip, 1].mean()
-    return u
+    X, tip = record.particles.positions, record.particles.tagged("tip")
+    return np.asarray(record.positions[:][:, tip, 1].mean(axis=1) - X[tip, 1].mean())
 
 
 def period_of(times: Array, values: Array, guess: float) -> float:

@@ -3,34 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import ClassVar, final
+from functools import partial
+from math import nan
+from typing import final
 
 import attrs
 import numpy as np
 
 from solidsph.errors import SceneError
 from solidsph.maths.arrays import Array
-from solidsph.registry.parameters import check_positive, number
+from solidsph.registry.construct import describe
+from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Curves, Measurement, Trial
 from solidsph_builtin.materials.linear_elastic import LinearElastic
-from solidsph_cases._compare import FINISHED, compared
+from solidsph_cases._compare import compared, finished, vanishing
 from solidsph_cases._energy import residual_over_start
-from solidsph_cases._scheme import check_count, with_scheme
+from solidsph_cases._scheme import box, check_all_positive, check_count, with_scheme
+from solidsph_cases.drawing.sheet import Panel, Sheet, line
 
 LENGTH = 1.0  # of each bar [m]
 MATERIAL = LinearElastic(youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
 
 # Time of flight before the contact, and whole duration, in transits L / c.
-BEFORE, _DURATION = 0.1, 3.0
+_BEFORE, _DURATION = 0.1, 3.0
 _OUTPUTS = 300
 _TOLERANCE = 0.02
 
 _SOURCE = "Saint-Venant (1867): waves of two equal bars"
-FORCE = "contact force of first on second x [N]"
+_FORCE = "contact force of first on second x [N]"
 
 
 @final
@@ -44,10 +47,10 @@ class CollidingBars(Case):
     bars are strips between frictionless walls.
     """
 
-    title: ClassVar[str] = "Two bars collide"
-    source: ClassVar[str] = _SOURCE
-    sweep: ClassVar[Mapping[str, Sequence[object]]] = {"particles": (25, 50, 100, 200)}
-    trials: ClassVar[Mapping[str, Trial]] = {
+    title = "Two bars collide"
+    source = _SOURCE
+    sweep = {"particles": (25, 50, 100, 200)}
+    trials = {
         "1D": Trial({}, {"particles": 50}),
         "strips": Trial({"dimension": 2}, {"particles": 50}),
     }
@@ -60,14 +63,14 @@ class CollidingBars(Case):
     kernel: str = "cubic-spline"
     cover: float = number(default=2.2)  # [spacings]
     gradient: str = "corrected"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     time_step_factor: float = number(default=0.5)  # of the CFL step
 
     def __attrs_post_init__(self) -> None:
         check_count("colliding-bars", "particles", self.particles, 10)
         check_count("colliding-bars", "across", self.across, 4)
-        check_positive("colliding-bars", "speed", self.speed, "parts of the wave speed")
+        check_all_positive("colliding-bars", self, speed="parts of the wave speed")
         if self.dimension not in (1, 2):
             raise SceneError(f"case 'colliding-bars': {self.dimension} dimensions; take 1 or 2")
 
@@ -93,23 +96,18 @@ class CollidingBars(Case):
 
     def scenes(self) -> Mapping[str, Scene]:
         builder = Simulation.builder().title(self.title)
-        gap = self.velocity * BEFORE * self.transit
+        gap = self.velocity * _BEFORE * self.transit
         for name, start in (("first", -LENGTH - gap), ("second", 0.0)):
             shape = (
                 {"type": "interval", "length": LENGTH, "origin": start}
                 if self.dimension == 1
-                else {"type": "box", "lengths": [LENGTH, self.width], "origin": [start, 0.0]}
+                else box(LENGTH, self.width, origin=[start, 0.0])
             )
             builder = builder.body(name, shape=shape, spacing=LENGTH / self.particles)
         if self.dimension == 2:
             builder = builder.boundary("clamp", where="all", axes=["y"])
         builder = (
-            builder.material(
-                "linear-elastic",
-                youngs_modulus=MATERIAL.youngs_modulus,
-                poissons_ratio=MATERIAL.poissons_ratio,
-                density=MATERIAL.density,
-            )
+            builder.material(describe("materials", MATERIAL))
             .effect("contact", strength=self.strength)
             .initial(where=f"X < {-0.5 * gap!r}", velocity={"x": self.velocity})
             .integrator("central-difference", time_step_factor=self.time_step_factor)
@@ -120,58 +118,41 @@ class CollidingBars(Case):
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["bars"]
-        plateau = self.plateau
-        times, force = record.times, record.history[FORCE]
-        above = force > 0.5 * plateau
-        lasted, middle = float("nan"), float("nan")
+        times, force = record.times, record.history[_FORCE]
+        above = force > 0.5 * self.plateau
+        lasted, middle = nan, nan
         if above.any():
-            lasted = _crossing(times, force, 0.5 * plateau, last=True) - _crossing(
-                times, force, 0.5 * plateau, last=False
+            begin, end = (
+                _crossing(times, force, 0.5 * self.plateau, last=x) for x in (False, True)
             )
+            lasted = end - begin
             between = (times > times[above][0]) & (times < times[above][-1])
             middle = float(force[between].mean())
-        velocities = self.mean_velocities(record)[-1] / self.velocity
-        done = record.outcome == FINISHED
-        momenta = self.mean_velocities(record).sum(axis=1) / self.velocity
+        means = self.mean_velocities(record)
+        momenta = means.sum(axis=1) / self.velocity
         lost = float(np.abs(momenta / momenta[0] - 1.0).max())
+        hitting, hit = velocities = means[-1] / self.velocity
+        compare = partial(compared, record, source=_SOURCE, tolerance=_TOLERANCE)
         return [
-            compared(
+            compare("time of contact, at half the force", lasted, "s", 2.0 * self.transit),
+            compare("force of contact", middle, "N", self.plateau),
+            compare("velocity of the bar hit", hit, "v", 1.0),
+            vanishing(
+                record, "velocity of the bar that hit", hitting, _TOLERANCE, _SOURCE, unit="v"
+            ),
+            vanishing(
                 record,
-                "time of contact, at half the force",
-                lasted,
-                "s",
-                2.0 * self.transit,
-                _SOURCE,
-                _TOLERANCE,
-            ),
-            compared(record, "force of contact", middle, "N", plateau, _SOURCE, _TOLERANCE),
-            compared(
-                record, "velocity of the bar hit", velocities[1], "v", 1.0, _SOURCE, _TOLERANCE
+                "largest relative change of momentum",
+                lost,
+                1e-10,  # rounding of some thousand steps
+                "nothing acts from outside",
             ),
             Measurement(
-                quantity="velocity of the bar that hit",
-                value=float(velocities[0]),
-                unit="v",
-                reference=0.0,
-                source=_SOURCE,
-                error=float(abs(velocities[0])),
-                passed=done and abs(velocities[0]) <= _TOLERANCE,
-            ),
-            Measurement(
-                quantity="largest relative change of momentum",
-                value=lost,
-                unit="1",
-                reference=0.0,
-                source="nothing acts from outside",
-                error=lost,
-                passed=done and lost <= 1e-10,  # rounding of some thousand steps
-            ),
-            Measurement(
-                quantity="energy left in vibrations over that at the start",
-                value=float(1.0 - np.sum(velocities**2)),
-                unit="1",
+                "energy left in vibrations over that at the start",
+                float(1.0 - np.sum(velocities**2)),
+                "1",
                 verdict="a sharp front sheds some",
-                passed=done,
+                passed=finished(record),
             ),
             residual_over_start(record),
         ]
@@ -182,12 +163,31 @@ class CollidingBars(Case):
         bodies = record.particles.bodies
         return np.column_stack([v[:, bodies[name]].mean(axis=1) for name in ("first", "second")])
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._contact_pictures import draw_bars
-
-        path = folder / "colliding-bars.png"
-        draw_bars(records["bars"], self, path)
-        return [path]
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """The force of contact and both mean velocities against time, in transits."""
+        record = records["bars"]
+        t = record.times / self.transit - _BEFORE
+        first, second = self.mean_velocities(record).T / self.velocity
+        part = 0.5 * np.clip(t, 0.0, 2.0)
+        law = {"color": "tab:orange", "linestyle": "--", "linewidth": 1.5}
+        force = Panel(
+            line(t, record.history[_FORCE] / self.plateau, linewidth=1.0, label="simulated"),
+            line(t, (t > 0.0) & (t < 2.0), "-", **law, label="waves of two bars"),
+            x="time since the contact [L / c]",
+            y="force of contact [rho c v A / 2]",
+            legend={},
+        )
+        velocity = Panel(
+            line(t, 1.0 - part, "-", **law, zorder=0),
+            line(t, part, "-", **law, zorder=0),
+            line(t, first, label="first bar"),
+            line(t, second, "k:", label="second bar"),
+            x="time since the contact [L / c]",
+            y="mean velocity [v]",
+            legend={},
+        )
+        title = f"{self.title}: {record.particles.count} particles, {self.dimension}D"
+        return {"colliding-bars": Sheet([[force, velocity]], (9.0, 3.8), title)}
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         record = records["bars"]
@@ -195,7 +195,7 @@ class CollidingBars(Case):
         return {
             "colliding-bars": {
                 "time [s]": record.times,
-                "force of contact [N]": record.history[FORCE],
+                "force of contact [N]": record.history[_FORCE],
                 "mean velocity of the first [m/s]": first,
                 "mean velocity of the second [m/s]": second,
             }

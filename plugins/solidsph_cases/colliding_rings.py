@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import sqrt
-from pathlib import Path
-from typing import Any, ClassVar, final
+from typing import final
 
 import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.maths.arrays import Array
-from solidsph.registry.parameters import check_positive, number
+from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Curves, Measurement, Trial
-from solidsph_cases._compare import FINISHED
+from solidsph_cases._compare import finished, vanishing
 from solidsph_cases._energy import residual_over_start, smallest_volume_ratio
-from solidsph_cases._scheme import check_count, with_scheme
+from solidsph_cases._scheme import check_all_positive, check_count, with_scheme
+from solidsph_cases.drawing.fields import scatter
+from solidsph_cases.drawing.sheet import Bar, Panel, Sheet, line
 
 INNER, OUTER = 0.03, 0.04  # radii [m]
 YOUNGS_MODULUS, POISSONS_RATIO, DENSITY = 1e7, 0.3975, 1010.0  # [Pa], [-], [kg/m^3]
@@ -42,17 +43,17 @@ class CollidingRings(Case):
     """Each ring moves with `speed` times c0 = sqrt(K / rho) towards the other.
 
     In tension, forms of SPH for solids in the current configuration let particles clump and the
-    rings break, by the numbers alone, which is what Monaghan and Gray showed and mended. What
-    must come out is known in kind: the rings flatten where they touch, part, and go on vibrating;
+    rings break, by the numbers alone, which is what Monaghan and Gray showed and mended. The
+    outcome is known in kind: the rings flatten where they touch, part, and go on vibrating;
     momentum stays, and so does energy; neighbours remain neighbours. We know of no published value
-    of the speed after the impact, so that only its convergence is told: 0.799, 0.812, 0.810 and
+    of the speed after the impact, so that only its convergence is given: 0.799, 0.812, 0.810 and
     0.809 of that before, with 5, 7, 10 and 14 particles from rim to rim.
     """
 
-    title: ClassVar[str] = "Two rubber rings collide"
-    source: ClassVar[str] = _SOURCE
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {"through": (5, 7, 10, 14)}
-    trials: ClassVar[Mapping[str, Trial]] = {
+    title = "Two rubber rings collide"
+    source = _SOURCE
+    sweep = {"through": (5, 7, 10, 14)}
+    trials = {
         "0.059 c0": Trial({}, {"through": 4}),
         "0.059 c0, off centre, friction 0.5": Trial(
             {"offset": 0.03, "friction": 0.5}, {"through": 4, "duration": 0.015}
@@ -70,14 +71,13 @@ class CollidingRings(Case):
     kernel: str = "cubic-spline"
     cover: float = number(default=2.2)  # [spacings]
     gradient: str = "corrected"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     time_step_factor: float = number(default=0.5)  # of the CFL step
 
     def __attrs_post_init__(self) -> None:
         check_count("colliding-rings", "through", self.through, 4)
-        check_positive("colliding-rings", "speed", self.speed, "parts of c0")
-        check_positive("colliding-rings", "duration", self.duration, "s")
+        check_all_positive("colliding-rings", self, speed="parts of c0", duration="s")
 
     @property
     def velocity(self) -> float:
@@ -89,15 +89,11 @@ class CollidingRings(Case):
         builder = Simulation.builder().title(self.title)
         # Lattices off centre alike, so that the rings mirror each other.
         x, y, v = OUTER + 0.5 * _APART, 0.5 * self.offset, self.velocity
+        ring = {"type": "annulus", "inner_radius": INNER, "outer_radius": OUTER}
         for name, side in (("west", -1.0), ("east", 1.0)):
             builder = builder.body(
                 name,
-                shape={
-                    "type": "annulus",
-                    "inner_radius": INNER,
-                    "outer_radius": OUTER,
-                    "centre": [side * x, side * y],
-                },
+                shape={**ring, "centre": [side * x, side * y]},
                 spacing=(OUTER - INNER) / self.through,
                 discretisation="lattice",
             ).initial(where=name, velocity={"x": -side * v})
@@ -117,54 +113,46 @@ class CollidingRings(Case):
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["rings"]
-        done = record.outcome == FINISHED
+        done = finished(record)
         v = self.mean_velocities(record) / self.velocity
         drift = float(np.abs(v.sum(axis=1) - v[0].sum(axis=0)).max())
-        shortest, longest = self.neighbours(record)
+        shortest, longest = _neighbours(record)
         gap = float(record.history["contact least gap [m]"][-1])
-        pairs = float(record.history["contact touching pairs [-]"][-1])
-        apart = pairs == 0.0 and gap > 0.0
+        apart = float(record.history["contact touching pairs [-]"][-1]) == 0.0 and gap > 0.0
         whole = shortest >= self.closest and longest <= _FURTHEST
         return [
-            Measurement(
-                quantity="largest change of momentum over that of one ring",
-                value=drift,
-                unit="1",
-                reference=0.0,
-                source="nothing acts from outside",
-                error=drift,
-                passed=done and drift <= 1e-10,  # rounding of some ten thousand steps
+            vanishing(
+                record,
+                "largest change of momentum over that of one ring",
+                drift,
+                1e-10,  # rounding of some ten thousand steps
+                "nothing acts from outside",
             ),
             residual_over_start(record),
             smallest_volume_ratio(record),
-            Measurement(
-                quantity="shortest distance of neighbours over their first",
-                value=shortest,
-                unit="1",
-                source=_SOURCE,
-                verdict="neighbours remain neighbours" if whole else "clumped or broken",
-                passed=done and whole,
+            *(
+                Measurement(
+                    f"{name} distance of neighbours over their first",
+                    ratio,
+                    "1",
+                    source=_SOURCE,
+                    verdict="neighbours remain neighbours" if whole else "clumped or broken",
+                    passed=done and whole,
+                )
+                for name, ratio in (("shortest", shortest), ("longest", longest))
             ),
             Measurement(
-                quantity="longest distance of neighbours over their first",
-                value=longest,
-                unit="1",
-                source=_SOURCE,
-                verdict="neighbours remain neighbours" if whole else "clumped or broken",
-                passed=done and whole,
-            ),
-            Measurement(
-                quantity="gap at the end",
-                value=1e3 * gap,
-                unit="mm",
+                "gap at the end",
+                1e3 * gap,
+                "mm",
                 source=_SOURCE,
                 verdict="apart again" if apart else "still together",
                 passed=done and apart,
             ),
             Measurement(
-                quantity="speed of a ring after the impact over that before",
-                value=float(np.linalg.norm(v[-1, 1])),
-                unit="1",
+                "speed of a ring after the impact over that before",
+                float(np.linalg.norm(v[-1, 1])),
+                "1",
                 verdict="the rest of the energy is in vibrations",
                 passed=done,
             ),
@@ -180,27 +168,61 @@ class CollidingRings(Case):
         ]
         return np.stack(means, axis=1)
 
-    def neighbours(self, record: Record) -> tuple[float, float]:
-        """Shortest and longest distance of nearest neighbours at any time, over their first."""
-        shortest, longest = np.inf, 0.0
-        for rows in record.particles.bodies.values():
-            X = record.particles.positions[rows]
-            spacing = float(record.particles.spacings[rows].max())
-            pairs = cKDTree(X).query_pairs(1.2 * spacing, output_type="ndarray")
-            first = np.linalg.norm(X[pairs[:, 0]] - X[pairs[:, 1]], axis=1)
-            for positions in record.positions:
-                x = positions[rows]
-                ratios = np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1) / first
-                shortest = min(shortest, float(ratios.min()))
-                longest = max(longest, float(ratios.max()))
-        return shortest, longest
-
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._contact_pictures import draw_rings
-
-        path = folder / "colliding-rings.png"
-        draw_rings(records["rings"], self, path)
-        return [path]
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """Particles coloured by J at some times, the energies, and the velocities of both rings."""
+        record = records["rings"]
+        times, history = 1e3 * record.times, record.history
+        J = record.field("volume_ratio")
+        touching = np.flatnonzero(history["contact touching pairs [-]"] > 0.0)
+        end = int(touching[-1]) if touching.size else len(times) - 1
+        shown = np.linspace(0, min(len(times) - 1, int(1.6 * end)), 6).astype(int).tolist()
+        places = 1e3 * np.concatenate([record.positions[k] for k in shown])
+        (left, bottom), (right, top) = places.min(axis=0) - 2.0, places.max(axis=0) + 2.0
+        span = max(abs(float(J[k].min()) - 1.0) for k in shown)
+        frames = [
+            Panel(
+                scatter(
+                    *(1e3 * record.positions[k], J[k], "coolwarm_r"),
+                    vmin=1.0 - span,
+                    vmax=1.0 + span,
+                    s=4.0,
+                ),
+                title=f"t = {times[k]:.2f} ms",
+                x="x [mm]",
+                aspect="equal",
+                xlim=(left, right),
+                ylim=(bottom, top),
+            )
+            for k in shown
+        ]
+        start = history["kinetic energy [J]"][0]
+        energies = Panel(
+            *(
+                line(times, history[f"{name} [J]"] / start, "-", label=name.split(" ")[label])
+                for name, label in (
+                    ("kinetic energy", 0),
+                    ("strain energy", 0),
+                    ("contact energy", 0),
+                    ("energy residual", 1),
+                )
+            ),
+            x="t [ms]",
+            y="energy over that at the start [-]",
+            legend={},
+        )
+        v = self.mean_velocities(record)[:, :, 0] / self.velocity
+        names = ("western ring", "eastern ring")
+        speeds = Panel(
+            *(line(times, v[:, k], "-", label=name) for k, name in enumerate(names)),
+            x="t [ms]",
+            y="mean velocity over that before [-]",
+            legend={},
+        )
+        rows = [[frame for frame in row for _ in "xx"] for row in (frames[:3], frames[3:])]
+        rows.append([energies] * 3 + [speeds] * 3)
+        title = f"{self.title}: {record.particles.count} particles, {self.speed:g} c0 each"
+        bars = [Bar("J [-]", frames, {"shrink": 0.7})]
+        return {"colliding-rings": Sheet(rows, (13.0, 9.5), title, bars=bars)}
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         record = records["rings"]
@@ -211,3 +233,19 @@ class CollidingRings(Case):
                 "mean velocity of the eastern ring [m/s]": self.mean_velocities(record)[:, 1, 0],
             }
         }
+
+
+def _neighbours(record: Record) -> tuple[float, float]:
+    """Shortest and longest distance of nearest neighbours at any time, over their first."""
+    shortest, longest = np.inf, 0.0
+    for rows in record.particles.bodies.values():
+        X = record.particles.positions[rows]
+        spacing = float(record.particles.spacings[rows].max())
+        pairs = cKDTree(X).query_pairs(1.2 * spacing, output_type="ndarray")
+        first = np.linalg.norm(X[pairs[:, 0]] - X[pairs[:, 1]], axis=1)
+        for positions in record.positions:
+            x = positions[rows]
+            ratios = np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1) / first
+            shortest = min(shortest, float(ratios.min()))
+            longest = max(longest, float(ratios.max()))
+    return shortest, longest

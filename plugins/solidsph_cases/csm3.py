@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import ceil
-from pathlib import Path
-from typing import Any, ClassVar, final
+from math import ceil, nan
+from typing import final
 
 import attrs
 import numpy as np
 
 from solidsph.maths.arrays import Array
-from solidsph.registry.parameters import check_positive, number
+from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Measurement
 from solidsph_cases._compare import compared
-from solidsph_cases._scheme import check_count
-from solidsph_cases._turek_hron import Clamp, beam, clamp_named, extremum, tip
+from solidsph_cases._scheme import check_all_positive, check_count
+from solidsph_cases._turek_hron import (
+    Clamp,
+    beam,
+    beam_panel,
+    clamp_named,
+    extremum,
+    stress_bar,
+    tip,
+)
+from solidsph_cases.drawing.fields import outline
+from solidsph_cases.drawing.sheet import Panel, Sheet, line
 
 # The first minimum comes at 0.456 s, the second at 1.37 s.
 _FIRST_HALF = 0.7  # [s]
@@ -39,9 +48,9 @@ class Csm3(Case):
     modes go on for ever, so that extremes differ by about a per cent from one period to another.
     """
 
-    title: ClassVar[str] = "Turek and Hron's beam in motion (CSM3)"
-    source: ClassVar[str] = "Turek & Hron (2006)"
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+    title = "Turek and Hron's beam in motion (CSM3)"
+    source = "Turek & Hron (2006)"
+    sweep = {
         "across": (3, 5, 7, 9),
         "gradient": ("consistent", "quadratic", "corrected"),
         "cover": (2.2, 2.6, 3.0),
@@ -53,7 +62,7 @@ class Csm3(Case):
     kernel: str = "cubic-spline"
     cover: float = number(default=2.6)  # [spacings]
     gradient: str = "consistent"
-    hourglass: float = number(default=0.0)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.0)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
     time_step_factor: float = number(default=0.6)  # of the CFL step
@@ -62,8 +71,7 @@ class Csm3(Case):
     def __attrs_post_init__(self) -> None:
         clamp_named("csm3", self.clamp)
         check_count("csm3", "across", self.across, 3)
-        check_positive("csm3", "duration", self.duration, "s")
-        check_positive("csm3", "tolerance", self.tolerance, "parts of one")
+        check_all_positive("csm3", self, duration="s", tolerance="parts of one")
 
     @property
     def held(self) -> Clamp:
@@ -72,19 +80,19 @@ class Csm3(Case):
 
     def scenes(self) -> Mapping[str, Scene]:
         builder = (
-            beam(self.held, self.across, self)
+            beam(self.title, self.held, self.across, self)
             .integrator(self.integrator, time_step_factor=self.time_step_factor)
-            .title(self.title)
             .duration(self.duration)
             .outputs(ceil(_RATE * self.duration))
         )
         return {"csm3": builder.scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
-        record = records["csm3"]
+        record, held = records["csm3"], self.held
         u = tip(record)
-        time, lowest = first_minimum(record.times, u[:, 1])
-        held = self.held
+        swing = record.times < _FIRST_HALF
+        low = u[swing, 1]
+        time, lowest = extremum(record.times[swing], low, int(np.argmin(low)))
         found = [
             ("first minimum of u_y", 1e3 * lowest, "mm", 1e3 * held.first_minimum, self.tolerance),
             # Published in steps of 5 ms, about a per cent.
@@ -95,31 +103,45 @@ class Csm3(Case):
             f = frequency_of(record.times, u[:, 1])
             # A run that ended early has no period: its values are no numbers, and do not pass.
             last = record.times > record.times[-1] - 1.0 / f if f > 0.0 else [0]
-            for axis, mean, swing in ((0, mean_x, swing_x), (1, mean_y, swing_y)):
-                low, high = u[last, axis].min(), u[last, axis].max()
+            for axis, mean, amplitude in ((0, mean_x, swing_x), (1, mean_y, swing_y)):
+                least, most = u[last, axis].min(), u[last, axis].max()
                 name = f"u_{'xy'[axis]} in the last period"
                 found += [
-                    (f"mean of {name}", 500.0 * (high + low), "mm", 1e3 * mean, 0.05),
-                    (f"amplitude of {name}", 500.0 * (high - low), "mm", 1e3 * swing, 0.05),
+                    (f"mean of {name}", 500.0 * (most + least), "mm", 1e3 * mean, 0.05),
+                    (f"amplitude of {name}", 500.0 * (most - least), "mm", 1e3 * amplitude, 0.05),
                 ]
             found.append(("frequency", f, "Hz", frequency, self.tolerance))
         return [
-            compared(record, name, value, unit, reference, held.source, tolerance)
-            for name, value, unit, reference, tolerance in found
+            compared(record, quantity, value, unit, reference, held.source, tolerance)
+            for quantity, value, unit, reference, tolerance in found
         ]
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._beam_picture import draw_in_motion
-
-        path = folder / "csm3.png"
-        draw_in_motion(records["csm3"], self.held, self.title, path)
-        return [path]
-
-
-def first_minimum(times: Array, values: Array) -> tuple[float, float]:
-    """Time [s] and value [m] of the lowest place in the first swing."""
-    swing = times < _FIRST_HALF
-    return extremum(times[swing], values[swing], int(np.argmin(values[swing])))
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """The beam at its lowest, and both components of the tip's displacement over time."""
+        record, held = records["csm3"], self.held
+        u = 1e3 * tip(record)
+        k = int(np.argmin(u[:, 1]))
+        title = f"{self.title}: {record.particles.count} particles, at t = {record.times[k]:.3f} s"
+        surface = record.particles.tagged("surface")
+        earlier = np.linspace(0, k, 5)[1:-1].astype(int)
+        body = beam_panel(
+            *(record, k, held, title),
+            *(outline(record.positions[step][surface]) for step in earlier),
+        )
+        minimum = 1e3 * held.first_minimum
+        label = f"reference: {minimum:.2f} mm at {held.first_minimum_time:g} s"
+        history = Panel(
+            line(record.times, u[:, 0], "--", color="0.45", label="$u_x$ of the tip"),
+            line(record.times, u[:, 1], label="$u_y$ of the tip"),
+            line(held.first_minimum_time, minimum, "ko", mfc="none", ms=10, label=label),
+            x="time [s]",
+            y="displacement [mm]",
+            grid=True,
+            xlim=(0.0, record.times[-1]),
+            legend={"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 3, "fontsize": 10},
+        )
+        bars = [stress_bar(body)]
+        return {"csm3": Sheet([[body], [history]], (8.5, 8.0), heights=(1.15, 1.0), bars=bars)}
 
 
 def frequency_of(times: Array, values: Array) -> float:
@@ -127,7 +149,7 @@ def frequency_of(times: Array, values: Array) -> float:
     centred = values - 0.5 * (values.min() + values.max())
     down = np.flatnonzero((centred[:-1] > 0.0) & (centred[1:] <= 0.0))
     if len(down) < 2:
-        return float("nan")
+        return nan
     part = centred[down] / (centred[down] - centred[down + 1])
     passages = times[down] + part * (times[down + 1] - times[down])
     return float((len(down) - 1) / (passages[-1] - passages[0]))

@@ -4,25 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import ceil, pi
-from pathlib import Path
-from typing import Any, ClassVar, final
+from typing import final
 
 import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.maths.arrays import Array
-from solidsph.registry.parameters import check_positive, number
+from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
-from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Measurement, Trial
-from solidsph_cases._compare import FINISHED
+from solidsph_builtin.materials.neo_hookean import NeoHookean
+from solidsph_cases._compare import finished, vanishing
 from solidsph_cases._energy import total_energy
-from solidsph_cases._scheme import check_count, with_scheme
+from solidsph_cases._scheme import FITTED, box, check_all_positive, check_count, in_motion, solid
+from solidsph_cases.drawing.fields import LARGEST_STRESS, field, outline, principal_stress
+from solidsph_cases.drawing.sheet import Bar, Panel, Sheet, line, mark
 
 SIDE = 1.0  # [m]
-DENSITY = 1100.0  # [kg/m^3]
+RUBBER = NeoHookean(youngs_modulus=17e6, poissons_ratio=0.3, density=1100.0)
 ANGULAR_VELOCITY = 105.0  # at the start [rad/s]
 
 # Outputs a turn, and in all, which bounds the record: the phases of a long run fall anywhere.
@@ -43,23 +44,21 @@ class ElasticSpin(Case):
     time step and must not drift; and its particles must not clump.
     """
 
-    title: ClassVar[str] = "A free elastic square that spins"
-    source: ClassVar[str] = "conservation of angular momentum and energy"
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+    title = "A free elastic square that spins"
+    source = "conservation of angular momentum and energy"
+    sweep = {
         "across": (11, 21),
         "time_step_factor": (0.1, 0.2, 0.4),
         "gradient": ("quadratic", "corrected"),
     }
-    trials: ClassVar[Mapping[str, Trial]] = {
-        "1000 turns": Trial({"turns": 1000.0, "across": 11}, {"turns": 5.0}),
-    }
+    trials = {"1000 turns": Trial({"turns": 1000.0, "across": 11}, {"turns": 5.0})}
 
     turns: float = number(default=10.0)  # duration, in turns of the rigid square
     across: int = 21  # particles along a side
     kernel: str = "cubic-spline"
     cover: float = number(default=2.2)  # [spacings]
     gradient: str = "quadratic"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
     time_step_factor: float = number(default=0.4)  # of the CFL step
@@ -68,92 +67,93 @@ class ElasticSpin(Case):
 
     def __attrs_post_init__(self) -> None:
         check_count("elastic-spin", "across", self.across, 5)
-        check_positive("elastic-spin", "turns", self.turns, "turns")
+        check_all_positive("elastic-spin", self, turns="turns")
 
     def accuracy(self, measurements: Sequence[Measurement]) -> Measurement:
         """The drift of energy; angular momentum is kept to rounding at any cost."""
         return measurements[1]
 
     def scenes(self) -> Mapping[str, Scene]:
-        w = ANGULAR_VELOCITY
-        builder = with_scheme(
-            Simulation.builder()
-            .title(self.title)
-            .body(
-                "square",
-                shape={
-                    "type": "box",
-                    "lengths": [SIDE, SIDE],
-                    "origin": [-0.5 * SIDE, -0.5 * SIDE],
-                },
-                spacing=SIDE / (self.across - 1),
-                discretisation={
-                    "type": "fitted-moments",
-                    "of": {"type": "lattice", "on_boundary": True},
-                },
-            )
-            .material("neo-hookean", youngs_modulus=17e6, poissons_ratio=0.3, density=DENSITY)
-            .initial(velocity={"x": f"-{w!r}*Y", "y": f"{w!r}*X"})
-            .integrator(self.integrator, time_step_factor=self.time_step_factor)
-            .duration(self.turns * 2.0 * pi / w)
-            .outputs(min(_MOST_OUTPUTS, ceil(_OUTPUTS_A_TURN * self.turns))),
-            self,
-        )
-        return {"spin": builder.scene()}
+        w, spacing = ANGULAR_VELOCITY, SIDE / (self.across - 1)
+        shape = box(SIDE, SIDE, origin=[-0.5 * SIDE, -0.5 * SIDE])
+        builder = solid(self.title, "square", shape, spacing, RUBBER, discretisation=FITTED)
+        builder = builder.initial(velocity={"x": f"-{w!r}*Y", "y": f"{w!r}*X"})
+        outputs = min(_MOST_OUTPUTS, ceil(_OUTPUTS_A_TURN * self.turns))
+        return {"spin": in_motion(builder, self, self.turns * 2.0 * pi / w, outputs).scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["spin"]
-        finished = record.outcome == FINISHED
         momentum = angular_momentum(record)
         change = float(np.abs(momentum / momentum[0] - 1.0).max())
-        drift = abs(energy_drift(record))
         closest = float(smallest_distance(record).min())
         over = f"over {self.turns:g} turns"
         return [
-            Measurement(
-                quantity=f"largest relative change of angular momentum {over}",
-                value=change,
-                unit="1",
-                reference=0.0,
-                source="isotropy of space",
-                error=change,
-                passed=finished and change <= self.momentum_tolerance,
+            vanishing(
+                record,
+                f"largest relative change of angular momentum {over}",
+                change,
+                self.momentum_tolerance,
+                "isotropy of space",
+            ),
+            vanishing(
+                record,
+                f"relative drift of energy {over}",
+                abs(_energy_drift(record)),
+                self.energy_tolerance,
+                "a symplectic scheme wavers, and does not drift",
             ),
             Measurement(
-                quantity=f"relative drift of energy {over}",
-                value=drift,
-                unit="1",
-                reference=0.0,
-                source="a symplectic scheme wavers, and does not drift",
-                error=drift,
-                passed=finished and drift <= self.energy_tolerance,
-            ),
-            Measurement(
-                quantity="smallest distance of neighbours",
-                value=closest,
-                unit="spacings",
+                "smallest distance of neighbours",
+                closest,
+                "spacings",
                 verdict="clumped" if closest < _CLOSEST else "apart",
-                passed=finished and closest >= _CLOSEST,
+                passed=finished(record) and closest >= _CLOSEST,
             ),
         ]
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._spin_picture import draw_spin
-
-        path = folder / "elastic-spin.png"
-        draw_spin(records["spin"], self.title, path)
-        return [path]
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """The square at the end; momentum, energy and distances over the turns."""
+        record = records["spin"]
+        turns = record.times * ANGULAR_VELOCITY / (2.0 * np.pi)
+        body = Panel(
+            field(record, -1, principal_stress(record, -1)),
+            outline(record.positions[0][record.particles.tagged("surface")]),
+            title=f"after {turns[-1]:.4g} turns (dots: at the start)",
+            x="x [m]",
+            y="y [m]",
+        )
+        momentum, total = angular_momentum(record), total_energy(record)
+        curves = {
+            "angular momentum\n(L - L$_0$) / L$_0$": momentum / momentum[0] - 1.0,
+            "energy\n(E - E$_0$) / E$_0$": total / total[0] - 1.0,
+            "smallest distance\n[spacings]": smallest_distance(record),
+        }
+        histories = [
+            Panel(
+                line(turns, values, linewidth=0.9),
+                mark("ticklabel_format", axis="y", scilimits=(-2, 2), useMathText=True),
+                x="" if row < 2 else "time [turns]",
+                y=label,
+                grid=True,
+                xlim=(0.0, float(turns[-1])),
+                ylim=(None, None) if row < 2 else (0.0, None),
+            )
+            for row, (label, values) in enumerate(curves.items())
+        ]
+        title = f"{self.title}: {record.particles.count} particles"
+        rows = [[body, history] for history in histories]
+        bars = [Bar(f"{LARGEST_STRESS} [MPa]", [body], {"location": "bottom"})]
+        return {"elastic-spin": Sheet(rows, (11.0, 6.2), title, widths=(1.0, 1.5), bars=bars)}
 
 
 def angular_momentum(record: Record) -> Array:
     """About the origin at every time, (t,) [kg m^2/s per metre]."""
-    masses = DENSITY * record.particles.volumes
+    masses = RUBBER.density * record.particles.volumes
     x, v = record.positions[:], record.field("velocity")[:]
-    result: Array = (x[..., 0] * v[..., 1] - x[..., 1] * v[..., 0]) @ masses
-    return result
+    return np.asarray((x[..., 0] * v[..., 1] - x[..., 1] * v[..., 0]) @ masses)
 
 
-def energy_drift(record: Record) -> float:
+def _energy_drift(record: Record) -> float:
     """Change of the energy along the straight line that fits it best, over its start [-]."""
     total = total_energy(record)
     times = record.times - record.times.mean()
@@ -164,8 +164,5 @@ def energy_drift(record: Record) -> float:
 def smallest_distance(record: Record) -> Array:
     """Of any two particles at every time, (t,) [spacings]."""
     spacing = float(record.particles.spacings[0])
-    closest = []
-    for positions in record.positions:
-        distances = np.asarray(cKDTree(positions).query(positions, 2)[0])
-        closest.append(distances[:, 1].min() / spacing)
-    return np.array(closest)
+    nearest = (cKDTree(positions).query(positions, 2)[0] for positions in record.positions)
+    return np.array([np.asarray(distances)[:, 1].min() / spacing for distances in nearest])

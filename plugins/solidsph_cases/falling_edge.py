@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, final
 
 import attrs
 import numpy as np
@@ -20,6 +19,8 @@ from solidsph_cases._line import LENGTH, Line, check_covers, complete_line
 from solidsph_cases._moments import Moments, of_lattice
 from solidsph_cases._scheme import check_count
 from solidsph_cases._slopes import SlopeOfEdge
+from solidsph_cases.drawing.profiles import KEY, by_cover
+from solidsph_cases.drawing.sheet import Mark, Panel, Sheet, theory
 
 GRADIENTS = ("standard", "corrected")
 
@@ -46,9 +47,9 @@ class FallingEdge(Case):
     particles, relative to the same of the true slope.
     """
 
-    title: ClassVar[str] = "A falling edge, from a gentle slope to a jump"
-    source: ClassVar[str] = "Ismail & Reddy, section 3.1, Figs. 6 to 9"
-    figures: ClassVar[tuple[str, ...]] = ("fig-6", "fig-7", "fig-8", "fig-9")
+    title = "A falling edge, from a gentle slope to a jump"
+    source = "Ismail & Reddy, section 3.1, Figs. 6 to 9"
+    figures = ("fig-6", "fig-7", "fig-8", "fig-9")
 
     kernel: str = "modified-mollifier"
     covers: Sequence[float] = (1.5, 2.5, 3.5, 4.5, 5.5)  # [spacings]
@@ -88,15 +89,40 @@ class FallingEdge(Case):
             for measurement in self._figure(figure, width, says, lines)
         ]
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._edge_picture import draw_edges
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """Figs. 6 and 7, Figs. 8 and 9."""
+        return {
+            "fig-6-7-gentle-edges": self._sheet(_FIGURES[:2], self.widths[:2]),
+            "fig-8-9-steep-edges": self._sheet(_FIGURES[2:], self.widths[2:]),
+        }
 
-        lines = {gradient: self.lines(gradient) for gradient in GRADIENTS}
-        paths = [folder / "fig-6-7-gentle-edges.png", folder / "fig-8-9-steep-edges.png"]
-        figures = list(zip(_FIGURES, self.widths, strict=True))
-        for path, pair in zip(paths, (figures[:2], figures[2:]), strict=True):
-            draw_edges(lines, dict(pair), self.kernel, path)
-        return paths
+    def _sheet(self, figures: Sequence[str], widths: Sequence[int]) -> Sheet:
+        """A column a figure: the field, its plain and its corrected slope."""
+        plain, corrected = (self.lines(gradient) for gradient in GRADIENTS)
+        columns: list[Sequence[Panel]] = []
+        for figure, width in zip(figures, widths, strict=True):
+            kinds = (
+                (plain, edge, lambda line, f: line.smoothing @ f, "f \\rangle$ [1]"),
+                (plain, _slope, _spaced_gradient, "f' \\rangle$, plain gradient [1/ps]"),
+                (corrected, _slope, _spaced_gradient, "f' \\rangle$, corrected gradient [1/ps]"),
+            )
+            columns.append(
+                [
+                    _panel(
+                        *(lines, width, exact, approximation),
+                        title=f"{figure}: edge over {width} spacing{'s' if width > 1 else ''}"
+                        if exact is edge
+                        else "",
+                        x="distance from the middle [ps]",
+                        y="" if columns else f"$\\langle {label}",
+                        same_x=figure,
+                    )
+                    for lines, exact, approximation, label in kinds
+                ]
+            )
+        rows = list(zip(*columns, strict=True))
+        title = f"Falling edges ({self.kernel}); Ismail & Reddy, {' and '.join(figures)}"
+        return Sheet(rows, (12.0, 10.0), title, key=columns[0][-1], key_style=KEY)
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         lines = {gradient: self.lines(gradient) for gradient in GRADIENTS}
@@ -233,8 +259,36 @@ def _table(lines: Mapping[str, Mapping[float, Line]], width: int) -> Curves:
     }
     for cover, line in lines["standard"].items():
         table[f"f cover {cover:g} [1]"] = (line.smoothing @ edge(line, width))[line.real]
-    for gradient, by_cover in lines.items():
-        for cover, line in by_cover.items():
+    for gradient, covers in lines.items():
+        for cover, line in covers.items():
             slope = (line.gradient @ edge(line, width))[line.real]
             table[f"f' {gradient} cover {cover:g} [1/m]"] = slope
     return table
+
+
+def _slope(line: Line, width: int) -> Array:
+    return line.spacing * true_slope(line, width)
+
+
+def _spaced_gradient(line: Line, f: Array) -> Array:
+    return np.asarray(line.spacing * (line.gradient @ f))
+
+
+def _panel(
+    lines: Mapping[float, Line],
+    width: int,
+    exact: Callable[[Line, int], Array],
+    approximation: Callable[[Line, Array], Array],
+    **options: Any,
+) -> Panel:
+    """Near the edge: exact values at the particles, and the approximations of every cover."""
+    curves = {}
+    marks: list[Mark] = []
+    for cover, line in lines.items():
+        places = (line.X - 0.5 * LENGTH) / line.spacing
+        # As far as the largest support reaches beyond the kinks.
+        near = (np.abs(places) <= 0.5 * width + max(lines) + 1.0) & line.real
+        curves[cover] = places[near], approximation(line, edge(line, width))[near]
+        if not marks:
+            marks.append(theory(places[near], exact(line, width)[near]))
+    return Panel(*marks, *by_cover(curves), grid=True, **options)

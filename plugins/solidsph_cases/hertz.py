@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import pi, sqrt
-from pathlib import Path
-from typing import Any, ClassVar, final
+from functools import partial
+from math import nan, pi, sqrt
+from typing import final
 
 import attrs
 import numpy as np
 
 from solidsph.maths.arrays import Array
-from solidsph.registry.parameters import check_positive, number
+from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
-from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Curves, Measurement
 from solidsph_builtin.materials.linear_elastic import LinearElastic
 from solidsph_cases._compare import compared
-from solidsph_cases._scheme import check_count, with_scheme
+from solidsph_cases._scheme import (
+    ON_BOUNDARY,
+    box,
+    check_all_positive,
+    check_count,
+    solid,
+    with_scheme,
+)
+from solidsph_cases.drawing.fields import scatter
+from solidsph_cases.drawing.sheet import Bar, Panel, Sheet, level, line
 
 RADIUS = 1.0  # R, of the foot [m]
 MATERIAL = LinearElastic(youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
@@ -26,8 +34,9 @@ MATERIAL = LinearElastic(youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
 # The half width of the block and its height, in half-widths of the contact: stresses at the far
 # sides are then below a fiftieth of the peak.
 _BLOCK = 8.0
-# Half-width of the contact that is aimed at, over R: where Hertz's parabola and small strains hold.
-_SLENDER = 0.1
+# Half-width of the contact that is aimed at [m], a tenth of R: where Hertz's parabola and small
+# strains hold.
+_HALF_WIDTH = 0.1 * RADIUS
 # Motion of the top that brings it about, over that half-width.
 _APPROACH = 0.15
 
@@ -47,70 +56,48 @@ class Hertz(Case):
     finite, which changes the pressures by less than a hundredth. One half is simulated.
     """
 
-    title: ClassVar[str] = "A round foot on a rigid plane"
-    source: ClassVar[str] = _SOURCE
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {"in_contact": (4, 6, 8, 12)}
+    title = "A round foot on a rigid plane"
+    source = _SOURCE
+    sweep = {"in_contact": (4, 6, 8, 12)}
 
     in_contact: int = 8  # particles from the middle of the contact to its edge
     strength: float = number(default=10.0)  # of the wall [-]
     kernel: str = "cubic-spline"
     cover: float = number(default=2.2)  # [spacings]
     gradient: str = "consistent"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
 
     def __attrs_post_init__(self) -> None:
         check_count("hertz", "in_contact", self.in_contact, 3)
-        check_positive("hertz", "strength", self.strength, "1 / spacings that the wall yields")
-
-    @property
-    def half_width(self) -> float:
-        """That is aimed at [m]."""
-        return _SLENDER * RADIUS
+        check_all_positive("hertz", self, strength="1 / spacings that the wall yields")
 
     @property
     def spacing(self) -> float:
         """[m]"""
-        return self.half_width / self.in_contact
-
-    @property
-    def contact_modulus(self) -> float:
-        """E* = E / (1 - nu^2) [Pa]"""
-        return MATERIAL.youngs_modulus / (1.0 - MATERIAL.poissons_ratio**2)
+        return _HALF_WIDTH / self.in_contact
 
     def scenes(self) -> Mapping[str, Scene]:
-        side = _BLOCK * self.half_width
-        box = {"type": "box", "lengths": [side, side]}
-        profile = f"Y + X**2/{2.0 * RADIUS!r}*(1 - Y/{side!r})"
+        side = _BLOCK * _HALF_WIDTH
+        rows = {
+            "type": "mapped",
+            "of": ON_BOUNDARY,
+            "before": box(side, side),
+            "to": {"y": f"Y + X**2/{2.0 * RADIUS!r}*(1 - Y/{side!r})"},
+        }
+        tags = {
+            "middle": f"X < {0.1 * self.spacing!r}",
+            "upper": f"Y > {side - 0.1 * self.spacing!r}",
+        }
+        shape = {"type": "polygon", "vertices": _outline(side, self.spacing)}
+        options = {"discretisation": rows, "tags": tags}
         builder = (
-            Simulation.builder()
-            .title(self.title)
-            .body(
-                "foot",
-                shape={"type": "polygon", "vertices": _outline(side, self.spacing)},
-                spacing=self.spacing,
-                discretisation={
-                    "type": "mapped",
-                    "of": {"type": "lattice", "on_boundary": True},
-                    "before": box,
-                    "to": {"y": profile},
-                },
-                tags={
-                    "middle": f"X < {0.1 * self.spacing!r}",
-                    "upper": f"Y > {side - 0.1 * self.spacing!r}",
-                },
-            )
-            .material(
-                "linear-elastic",
-                youngs_modulus=MATERIAL.youngs_modulus,
-                poissons_ratio=MATERIAL.poissons_ratio,
-                density=MATERIAL.density,
-            )
+            solid(self.title, "foot", shape, self.spacing, MATERIAL, **options)
             .boundary("clamp", where="middle", axes=["x"])
             .boundary(
                 "prescribed-motion",
                 where="upper",
-                displacement={"y": f"-{_APPROACH * self.half_width!r}*t"},
+                displacement={"y": f"-{_APPROACH * _HALF_WIDTH!r}*t"},
             )
             .effect(
                 "rigid-wall",
@@ -129,22 +116,13 @@ class Hertz(Case):
         record = records["foot"]
         width, peak = self.expected(record)
         found_width, found_peak = self.fitted(record)
+        compare = partial(compared, record, source=_SOURCE, tolerance=_TOLERANCE)
+        depth = -float(record.history["plane least gap [m]"][-1]) / self.spacing
         return [
-            compared(
-                record, "half-width of the contact", found_width, "m", width, _SOURCE, _TOLERANCE
-            ),
-            compared(record, "peak pressure", found_peak, "Pa", peak, _SOURCE, _TOLERANCE),
-            Measurement(
-                quantity="load",
-                value=self.load(record),
-                unit="N/m",
-                verdict="from which the two are found",
-            ),
-            Measurement(
-                quantity="largest penetration of the plane",
-                value=-float(record.history["plane least gap [m]"][-1]) / self.spacing,
-                unit="spacings",
-            ),
+            compare("half-width of the contact", found_width, "m", width),
+            compare("peak pressure", found_peak, "Pa", peak),
+            Measurement("load", self.load(record), "N/m", verdict="from which the two are found"),
+            Measurement("largest penetration of the plane", depth, "spacings"),
         ]
 
     def load(self, record: Record) -> float:
@@ -154,7 +132,8 @@ class Hertz(Case):
     def expected(self, record: Record) -> tuple[float, float]:
         """Hertz's half-width [m] and peak pressure [Pa] under that load."""
         load = self.load(record)
-        width = sqrt(4.0 * load * RADIUS / (pi * self.contact_modulus))
+        modulus = MATERIAL.youngs_modulus / (1.0 - MATERIAL.poissons_ratio**2)  # E*
+        width = sqrt(4.0 * load * RADIUS / (pi * modulus))
         return width, 2.0 * load / (pi * width)
 
     def pressures(self, record: Record) -> tuple[Array, Array]:
@@ -171,16 +150,38 @@ class Hertz(Case):
         """Half-width [m] and peak pressure [Pa] of the half ellipse that fits best."""
         x, p = self.pressures(record)
         if len(x) < 3:
-            return float("nan"), float("nan")
+            return nan, nan
         slope, peak = np.polyfit(x**2, p**2, 1)
         return float(np.sqrt(-peak / slope)), float(np.sqrt(peak))
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._contact_pictures import draw_foot
-
-        path = folder / "hertz.png"
-        draw_foot(records["foot"], self, path)
-        return [path]
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """The pressures beside Hertz's, and the stress above them."""
+        record = records["foot"]
+        x, p = self.pressures(record)
+        width, peak = self.expected(record)
+        along = np.linspace(0.0, width, 200)
+        hertz = 1e-3 * peak * np.sqrt(1.0 - (along / width) ** 2)
+        pressures = Panel(
+            line(x, 1e-3 * p, "ko", markersize=4.0, label="simulated"),
+            line(along, hertz, "-", color="tab:orange", label="Hertz"),
+            x="x [m]",
+            y="pressure [kPa]",
+            ylim=(0.0, None),
+            legend={},
+        )
+        places = record.positions[-1]
+        near = np.all(places < 3.0 * width, axis=1)
+        stress = record.field("cauchy_stress")[-1][near, 1, 1] / peak
+        field = Panel(
+            scatter(places[near], stress, "viridis", s=10),
+            level(0.0, linewidth=1.0),
+            x="x [m]",
+            y="y [m]",
+            aspect="equal",
+        )
+        title = f"{self.title}: {record.particles.count} particles"
+        bars = [Bar("vertical stress [peak pressure]", [field])]
+        return {"hertz": Sheet([[pressures, field]], (11.0, 4.4), title, bars=bars)}
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         x, p = self.pressures(records["foot"])

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, final
 
 import attrs
 import numpy as np
@@ -18,6 +17,8 @@ from solidsph.studies.case import Case, Curves, Measurement
 from solidsph_cases import _error_law as law
 from solidsph_cases._compare import ROUNDING, closed_form
 from solidsph_cases._line import (
+    LENGTH,
+    F,
     Line,
     bare_line,
     check_covers,
@@ -28,9 +29,8 @@ from solidsph_cases._line import (
 from solidsph_cases._moments import Moments, of_lattice
 from solidsph_cases._scheme import check_count
 from solidsph_cases._slopes import SlopeOfQuartic
-
-# Ismail & Reddy, section 3, after Zhang & Batra (2004).
-F = Polynomial([-0.5, 1.0]) ** 4
+from solidsph_cases.drawing.profiles import KEY, by_cover
+from solidsph_cases.drawing.sheet import Panel, Sheet, note, theory
 
 ORDERS = {0: "f", 1: "f'", 2: "f''"}
 
@@ -51,9 +51,9 @@ class Interpolation(Case):
     the moments of the kernel; the error law, eq. 13, follows from them and is measured.
     """
 
-    title: ClassVar[str] = "Interpolation of a quartic and its derivatives"
-    source: ClassVar[str] = "Ismail & Reddy, section 3, Figs. 3 to 5, eq. 13"
-    figures: ClassVar[tuple[str, ...]] = ("fig-3", "fig-4", "fig-5", "eq-13")
+    title = "Interpolation of a quartic and its derivatives"
+    source = "Ismail & Reddy, section 3, Figs. 3 to 5, eq. 13"
+    figures = ("fig-3", "fig-4", "fig-5", "eq-13")
 
     kernel: str = "modified-mollifier"
     covers: Sequence[float] = (1.5, 2.5, 3.5, 4.5, 5.5)  # [spacings]
@@ -97,23 +97,51 @@ class Interpolation(Case):
             *law.discretisation_errors(self.kernel),
         ]
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._interpolation_picture import draw_complete, draw_ends
-        from solidsph_cases._law_picture import draw_law
-
-        paths = [folder / "fig-3-no-extra-particles.png", folder / "fig-4-5-fine-and-coarse.png"]
-        draw_ends(self.bare(), self.kernel, paths[0])
-        draw_complete([self.complete(n) for n in (self.fine, self.coarse)], self.kernel, paths[1])
-        draw_law(self.kernel, F, folder / "eq-13-error-law.png")
-        return [*paths, folder / "eq-13-error-law.png"]
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """Figs. 3 to 5, and the error law."""
+        bare = self.bare()
+        reach = 2.5 * max(line.kernel.support_radius for line in bare.values())
+        # The gradients leave the picture at the ends, where f itself counts as a step.
+        limits: Sequence[tuple[float | None, float | None]] = (
+            *((None, None), (-1.5, 1.5), (-12.0, 12.0)),
+        )
+        whole = [_panel(bare, order, ylim=limits[order]) for order in ORDERS]
+        near = [
+            _panel(bare, order, "" if order else "the left end", reach=reach, x="x [m]")
+            for order in ORDERS
+        ]
+        fine, coarse = (
+            [
+                _panel(
+                    self.complete(cells),
+                    order,
+                    "" if order else f"spacing {LENGTH / cells:g} m",
+                    x="x [m]",
+                    same_x=f"{order}",
+                )
+                for order in ORDERS
+            ]
+            for cells in (self.fine, self.coarse)
+        )
+        spacing = f"spacing {LENGTH / self.fine:g} m ({self.kernel}); Ismail & Reddy, Fig. 3"
+        ends = f"$(x - 1/2)^4$ without extra particles, {spacing}"
+        ghosts = f"with ghosts beyond the ends ({self.kernel}); Ismail & Reddy, Figs. 4 and 5"
+        figure_3 = Sheet([whole, near], (13.0, 8.0), ends, key=near[0], key_style=KEY)
+        figures_4_5 = Sheet(
+            [fine, coarse], (13.0, 8.0), f"$(x - 1/2)^4$ {ghosts}", key=coarse[0], key_style=KEY
+        )
+        return {
+            "fig-3-no-extra-particles": figure_3,
+            "fig-4-5-fine-and-coarse": figures_4_5,
+            "eq-13-error-law": law.pictures(self.kernel, F),
+        }
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         return {
             "fig-3-no-extra-particles": _table(self.bare()),
             "fig-4-fine": _table(self.complete(self.fine)),
             "fig-5-coarse": _table(self.complete(self.coarse)),
-            "eq-13-smoothing": _smoothing_table(self.kernel),
-            "eq-13-discretisation": _discretisation_table(self.kernel),
+            **law.tables(self.kernel, F),
         }
 
     def bare(self) -> Mapping[float, Line]:
@@ -265,16 +293,20 @@ def _table(lines: Mapping[float, Line]) -> Curves:
     return table
 
 
-def _smoothing_table(kernel: str) -> Curves:
-    h, errors = law.smoothing_data(kernel, F)
-    named = {f"error of {name} [m^{4 - order}]": errors[:, order] for order, name in ORDERS.items()}
-    return {"h [m]": h, **named}
-
-
-def _discretisation_table(kernel: str) -> Curves:
-    table = {}
-    for label, (ratio, error) in law.discretisation_data(kernel).items():
-        table[f"dx/h {label} [1]"] = ratio
-        table[f"error of <1> {label} [1]"] = error
-    # A comma ends a column of the file.
-    return {name.replace(",", ""): values for name, values in table.items()}
+def _panel(
+    lines: Mapping[float, Line], order: int, words: str = "", reach: float = LENGTH, **options: Any
+) -> Panel:
+    """f or a derivative from 0 to `reach` [m], exact and by every cover."""
+    x = np.linspace(0.0, min(reach, LENGTH), 400)
+    curves = {}
+    for cover, line in lines.items():
+        shown = line.real & (reach >= line.X)
+        curves[cover] = line.X[shown], approximated(line, order)[shown]
+    return Panel(
+        theory(x, F.deriv(order)(x)),
+        *by_cover(curves),
+        note(words),
+        y=f"$\\langle {ORDERS[order]} \\rangle$ [m$^{4 - order}$]",
+        grid=True,
+        **options,
+    )

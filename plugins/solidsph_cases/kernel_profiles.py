@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import pi, sqrt
-from pathlib import Path
-from typing import ClassVar, final
+from typing import final
 
 import attrs
 import numpy as np
@@ -18,6 +17,8 @@ from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Curves, Measurement
 from solidsph_cases._moments import of_continuum
+from solidsph_cases.drawing.profiles import STYLES
+from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark, theory
 
 PAPERS = "modified-mollifier"
 
@@ -41,9 +42,9 @@ class KernelProfiles(Case):
     near its middle, and narrower beyond, since it ends at H.
     """
 
-    title: ClassVar[str] = "Profiles of the kernels beside the Gaussian"
-    source: ClassVar[str] = "Ismail & Reddy, section 2.1, Fig. 1, eq. 6"
-    figures: ClassVar[tuple[str, ...]] = ("fig-1",)
+    title = "Profiles of the kernels beside the Gaussian"
+    source = "Ismail & Reddy, section 2.1, Fig. 1, eq. 6"
+    figures = ("fig-1",)
 
     def scenes(self) -> Mapping[str, Scene]:
         return {}
@@ -51,12 +52,41 @@ class KernelProfiles(Case):
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         return [*self._papers(), *self._masses()]
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._profile_picture import draw_profiles
-
-        path = folder / "fig-1-kernel-profiles.png"
-        draw_profiles(kernels(), path)
-        return [path]
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """All profiles, and the logarithms of the paper's and the Gaussian over q^2."""
+        found = kernels()
+        r, q = np.linspace(-1.0, 1.0, 801), np.linspace(0.0, 0.95, 400)
+        others = [name for name in found if name != PAPERS]
+        left = Panel(
+            theory(r, gaussian(r), "Gaussian, smoothing length H/3"),
+            line(r, found[PAPERS].value(np.abs(r)), linewidth=1.8, label=PAPERS),
+            *(
+                mark(
+                    *("plot", r, found[name].value(np.abs(r))),
+                    color="0.25",
+                    linestyle=STYLES[1 + k % (len(STYLES) - 1)],
+                    linewidth=1.2,
+                    label=name,
+                )
+                for k, name in enumerate(others)
+            ),
+            x="r / H [1]",
+            y="H W [1], of unit mass",
+            legend={"loc": "upper right", "fontsize": 8},
+            grid=True,
+        )
+        kernel = found[PAPERS].kernel
+        right = Panel(
+            theory(q**2, -1.0 - 9.0 * q**2, "$-1 - 9 q^2$"),
+            line(q**2, np.log(kernel.profile(q, kernel.params)), linewidth=1.8, label="ln w"),
+            x="$q^2$, with q = r / H [1]",
+            y=f"logarithm of the {PAPERS} [1]",
+            legend={"loc": "lower left"},
+            grid=True,
+        )
+        title = "Kernels of unit mass and support H, in 1D; Ismail & Reddy, Fig. 1"
+        sheet = Sheet([[left, right]], (12.0, 5.0), title, widths=(1.4, 1.0))
+        return {"fig-1-kernel-profiles": sheet}
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         r = np.linspace(-1.0, 1.0, 401)
@@ -72,61 +102,48 @@ class KernelProfiles(Case):
         q = np.linspace(0.0, _NEAR, 51)
         logarithm = np.log(kernel.kernel.profile(q, kernel.kernel.params))
         curvature, start = np.polyfit(q**2, logarithm, 3)[-2:]
+        source = "Taylor's series of eq. 6: ln w = -1 - 9 q^2 - ..."
         for quantity, value, reference in (
-            (f"{PAPERS}: ln w at q = 0", start, -1.0),
-            (f"{PAPERS}: d ln w / d q^2 at q = 0", curvature, -1.0 / SMOOTHING_LENGTH**2),
+            ("ln w at q = 0", float(start), -1.0),
+            ("d ln w / d q^2 at q = 0", float(curvature), -1.0 / SMOOTHING_LENGTH**2),
         ):
-            error = abs(float(value) / reference - 1.0)
+            error = abs(value / reference - 1.0)
+            passed = error <= 1e-7  # the fit leaves out q^8, 1e-8 of q^2 at its end
+            name, verdict = f"{PAPERS}: {quantity}", ""
             yield Measurement(
-                quantity=quantity,
-                value=float(value),
-                unit="1",
-                reference=reference,
-                source="Taylor's series of eq. 6: ln w = -1 - 9 q^2 - ...",
-                error=error,
-                # The fit leaves out q^8, 1e-8 of q^2 at its end.
-                passed=error <= 1e-7,
-                paper=resembles,
+                name, value, "1", reference, source, error, verdict, passed, resembles
             )
         r = np.linspace(0.0, 1.0, 2001)
         apart = np.abs(kernel.value(r) - gaussian(r)).max() / float(gaussian(np.zeros(1))[0])
         yield Measurement(
-            quantity=f"{PAPERS}: largest distance from a Gaussian of equal mass, over its peak",
-            value=float(apart),
-            unit="1",
+            f"{PAPERS}: largest distance from a Gaussian of equal mass, over its peak",
+            float(apart),
+            "1",
             source="smoothing length H / 3",
             paper=resembles,
         )
         yield Measurement(
-            quantity=f"{PAPERS}: second moment over the Gaussian's",
-            value=of_continuum(kernel).value[2] / (0.5 * SMOOTHING_LENGTH**2),
-            unit="1",
+            f"{PAPERS}: second moment over the Gaussian's",
+            of_continuum(kernel).value[2] / (0.5 * SMOOTHING_LENGTH**2),
+            "1",
             source="smoothing length H / 3: H^2 / 18",
             paper=resembles,
         )
 
     def _masses(self) -> Iterator[Measurement]:
-        """The mass of every kernel, and how far it smooths."""
+        """The mass of every kernel, and its second moment."""
         for name, kernel in kernels().items():
-            moments = of_continuum(kernel)
+            mass, _, second, *_ = of_continuum(kernel).value
             expected = 1.0 - kernel.kernel.lost_mass(1)
-            error = abs(moments.value[0] / expected - 1.0)
+            error = abs(mass / expected - 1.0)
+            source = "eq. 2, less what a cut loses"
+            paper = "normalised numerically" if name == PAPERS else ""
+            passed = error <= _QUADRATURE
             yield Measurement(
-                quantity=f"{name}: mass",
-                value=moments.value[0],
-                unit="1",
-                reference=expected,
-                source="eq. 2, less what a cut loses",
-                error=error,
-                passed=error <= _QUADRATURE,
-                paper="normalised numerically" if name == PAPERS else "",
+                f"{name}: mass", mass, "1", expected, source, error, "", passed, paper
             )
-            yield Measurement(
-                quantity=f"{name}: second moment over H^2, which smooths",
-                value=moments.value[2],
-                unit="1",
-                source="adaptive quadrature",
-            )
+            quantity = f"{name}: second moment over H^2, which smooths"
+            yield Measurement(quantity, second, "1", source="adaptive quadrature")
 
 
 def kernels() -> Mapping[str, SmoothingKernel]:
@@ -134,16 +151,13 @@ def kernels() -> Mapping[str, SmoothingKernel]:
     return {
         name: smoothing_kernel(construct("kernels", name), 1, 1.0)
         for name in registry.names("kernels")
-        if all(field.default is not attrs.NOTHING for field in _fields(name))
+        if all(
+            field.default is not attrs.NOTHING
+            for field in attrs.fields(registry.load("kernels", name))
+        )
     }
-
-
-def _fields(name: str) -> Sequence[attrs.Attribute[object]]:
-    kernel = registry.load("kernels", name)
-    return tuple(attrs.fields(kernel))
 
 
 def gaussian(r: Array) -> Array:
     """The whole Gaussian of unit mass and smoothing length 1/3, (n,) [1/m]."""
-    result: Array = np.exp(-((r / SMOOTHING_LENGTH) ** 2)) / (SMOOTHING_LENGTH * sqrt(pi))
-    return result
+    return np.asarray(np.exp(-((r / SMOOTHING_LENGTH) ** 2)) / (SMOOTHING_LENGTH * sqrt(pi)))

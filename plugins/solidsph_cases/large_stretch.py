@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import inf
-from pathlib import Path
-from typing import Any, ClassVar, final
+from math import inf, nan
+from typing import final
 
 import attrs
 import numpy as np
@@ -17,13 +16,21 @@ from solidsph.registry.parameters import check_positive, number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_builder import SceneBuilder
-from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Curves, Measurement, Trial
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 from solidsph_cases import _stretch_theory as theory
-from solidsph_cases._compare import FINISHED, compared
-from solidsph_cases._scheme import check_count, with_scheme
+from solidsph_cases._compare import compared, finished
+from solidsph_cases._scheme import (
+    ON_BOUNDARY,
+    box,
+    check_all_positive,
+    check_count,
+    solid,
+    with_scheme,
+)
 from solidsph_cases._stretch_history import History, StressCurve
+from solidsph_cases._stretch_pictures import stress_over_stretch
+from solidsph_cases.drawing.sheet import Sheet
 
 BAR, MOVING, PLAIN = "bar", "bar-in-motion", "bar-plain-sums"
 
@@ -61,17 +68,15 @@ class LargeStretch(Case):
     proportion to the stress that the pull has added.
     """
 
-    title: ClassVar[str] = "A bar and strips pulled to six times their length"
-    source: ClassVar[str] = "Ismail & Reddy, section 5.3, Fig. 15"
-    figures: ClassVar[tuple[str, ...]] = ("fig-15",)
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+    title = "A bar and strips pulled to six times their length"
+    source = "Ismail & Reddy, section 5.3, Fig. 15"
+    figures = ("fig-15",)
+    sweep = {
         "particles": (16, 31, 61),
         "gradient": ("consistent", "quadratic"),
         "cover": (2.2, 2.5, 3.5),
     }
-    trials: ClassVar[Mapping[str, Trial]] = {
-        "to six times the length": Trial({"across": ()}, {"particles": 16}),
-    }
+    trials = {"to six times the length": Trial({"across": ()}, {"particles": 16})}
 
     stretch: float = number(default=6.0)  # at the end [-]
     across: Sequence[float] = (0.75, 1.25, 1.5)  # stretches held across the pull of strips [-]
@@ -93,12 +98,13 @@ class LargeStretch(Case):
     def __attrs_post_init__(self) -> None:
         check_count("large-stretch", "particles", self.particles, 11)
         check_count("large-stretch", "width", self.width, 3)
-        for name, unit in (
-            ("transits", "wave transits"),
-            ("length", "m"),
-            ("tolerance", "parts of one"),
-        ):
-            check_positive("case 'large-stretch'", name, getattr(self, name), unit)
+        check_all_positive(
+            "case 'large-stretch'",
+            self,
+            transits="wave transits",
+            length="m",
+            tolerance="parts of one",
+        )
         check_positive("case 'large-stretch'", "stretch - 1", self.stretch - 1.0, "parts of one")
         for held in self.across:
             check_positive("case 'large-stretch'", "a stretch across", held, "parts of one")
@@ -142,20 +148,22 @@ class LargeStretch(Case):
         smallest = min(
             float(np.min(record.field("volume_ratio")[:])) for record in records.values()
         )
-        whole = smallest > 0.0 and all(one.outcome == FINISHED for one in records.values())
+        whole = smallest > 0.0 and finished(*records.values())
+        histories = self._histories(records)
+        loaded = {name: history for name, history in histories.items() if name != MOVING}
         return [
-            *(self._mean(name, record) for name, record in records.items() if name != MOVING),
-            self._exact(records[MOVING]),
+            *(self._mean(name, history, records[name]) for name, history in loaded.items()),
+            self._exact(histories[MOVING]),
             self._first_wave(records[BAR]),
             *(
-                self._swing(name, record)
-                for name, record in records.items()
-                if name != MOVING and self.stretch > _SETTLED
+                self._swing(name, history)
+                for name, history in loaded.items()
+                if self.stretch > _SETTLED
             ),
             Measurement(
-                quantity="smallest J of any particle in any scene",
-                value=smallest,
-                unit="1",
+                "smallest J of any particle in any scene",
+                smallest,
+                "1",
                 verdict="no particle turned over" if whole else "turned over, or ended early",
                 passed=whole,
                 paper="large stretches achieved without any re-discretisation",
@@ -164,32 +172,24 @@ class LargeStretch(Case):
             self._critical_ratio(),
         ]
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._stretch_picture import draw_stretch
-
-        path = folder / "fig-15-large-stretch.png"
-        draw_stretch(
-            {name: self.history(name, record) for name, record in records.items()},
-            {_label(name): self._curve(held) for name, held in self._held().items()},
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """Fig. 15."""
+        held = self._held()
+        sheet = stress_over_stretch(
+            {name: one for name, one in self._histories(records).items() if name in held},
+            {_label(name): self._curve(across) for name, across in held.items()},
+            {_label(name): self.losses(across) for name, across in held.items()},
             self.stretch,
-            {_label(name): self.losses(held) for name, held in self._held().items()},
-            path,
         )
-        return [path]
+        return {"fig-15-large-stretch": sheet}
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         stretches = np.linspace(1.0, self.stretch, 201)
-        tables: dict[str, Curves] = {
-            "fig-15-curves": {
-                "stretch [1]": stretches,
-                **{
-                    f"{_label(name)} [MPa]": 1e-6 * self._curve(held)(stretches)
-                    for name, held in self._held().items()
-                },
-            }
-        }
-        for name, record in records.items():
-            history = self.history(name, record)
+        static = {"stretch [1]": stretches}
+        for name, held in self._held().items():
+            static[f"{_label(name)} [MPa]"] = 1e-6 * self._curve(held)(stretches)
+        tables = {"fig-15-curves": static}
+        for name, history in self._histories(records).items():
             tables[f"fig-15-{name}"] = {
                 "time [transits]": history.times / self.transit,
                 "stretch [1]": history.stretches,
@@ -204,6 +204,9 @@ class LargeStretch(Case):
         """Stress and stretch over the time of a scene."""
         return History.of(record, self._curve(self._held().get(name)))
 
+    def _histories(self, records: Mapping[str, Record]) -> Mapping[str, History]:
+        return {name: self.history(name, record) for name, record in records.items()}
+
     def losses(self, held: float | None) -> list[float]:
         """Stretches at which ellipticity is lost or regained on the way, by the acoustic tensor.
 
@@ -211,12 +214,9 @@ class LargeStretch(Case):
         follow only those along the pull.
         """
 
-        def path(stretch: float) -> Array:
-            if held is None:
-                return np.array([[stretch]])
-            return np.diag([stretch, held])
-
-        return losses_of_ellipticity(self.material, path, 1.0, self.stretch)
+        return losses_of_ellipticity(
+            self.material, lambda stretch: _pull(stretch, held), 1.0, self.stretch
+        )
 
     def _held(self) -> Mapping[str, float | None]:
         """What is held across the pull, by scene; nothing can move across a bar."""
@@ -226,37 +226,24 @@ class LargeStretch(Case):
         return StressCurve(1.0 if held is None else held, *self.material.lame_parameters)
 
     def _bar(self, ghosts: int = 0) -> SceneBuilder:
-        return self._pulled(
-            {"type": "interval", "length": self.length}, f"{self.title}: bar", ghosts
-        )
+        shape = {"type": "interval", "length": self.length}
+        return self._pulled(shape, f"{self.title}: bar", ghosts)
 
     def _strip(self, held: float) -> SceneBuilder:
         breadth = (self.width - 1) * self.length / (self.particles - 1)
+        shape = box(self.length, breadth, origin=[0.0, -0.5 * breadth])
         across = f"{held - 1.0!r}*Y"
         return (
-            self._pulled(
-                {
-                    "type": "box",
-                    "lengths": [self.length, breadth],
-                    "origin": [0.0, -0.5 * breadth],
-                },
-                f"{self.title}: strip held at {held:g} across",
-            )
+            self._pulled(shape, f"{self.title}: strip held at {held:g} across")
             .boundary("prescribed-motion", where="all", displacement={"y": across})
             .initial(displacement={"x": 0.0, "y": across})
         )
 
     def _pulled(self, shape: Mapping[str, object], title: str, ghosts: int = 0) -> SceneBuilder:
+        lattice = {**ON_BOUNDARY, "ghosts": ghosts}
+        spacing = self.length / (self.particles - 1)
         return (
-            Simulation.builder()
-            .title(title)
-            .body(
-                "sheet",
-                shape=shape,
-                spacing=self.length / (self.particles - 1),
-                discretisation={"type": "lattice", "on_boundary": True, "ghosts": ghosts},
-            )
-            .material(self.material)
+            solid(title, "sheet", shape, spacing, self.material, discretisation=lattice)
             .boundary("prescribed-motion", where="left", displacement={"x": 0.0})
             .boundary("prescribed-motion", where="right", displacement={"x": f"{self.speed!r}*t"})
             .integrator("central-difference", time_step_factor=self.time_step_factor)
@@ -264,46 +251,50 @@ class LargeStretch(Case):
             .outputs(max(20, round(_OUTPUTS_A_TRANSIT * self.transits)))
         )
 
-    def _mean(self, name: str, record: Record) -> Measurement:
-        history = self.history(name, record)
+    def _mean(self, name: str, history: History, record: Record) -> Measurement:
         losses = self.losses(self._held().get(name))
         at, mean = history.averaged(self.length, self.density, losses[0] if losses else inf)
         curve = history.curve(at)
+        source, paper = _CURVES, "a close correlation with the static curves"
+        quantity = f"{name}: mean Cauchy stress"
+        if not len(at):
+            return Measurement(
+                quantity, nan, "MPa", None, source, inf, record.outcome, False, paper
+            )
         errors = np.abs(mean - curve) / (curve - history.curve(np.array([1.0])))
-        worst = int(np.argmax(errors)) if len(errors) else None
+        worst = int(np.argmax(errors))
         # What comes after the loss is not compared, nor asked to come to an end.
-        complete = worst is not None and (bool(losses) or record.outcome == FINISHED)
-        error = float(errors[worst]) if worst is not None else inf
+        complete = bool(losses) or finished(record)
+        error = float(errors[worst])
         within = error <= self.tolerance
-        told = f"{'within' if within else 'NOT within'} {100.0 * self.tolerance:g} %"
-        reached = f" at stretch {at[worst]:.3g}, where it is worst" if worst is not None else ""
+        verdict = f"{'within' if within else 'NOT within'} {100.0 * self.tolerance:g} %"
         return Measurement(
-            quantity=f"{name}: mean Cauchy stress{reached}",
-            value=1e-6 * float(mean[worst]) if worst is not None else float("nan"),
-            unit="MPa",
-            reference=1e-6 * float(curve[worst]) if worst is not None else None,
-            source=_CURVES,
+            f"{quantity} at stretch {at[worst]:.3g}, where it is worst",
+            1e-6 * float(mean[worst]),
+            "MPa",
+            reference=1e-6 * float(curve[worst]),
+            source=source,
             error=error,
-            verdict=told if complete else record.outcome,
+            verdict=verdict if complete else record.outcome,
             passed=complete and within,
-            paper="a close correlation with the static curves",
+            paper=paper,
         )
 
-    def _exact(self, record: Record) -> Measurement:
-        history = self.history(MOVING, record)
+    def _exact(self, history: History) -> Measurement:
         losses = self.losses(None)
         elastic = history.stretches <= (losses[0] if losses else inf)
-        missed = np.abs(history.stresses - history.curve(history.stretches)[:, None])
+        missed = np.abs(history.stresses - history.static[:, None])
         error = float(missed[elastic].max() / history.curve(history.stretches[elastic]).max())
+        on_curve = error <= _EXACT
         return Measurement(
-            quantity=f"{MOVING}: largest error of the stress of any particle",
-            value=error,
-            unit="1",
+            f"{MOVING}: largest error of the stress of any particle",
+            error,
+            "1",
             reference=0.0,
             source="the homogeneous motion is exact",
             error=error,
-            verdict="on the curve" if error <= _EXACT else "off the curve",
-            passed=error <= _EXACT,
+            verdict="on the curve" if on_curve else "off the curve",
+            passed=on_curve,
         )
 
     def _first_wave(self, record: Record) -> Measurement:
@@ -317,44 +308,40 @@ class LargeStretch(Case):
         inside &= depth > 1.5 * self.length / (self.particles - 1)
         found = float(record.field("volume_ratio")[step][inside].mean())
         source = "simple wave: the end's speed is the integral of c(s) ds"
-        return compared(
-            record, f"{BAR}: stretch behind the first wave", found, "1", behind, source, 0.01
-        )
+        quantity = f"{BAR}: stretch behind the first wave"
+        return compared(record, quantity, found, "1", behind, source, 0.01)
 
-    def _swing(self, name: str, record: Record) -> Measurement:
-        history = self.history(name, record)
+    def _swing(self, name: str, history: History) -> Measurement:
         settled = history.stretches >= _SETTLED
         curve = history.curve(history.stretches[settled])[:, None]
         swings = np.abs(history.stresses[settled] / curve - 1.0)
         return Measurement(
-            quantity=f"{name}: largest swing of a particle about the curve beyond stretch "
-            f"{_SETTLED:g}",
-            value=float(swings.max()) if len(swings) else float("nan"),
-            unit="1",
+            f"{name}: largest swing of a particle about the curve beyond stretch {_SETTLED:g}",
+            float(swings.max()) if len(swings) else nan,
+            "1",
             paper="dynamic effects cause the oscillations about the analytical curves",
         )
 
     def _ellipticity(self, name: str, held: float | None) -> Measurement:
+        lam, mu = self.material.lame_parameters
         lost = self.losses(held)
-        expected = theory.losses(held, *self.material.lame_parameters, self.stretch)
+        expected = theory.losses(held, lam, mu, self.stretch)
         agree = len(lost) == len(expected) and np.allclose(lost, expected, rtol=1e-6, atol=0.0)
         if lost:
             return Measurement(
-                quantity=f"{name}: stretch at which the material loses ellipticity",
-                value=lost[0],
-                unit="1",
+                f"{name}: stretch at which the material loses ellipticity",
+                lost[0],
+                "1",
                 reference=expected[0] if expected else None,
                 source=_CLOSED_FORM,
                 error=abs(lost[0] / expected[0] - 1.0) if expected else inf,
                 verdict="beyond it the MATERIAL localises, whatever the method",
                 passed=agree,
             )
-        F = np.array([[self.stretch]]) if held is None else np.diag([self.stretch, held])
-        _, mu = self.material.lame_parameters
         return Measurement(
-            quantity=f"{name}: least stiffness against a wave at the end, in shear moduli",
-            value=least_stiffness(self.material, F).value / mu,
-            unit="1",
+            f"{name}: least stiffness against a wave at the end, in shear moduli",
+            least_stiffness(self.material, _pull(self.stretch, held)).value / mu,
+            "1",
             verdict="elliptic all the way",
             passed=agree,
         )
@@ -366,8 +353,7 @@ class LargeStretch(Case):
             material = attrs.evolve(self.material, poissons_ratio=ratio)
 
             def stiffness(stretch: float) -> float:
-                F = np.array([[stretch]])
-                return least_stiffness(material, F).value / self.youngs_modulus
+                return least_stiffness(material, _pull(stretch, None)).value / self.youngs_modulus
 
             return float(minimize_scalar(stiffness, bounds=(1.0, 20.0)).fun)
 
@@ -376,15 +362,20 @@ class LargeStretch(Case):
         reference = 0.5 * ratio / (ratio + 1.0)
         error = abs(found / reference - 1.0)
         return Measurement(
-            quantity="Poisson's ratio beyond which a bar softens on the way",
-            value=found,
-            unit="1",
+            "Poisson's ratio beyond which a bar softens on the way",
+            found,
+            "1",
             reference=reference,
             source=f"P' = 0 at some stretch: lambda / mu > {ratio:.2f}",
             error=error,
             passed=error < 1e-6,
             paper="a slightly compressible material; no moduli are given",
         )
+
+
+def _pull(stretch: float, held: float | None) -> Array:
+    """F of a stretch along the axis, and of the stretch held across, if any."""
+    return np.array([[stretch]]) if held is None else np.diag([stretch, held])
 
 
 def _strip(held: float) -> str:

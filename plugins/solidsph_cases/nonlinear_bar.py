@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import nan
-from pathlib import Path
-from typing import Any, ClassVar, final
+from typing import final
 
 import attrs
 import numpy as np
@@ -27,9 +26,10 @@ from solidsph_cases._bar import (
     stress_along,
     with_viscosity,
 )
-from solidsph_cases._compare import FINISHED, compared
-from solidsph_cases._finite_waves import FiniteWave, Law, Shock, law_of
+from solidsph_cases._compare import alone, compared, finished
+from solidsph_cases._finite_waves import FiniteWave, Law, law_of
 from solidsph_cases._scheme import check_count
+from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark, note, theory
 
 # The wave is watched until it has come so far: its exact solution knows no right end.
 _END = 0.9  # of the bar
@@ -53,15 +53,15 @@ class NonlinearBar(Case):
     what it is for.
     """
 
-    title: ClassVar[str] = "Waves of finite amplitude in a bar"
-    source: ClassVar[str] = "Rankine-Hugoniot conditions and simple waves of Ismail & Reddy's law"
-    figures: ClassVar[tuple[str, ...]] = ("section-6-viscosity",)
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+    title = "Waves of finite amplitude in a bar"
+    source = "Rankine-Hugoniot conditions and simple waves of Ismail & Reddy's law"
+    figures = ("section-6-viscosity",)
+    sweep = {
         "particles": (51, 101, 201, 401),
         "linear": (0.25, 0.5, 1.0),
         "cover": (1.6, 2.2, 3.0),
     }
-    trials: ClassVar[Mapping[str, Trial]] = {
+    trials = {
         "pushed and pulled suddenly at 0.3 c": Trial(
             {"velocities": (0.3,), "time_step_factor": 0.15}, {"particles": 101}
         ),
@@ -127,20 +127,11 @@ class NonlinearBar(Case):
     def scenes(self) -> Mapping[str, Scene]:
         scenes = {}
         for name, wave in self.waves.items():
+            title = f"{self.title}: {name}"
+            motion = {"x": f"{wave.velocity!r}*t"}
             builder = (
-                bar(
-                    f"{self.title}: {name}",
-                    particles=self.particles,
-                    poissons_ratio=POISSONS_RATIO,
-                    scheme=self,
-                )
-                .boundary(
-                    "prescribed-motion",
-                    where="left",
-                    displacement={"x": f"{wave.velocity!r}*t"},
-                    label="end",
-                )
-                .integrator(self.integrator, time_step_factor=self.time_step_factor)
+                bar(title, particles=self.particles, poissons_ratio=POISSONS_RATIO, scheme=self)
+                .boundary("prescribed-motion", where="left", displacement=motion, label="end")
                 .duration(_END * LENGTH / wave.head)
                 .outputs(_OUTPUTS)
             )
@@ -157,18 +148,82 @@ class NonlinearBar(Case):
             )
         ]
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._nonlinear_picture import draw_profiles, draw_speeds
-
-        profiles, speeds = (
-            folder / f"section-6-viscosity-{name}.png" for name in ("profiles", "speeds")
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """Profiles at the end, pushes above and pulls below, and wave speeds."""
+        waves = sorted(self.waves.items(), key=lambda pair: abs(pair[1].velocity))
+        pushes, pulls = (
+            [
+                self._profile(name, wave, records, first=k == 0)
+                for k, (name, wave) in enumerate(
+                    pair for pair in waves if (pair[1].velocity < 0.0) == pulled
+                )
+            ]
+            for pulled in (False, True)
         )
-        draw_profiles(self.waves, records, self.law, self.title, profiles)
-        measured = {
-            wave.velocity: half_speed(records[name], wave) for name, wave in self.waves.items()
-        }
-        draw_speeds(self.law, self.waves.values(), measured, self.title, speeds)
-        return [profiles, speeds]
+        profiles = Sheet(
+            [pushes, pulls],
+            (4.3 * len(pushes), 7.2),
+            f"{self.title}: {self.particles} particles",
+            key=pushes[0],
+        )
+        speeds = Sheet([[self._speeds(records)]], (7.0, 4.8), self.title)
+        return {"section-6-viscosity-profiles": profiles, "section-6-viscosity-speeds": speeds}
+
+    def _profile(
+        self, name: str, wave: FiniteWave, records: Mapping[str, Record], *, first: bool
+    ) -> Panel:
+        """Stress along the bar at the end of a run."""
+        record, inviscid = records[name], records[f"{name}-inviscid"]
+        X, end = along(record), float(record.times[-1])
+        places = np.linspace(0.0, LENGTH, 3000)
+        modulus = self.law.lam + 2.0 * self.law.mu
+        without = {"color": "tab:blue", "linewidth": 0.7, "label": "SPH without viscosity"}
+        viscous = stress_along(record)[-1] / modulus
+        marks = [
+            theory(places, wave.stresses(places / end) / modulus),
+            line(X, stress_along(inviscid)[-1] / modulus, "-", **without),
+            line(X, viscous, "k.", markersize=3, label="SPH with viscosity"),
+        ]
+        if not finished(inviscid):
+            words = f"without viscosity diverged at {1e6 * inviscid.times[-1]:.1f} us"
+            marks.append(note(words))
+        plateau = wave.stress / modulus
+        speed, kind = abs(wave.velocity) / self.law.small_speed, "push" if wave.is_shock else "pull"
+        return Panel(
+            *marks,
+            title=f"{kind} at {speed:g} c_p: stretch {wave.stretch:.4f}, t = {1e6 * end:.1f} us",
+            x="X [m]",
+            y="T11 / (lambda + 2 mu)" if first else "",
+            same_x="X",
+            ylim=sorted((1.9 * plateau, -0.6 * plateau)),
+        )
+
+    def _speeds(self, records: Mapping[str, Record]) -> Panel:
+        """Speeds in the reference configuration over the velocity of the end."""
+        law, c = self.law, self.law.small_speed
+        largest = 1.1 * max(abs(wave.velocity) for wave in self.waves.values())
+        velocities = np.linspace(0.002 * largest, largest, 40)
+        v = velocities / c
+        shocks = [law.pushed(float(velocity)) for velocity in velocities]
+        fans = [law.pulled(float(velocity)) for velocity in velocities]
+        tails, heads = ([getattr(w, end) / c for w in fans] for end in ("tail", "head"))
+        fan = {"color": "0.88", "label": "fan, from its tail to its head"}
+        linear = {"color": "0.5", "linewidth": 0.8, "linestyle": ":", "label": "linear theory"}
+        measured = [
+            (wave.velocity / c, half_speed(records[name], wave) / c)
+            for name, wave in self.waves.items()
+        ]
+        sph = {"markerfacecolor": "white", "ms": 7, "label": "SPH, level of half the plateau"}
+        return Panel(
+            line(v, [w.head / c for w in shocks], label="shock"),
+            mark("fill_between", -v, tails, heads, **fan),
+            line(-v, [w.half_speed / c for w in fans], "k--", label="half of the fan"),
+            mark("axhline", 1.0, **linear),
+            mark("plot", *np.transpose(measured), "ko", **sph),
+            x="velocity of the end / c_p   (pull < 0 < push)",
+            y="wave speed / c_p",
+            legend={"loc": "upper left", "fontsize": 10},
+        )
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         return {
@@ -184,60 +239,43 @@ class NonlinearBar(Case):
     def _compared(
         self, name: str, wave: FiniteWave, record: Record, inviscid: Record
     ) -> list[Measurement]:
-        source = _SHOCK if isinstance(wave, Shock) else _FAN
-        what = "of the shock" if isinstance(wave, Shock) else "of half the plateau in the fan"
+        source = _SHOCK if wave.is_shock else _FAN
+        of = "of the shock" if wave.is_shock else "of half the plateau in the fan"
+        speed, stress = half_speed(record, wave), plateau(record, wave)
+        over, without = overshoot(record, wave), overshoot(inviscid, wave)
+        error = f"{name}: root mean square error of the profile at the end, relative"
         found = [
             compared(
                 record,
                 f"{name}: stress of the plateau",
-                plateau(record, wave),
-                "Pa",
-                wave.stress,
-                source,
-                self.plateau_tolerance,
+                *(stress, "Pa", wave.stress, source, self.plateau_tolerance),
             ),
             compared(
                 record,
-                f"{name}: speed {what}",
-                half_speed(record, wave),
-                "m/s",
-                wave.half_speed,
-                source,
-                self.speed_tolerance,
+                f"{name}: speed {of}",
+                *(speed, "m/s", wave.half_speed, source, self.speed_tolerance),
             ),
-            _alone(
-                record,
-                f"{name}: root mean square error of the profile at the end, relative",
-                profile_error(record, wave),
-            ),
+            alone(record, error, profile_error(record, wave)),
         ]
-        if isinstance(wave, Shock):
+        if wave.is_shock:
             found.append(self._power(name, wave, record))
         return [
             *found,
-            _alone(record, f"{name}: overshoot over the plateau", overshoot(record, wave)),
+            alone(record, f"{name}: overshoot over the plateau", over),
             # Without viscosity nothing is promised: whether it even finished is the finding.
             attrs.evolve(
-                _alone(
-                    inviscid,
-                    f"{name}: overshoot over the plateau, without viscosity",
-                    overshoot(inviscid, wave),
-                ),
+                alone(inviscid, f"{name}: overshoot over the plateau, without viscosity", without),
                 verdict=inviscid.outcome.partition(":")[0],
                 passed=True,
             ),
         ]
 
-    def _power(self, name: str, shock: Shock, record: Record) -> Measurement:
-        """What the shock takes, whoever takes it: nothing of it is in the viscosity's formula."""
+    def _power(self, name: str, shock: FiniteWave, record: Record) -> Measurement:
+        """Power that the shock takes; nothing of it is in the viscosity's formula."""
         found = compared(
             record,
             f"{name}: power that viscosity takes",
-            viscous_power(record),
-            "W/m^2",
-            shock.dissipation,
-            _SHOCK,
-            self.plateau_tolerance,
+            *(viscous_power(record), "W/m^2", shock.dissipation, _SHOCK, self.plateau_tolerance),
         )
         # A weak shock steepens slowly against viscosity, which dissipates more until it has: with
         # the kinematic viscosity nu = linear c s / 2 that takes some nu / (U - c)^2.
@@ -245,8 +283,8 @@ class NonlinearBar(Case):
         steepening = 0.5 * self.linear * c * spacing / (shock.head - c) ** 2
         if 4.0 * steepening < _SETTLED * record.times[-1]:
             return found
-        complete = record.outcome == FINISHED
-        return attrs.evolve(found, verdict="not judged: still steepening", passed=complete)
+        verdict = "not judged: still steepening"
+        return attrs.evolve(found, verdict=verdict, passed=finished(record))
 
 
 def exact_profile(record: Record, wave: FiniteWave) -> Array:
@@ -292,10 +330,6 @@ def viscous_power(record: Record) -> float:
         return nan
     work = record.history["work of viscosity [J]"][later]
     return -float(np.polyfit(record.times[later], work, 1)[0])
-
-
-def _alone(record: Record, quantity: str, value: float) -> Measurement:
-    return compared(record, quantity, value, "1", None, "", 0.0)
 
 
 def _name(velocity: float) -> str:

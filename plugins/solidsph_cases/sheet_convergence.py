@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, ClassVar, final
+from typing import final
 
 import attrs
 import numpy as np
 
 from solidsph.errors import SceneError
 from solidsph.maths.arrays import Array
-from solidsph.registry.parameters import check_positive, number
-from solidsph.results.pictures import largest_principal
+from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import PartLike
 from solidsph.studies.case import Case, Curves, Measurement
-from solidsph_cases._compare import FINISHED, compared
-from solidsph_cases._scheme import check_count, with_scheme
+from solidsph_cases._compare import compared, finished
+from solidsph_cases._scheme import check_all_positive, check_count, with_scheme
 from solidsph_cases._sheet import (
     EXTENSION,
     PEAK,
@@ -26,10 +24,18 @@ from solidsph_cases._sheet import (
     check_hole,
     extensions,
     is_known,
+    largest_stresses,
     peak_distance,
     quarter,
     rows_along,
+    sheet,
 )
+from solidsph_cases.drawing.convergence import by_spacing, errors_panel
+from solidsph_cases.drawing.fields import LARGEST_STRESS, quarter_circle, quarter_particles
+from solidsph_cases.drawing.sheet import Panel, Sheet, level, line, mark
+
+ROWS_ALONG, NO_ROWS = "rows along the hole", "no rows"
+ARRANGEMENTS = (ROWS_ALONG, "rows up to the hole", NO_ROWS)
 
 
 @final
@@ -42,12 +48,10 @@ class SheetConvergence(Case):
     Of each the error against a quasi-static solution, which must fall at every refinement.
     """
 
-    title: ClassVar[str] = "A sheet with a hole at rest: convergence"
-    source: ClassVar[str] = (
-        "Ismail & Reddy, section 5.4: a convergence analysis should be completed"
-    )
-    figures: ClassVar[tuple[str, ...]] = ("section-5.4-convergence",)
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+    title = "A sheet with a hole at rest: convergence"
+    source = "Ismail & Reddy, section 5.4: a convergence analysis should be completed"
+    figures = ("section-5.4-convergence",)
+    sweep = {
         "across": ((5, 10), (10, 15), (15, 20), (20, 30)),
         "gradient": ("consistent", "quadratic", "corrected"),
     }
@@ -61,14 +65,13 @@ class SheetConvergence(Case):
     kernel: str = "modified-mollifier"
     cover: float = number(default=3.0)  # [spacings]
     gradient: str = "consistent"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     tolerance: float = number(default=0.01)  # largest error of the displacement that passes [-]
     peak_tolerance: float = number(default=0.1)  # largest error of the stress that passes [-]
 
     def __attrs_post_init__(self) -> None:
-        for name, unit in (("width", "m"), ("traction", "Pa")):
-            check_positive("sheet-convergence", name, getattr(self, name), unit)
+        check_all_positive("sheet-convergence", self, width="m", traction="Pa")
         for count in self.across:
             check_count("sheet-convergence", "each of across", count, 2)
             check_hole("sheet-convergence", self.hole_ratio, self.width, self.width / count)
@@ -84,130 +87,157 @@ class SheetConvergence(Case):
         return self.hole_ratio * self.width
 
     @property
-    def arrangements(self) -> Mapping[str, Sequence[PartLike]]:
-        """Discretisations by the name of the arrangement, one for each of `across`."""
-        W = self.width
-        jittered = {
-            "type": "jittered",
-            "of": "conforming-lattice",
-            "amplitude": self.jitter,
-            "seed": self.seed,
-        }
-        return {
-            "rows along the hole": [rows_along(self.hole_ratio, W, W / n) for n in self.across],
-            "rows up to the hole": ["conforming-lattice" for _ in self.across],
-            "no rows": [jittered for _ in self.across],
-        }
+    def known(self) -> bool:
+        """True if there is a reference."""
+        return is_known(self.hole_ratio, self.traction)
+
+    @property
+    def spacings(self) -> Array:
+        """Over W, one for each of `across`, (k,) [-]."""
+        return 1.0 / np.array(self.across, dtype=np.float64)
 
     def scenes(self) -> Mapping[str, Scene]:
-        found = {}
-        for name, discretisations in self.arrangements.items():
-            for count, discretisation in zip(self.across, discretisations, strict=True):
-                builder = (
-                    quarter(self.hole_ratio, self.width, self.width / count, discretisation)
-                    .title(f"{self.title}: {name}, spacing W/{count}")
-                    .boundary("traction", where="right", traction={"x": self.traction})
-                    .duration(1.0)
-                    .statics()
-                )
-                found[_scene_name(name, count)] = with_scheme(builder, self).scene()
-        return found
+        return {
+            _scene_name(name, count): self._scene(name, count)
+            for name in ARRANGEMENTS
+            for count in self.across
+        }
+
+    def _scene(self, name: str, count: int) -> Scene:
+        spacing = self.width / count
+        discretisation: PartLike = "conforming-lattice"
+        if name == ROWS_ALONG:
+            discretisation = rows_along(quarter, self.hole_ratio, self.width, spacing)
+        if name == NO_ROWS:
+            moved = {"amplitude": self.jitter, "seed": self.seed}
+            discretisation = {"type": "jittered", "of": discretisation, **moved}
+        builder = (
+            sheet(
+                title=f"{self.title}: {name}, spacing W/{count}",
+                square=quarter,
+                hole_ratio=self.hole_ratio,
+                width=self.width,
+                spacing=spacing,
+                discretisation=discretisation,
+            )
+            .boundary("traction", where="right", traction={"x": self.traction})
+            .duration(1.0)
+            .statics()
+        )
+        return with_scheme(builder, self).scene()
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         measured = []
-        known = is_known(self.hole_ratio, self.traction)
-        for name in self.arrangements:
-            for count in self.across:
-                record = records[_scene_name(name, count)]
-                measured.append(
+        for name in ARRANGEMENTS:
+            runs = self._runs(records, name)
+            for count, record in zip(self.across, runs, strict=True):
+                measured += [
                     compared(
                         record,
                         f"{name}, W/{count}: mean u_x of the loaded edge over W",
                         float(extensions(record)[-1]) / self.width,
-                        "1",
-                        EXTENSION if known else None,
-                        SOURCE,
-                        self.tolerance,
-                    )
-                )
-                measured.append(self._peak(record, f"{name}, W/{count}", known))
-            if known:
+                        *("1", EXTENSION if self.known else None, SOURCE, self.tolerance),
+                    ),
+                    self._peak(record, f"{name}, W/{count}"),
+                ]
+            if self.known:
                 measured.append(self._order(records, name))
         return measured
 
     def accuracy(self, measurements: Sequence[Measurement]) -> Measurement:
         """The displacement in rows along the hole, the finest ones."""
-        name, finest = next(iter(self.arrangements)), self.across[-1]
-        return next(m for m in measurements if m.quantity.startswith(f"{name}, W/{finest}: mean"))
+        start = f"{ROWS_ALONG}, W/{self.across[-1]}: mean"
+        return next(m for m in measurements if m.quantity.startswith(start))
 
-    def _peak(self, record: Record, name: str, known: bool) -> Measurement:
+    def _runs(self, records: Mapping[str, Record], name: str) -> list[Record]:
+        return [records[_scene_name(name, count)] for count in self.across]
+
+    def _peak(self, record: Record, name: str) -> Measurement:
         """The largest stress, and whether it is where it must be."""
-        stress = largest_principal(record.field("cauchy_stress")[-1])
-        distance = peak_distance(record, self.radius, known)
+        distance = peak_distance(record, self.radius, self.known)
         found = compared(
             record,
             f"{name}: largest principal Cauchy stress",
-            1e-6 * stress.max(),
+            1e-6 * largest_stresses(record)[-1],
             "MPa",
-            1e-6 * PEAK if known else None,
-            SOURCE,
-            self.peak_tolerance,
+            *(1e-6 * PEAK if self.known else None, SOURCE, self.peak_tolerance),
         )
         words = (found.verdict, f"{distance.value:.1f} spacings from (0, a)")
-        return attrs.evolve(
-            found,
-            verdict=", ".join(word for word in words if word),
-            passed=found.passed and distance.passed,
-        )
+        verdict = ", ".join(word for word in words if word)
+        return attrs.evolve(found, verdict=verdict, passed=found.passed and distance.passed)
 
     def errors(self, records: Mapping[str, Record], name: str) -> Array:
         """Relative errors of the displacement, one for each of `across`, (k,)."""
-        values = [extensions(records[_scene_name(name, n)])[-1] for n in self.across]
-        return np.abs(np.array(values) / self.width / EXTENSION - 1.0)
-
-    def peaks(self, records: Mapping[str, Record], name: str) -> Array:
-        """Largest principal Cauchy stresses, one for each of `across`, (k,) [Pa]."""
-        stresses = [records[_scene_name(name, n)].field("cauchy_stress")[-1] for n in self.across]
-        return np.array([largest_principal(one).max() for one in stresses])
+        values = np.array([extensions(record)[-1] for record in self._runs(records, name)])
+        return np.abs(values / self.width / EXTENSION - 1.0)
 
     def _order(self, records: Mapping[str, Record], name: str) -> Measurement:
         errors = self.errors(records, name)
         falls = bool(np.all(np.diff(errors) < 0.0))
         return Measurement(
-            quantity=f"{name}: order of the displacement's error in the spacing",
-            value=float(-np.polyfit(np.log(self.across), np.log(errors), 1)[0]),
-            unit="1",
+            f"{name}: order of the displacement's error in the spacing",
+            float(-np.polyfit(np.log(self.across), np.log(errors), 1)[0]),
+            "1",
             verdict="falls at every refinement" if falls else "does NOT fall at every refinement",
-            passed=falls
-            and all(records[_scene_name(name, n)].outcome == FINISHED for n in self.across),
+            passed=falls and finished(*self._runs(records, name)),
         )
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._convergence_picture import draw_convergence
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """The arrangements near the hole at the coarsest spacing, the errors, and the stresses."""
+        coarsest = (self._runs(records, name)[0] for name in ARRANGEMENTS)
+        above = [self._arrangement(*pair) for pair in zip(ARRANGEMENTS, coarsest, strict=True)]
+        rows = [[one for one in above for _ in "xx"]]
+        if self.known:
+            errors, peaks = {}, {}
+            for name in ARRANGEMENTS:
+                runs = self._runs(records, name)
+                errors[name] = 100.0 * self.errors(records, name)
+                peaks[name] = np.array([1e-6 * largest_stresses(record)[-1] for record in runs])
+            ticks = [f"1/{count}" for count in self.across]
+            peak = 1e-6 * PEAK
+            style = {"color": "0.4", "linewidth": 3.0, "alpha": 0.4, "zorder": 0}
+            error = errors_panel(
+                self.spacings,
+                errors,
+                (1, 2),
+                ticks,
+                "spacing / W",
+                "error of the edge's mean u_x [%]",
+            )
+            stress = Panel(
+                *by_spacing(self.spacings, peaks, ticks),
+                level(peak, f"reference: {peak:.2f} MPa", **style),
+                x="spacing / W",
+                y=f"{LARGEST_STRESS} [MPa]",
+                ylim=(0.8 * peak, 1.2 * peak),
+            )
+            rows.append([error] * 3 + [stress] * 3)
+        title = f"{self.title}, radius of the hole {self.hole_ratio:g} W"
+        size = (11.0, 8.6 if self.known else 4.2)
+        return {"section-5.4-convergence": Sheet(rows, size, title)}
 
-        path = folder / "section-5.4-convergence.png"
-        names = list(self.arrangements)
-        known = is_known(self.hole_ratio, self.traction)
-        draw_convergence(
-            {name: records[_scene_name(name, self.across[0])] for name in names},
-            {name: self.errors(records, name) for name in names if known},
-            {name: self.peaks(records, name) for name in names},
-            PEAK,
-            1.0 / np.array(self.across, dtype=np.float64),
-            radius=self.radius,
-            width=self.width,
-            title=f"{self.title}, radius of the hole {self.hole_ratio:g} W",
-            path=path,
+    def _arrangement(self, name: str, record: Record) -> Panel:
+        shown = min(1.0, 2.5 * self.hole_ratio)
+        return Panel(
+            *quarter_particles(record, self.width),
+            line(*quarter_circle(self.hole_ratio), linewidth=0.8),
+            mark("set_aspect", "equal"),
+            title=f"{name}: {record.particles.count} particles",
+            x="X / W",
+            y="Y / W" if name == ROWS_ALONG else "",
+            xlim=(-0.04 * shown, shown),
+            ylim=(-0.04 * shown, shown),
         )
-        return [path]
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
-        if not is_known(self.hole_ratio, self.traction):
+        if not self.known:
             return {}
-        table = {"spacing over W [1]": 1.0 / np.array(self.across, dtype=np.float64)}
-        for name in self.arrangements:
+        table = {"spacing over W [1]": self.spacings}
+        for name in ARRANGEMENTS:
+            runs = self._runs(records, name)
             table[f"{name}: error of u_x [1]"] = self.errors(records, name)
-            table[f"{name}: largest principal Cauchy stress [Pa]"] = self.peaks(records, name)
+            peaks = [largest_stresses(record)[-1] for record in runs]
+            table[f"{name}: largest principal Cauchy stress [Pa]"] = np.array(peaks)
         return {"errors": table}
 
 

@@ -3,35 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from math import ceil
-from pathlib import Path
-from typing import Any, ClassVar, final
+from typing import final
 
 import attrs
 import numpy as np
 
 from solidsph.errors import SceneError
 from solidsph.maths.arrays import Array
-from solidsph.registry.parameters import check_positive, number
-from solidsph.results.pictures import largest_principal
+from solidsph.maths.tensors import largest_principal
+from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.studies.case import Case, Curves, Measurement
-from solidsph_cases._compare import FINISHED, compared
-from solidsph_cases._scheme import with_scheme
+from solidsph_cases import _motion_pictures as motion
+from solidsph_cases._compare import compared, finished, vanishing
+from solidsph_cases._scheme import check_all_positive, in_motion, with_scheme
 from solidsph_cases._sheet import (
     EXTENSION,
+    MATERIAL,
     PEAK,
     SOURCE,
     at_hole,
     check_hole,
-    crossing_time,
     extensions,
     is_known,
+    largest_stresses,
     peak_distance,
     quarter,
+    sheet,
 )
+from solidsph_cases.drawing.sheet import Sheet
 
 SUDDEN, RAMPED, REST = "sudden", "ramped", "rest"
 
@@ -48,7 +52,6 @@ _WATCHED = 20.0  # [W / c_p]
 _KIRSCH = "Kirsch (1898): 3 at a small hole under a small load; twice that in one undamped mode"
 _NEWTON = "equilibrium of the same particles by Newton's method"
 _PAPER = "60 MPa"
-_STRESS = "cauchy_stress"
 
 # Of largest stresses at twenty particles to the width.
 _PEAK_TOLERANCE = 0.15
@@ -77,10 +80,10 @@ class SheetInMotion(Case):
     up beside larger holes their stable step is fifty times smaller.
     """
 
-    title: ClassVar[str] = "A sheet with a hole, in motion"
-    source: ClassVar[str] = "Ismail & Reddy, section 5.4, Figs. 16 to 18"
-    figures: ClassVar[tuple[str, ...]] = ("fig-16", "fig-17", "fig-18")
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+    title = "A sheet with a hole, in motion"
+    source = "Ismail & Reddy, section 5.4, Figs. 16 to 18"
+    figures = ("fig-16", "fig-17", "fig-18")
+    sweep = {
         "spacing": (0.2, 0.1, 1.0 / 15.0, 0.05),
         "gradient": ("consistent", "quadratic", "corrected"),
     }
@@ -96,7 +99,7 @@ class SheetInMotion(Case):
     kernel: str = "modified-mollifier"
     cover: float = number(default=3.0)  # [spacings]
     gradient: str = "consistent"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
     time_step_factor: float = number(default=0.3)  # of the CFL step; particles crowd as they move
@@ -104,15 +107,16 @@ class SheetInMotion(Case):
     peak_tolerance: float = number(default=0.1)  # of the stress at rest, as in `sheet-convergence`
 
     def __attrs_post_init__(self) -> None:
-        for name, unit in (
-            ("width", "m"),
-            ("spacing", "m"),
-            ("traction", "Pa"),
-            ("ramp", "crossings"),
-            ("settling", "crossings"),
-            ("damping", "one over a crossing"),
-        ):
-            check_positive("sheet-in-motion", name, getattr(self, name), unit)
+        check_all_positive(
+            "sheet-in-motion",
+            self,
+            width="m",
+            spacing="m",
+            traction="Pa",
+            ramp="crossings",
+            settling="crossings",
+            damping="one over a crossing",
+        )
         check_hole("sheet-in-motion", self.hole_ratio, self.width, self.spacing)
         if not self.duration >= _WATCHED:
             raise SceneError(
@@ -127,186 +131,141 @@ class SheetInMotion(Case):
 
     @property
     def crossing(self) -> float:
-        """W / c_p [s]."""
-        return crossing_time(self.width)
+        """Time in which a small pressure wave crosses the quarter, W / c_p [s]."""
+        return self.width / MATERIAL.wave_speed
+
+    @property
+    def known(self) -> bool:
+        """True if there is a reference."""
+        return is_known(self.hole_ratio, self.traction)
 
     def scenes(self) -> Mapping[str, Scene]:
-        S, crossing = self.traction, self.crossing
-        ramp = f"{S!r}*min(t/{self.ramp * crossing!r}, 1)"
-        slow = self.ramp + self.settling
+        S, slow = self.traction, self.ramp + self.settling
+        ramp = f"{S!r}*min(t/{self.ramp * self.crossing!r}, 1)"
+        rest = with_scheme(self._sheet(), self)
         return {
             SUDDEN: self._moving(S, self.duration, _OUTPUTS).scene(),
             RAMPED: self._moving(ramp, slow, _OUTPUTS_AT_REST)
-            .effect("mass-damping", rate=self.damping / crossing)
+            .effect("mass-damping", rate=self.damping / self.crossing)
             .scene(),
-            REST: self._loaded(S).duration(1.0).statics().scene(),
+            REST: _pulled(rest, S).duration(1.0).statics().scene(),
         }
 
-    def _loaded(self, traction: float | str) -> SceneBuilder:
-        builder = quarter(self.hole_ratio, self.width, self.spacing, "conforming-lattice")
-        return with_scheme(builder.title(self.title), self).boundary(
-            "traction", where="right", traction={"x": traction}
+    def _sheet(self) -> SceneBuilder:
+        return sheet(
+            title=self.title,
+            square=quarter,
+            hole_ratio=self.hole_ratio,
+            width=self.width,
+            spacing=self.spacing,
+            discretisation="conforming-lattice",
         )
 
     def _moving(self, traction: float | str, crossings: float, outputs: int) -> SceneBuilder:
-        return (
-            self._loaded(traction)
-            .integrator(self.integrator, time_step_factor=self.time_step_factor)
-            .duration(crossings * self.crossing)
-            .outputs(ceil(outputs * crossings))
-        )
+        duration, outputs = crossings * self.crossing, ceil(outputs * crossings)
+        return _pulled(in_motion(self._sheet(), self, duration, outputs), traction)
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         return [*self._extension(records), *self._stress(records)]
 
     def _extension(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
-        known = is_known(self.hole_ratio, self.traction)
         sudden, ramped, rest = records[SUDDEN], records[RAMPED], records[REST]
         time, maximum = first_maximum(sudden.times / self.crossing, extensions(sudden))
         still = float(extensions(rest)[-1])
         miss = np.linalg.norm(ramped.positions[-1] - rest.positions[-1], axis=1).max() / still
-        tolerance = self.tolerance
+        reached = float(extensions(ramped)[-1]) / self.width
+        distance = vanishing(
+            ramped,
+            "ramped and damped: largest distance from equilibrium over its u_x",
+            *(float(miss), _AT_REST, _NEWTON),
+            verdict="at rest" if miss <= _AT_REST else "NOT at rest",
+        )
+
+        def compare(
+            record: Record, quantity: str, value: float, unit: str, reference: float
+        ) -> Measurement:
+            known = reference if self.known else None
+            return compared(record, quantity, value, unit, known, SOURCE, self.tolerance)
+
+        quantity = "sudden: first maximum of the loaded edge's mean u_x over W"
+        ratio = "overshoot: first maximum of u_x over that at rest"
+        end = "ramped and damped: mean u_x at the end over W"
         return [
-            compared(
-                sudden,
-                "sudden: first maximum of the loaded edge's mean u_x over W",
-                maximum / self.width,
-                "1",
-                FIRST_MAXIMUM if known else None,
-                SOURCE,
-                tolerance,
-            ),
-            compared(
-                sudden,
-                "sudden: time of it",
-                time,
-                "W/c_p",
-                ITS_TIME if known else None,
-                SOURCE,
-                tolerance,
-            ),
-            compared(
-                ramped,
-                "ramped and damped: mean u_x at the end over W",
-                float(extensions(ramped)[-1]) / self.width,
-                "1",
-                EXTENSION if known else None,
-                SOURCE,
-                tolerance,
-            ),
-            Measurement(
-                quantity="ramped and damped: largest distance from equilibrium over its u_x",
-                value=float(miss),
-                unit="1",
-                reference=0.0,
-                source=_NEWTON,
-                error=float(miss),
-                verdict="at rest" if miss <= _AT_REST else "NOT at rest",
-                passed=bool(miss <= _AT_REST) and _finished(ramped, rest),
-            ),
-            compared(
-                sudden,
-                "overshoot: first maximum of u_x over that at rest",
-                maximum / still,
-                "1",
-                FIRST_MAXIMUM / EXTENSION if known else None,
-                SOURCE,
-                tolerance,
-            ),
+            compare(sudden, quantity, maximum / self.width, "1", FIRST_MAXIMUM),
+            compare(sudden, "sudden: time of it", time, "W/c_p", ITS_TIME),
+            compare(ramped, end, reached, "1", EXTENSION),
+            attrs.evolve(distance, passed=distance.passed and finished(rest)),
+            compare(sudden, ratio, maximum / still, "1", FIRST_MAXIMUM / EXTENSION),
         ]
 
     def _stress(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
-        known = is_known(self.hole_ratio, self.traction)
-        sudden, ramped = records[SUDDEN], records[RAMPED]
+        sudden, ramped, known = records[SUDDEN], records[RAMPED], self.known
         top = at_hole(ramped, self.radius, 90.0)
-        final = float(largest_principal(ramped.field(_STRESS)[-1])[top])
+        final, still = (
+            float(largest_principal(record.field("cauchy_stress")[-1])[top])
+            for record in (ramped, records[REST])
+        )
         watched = sudden.times <= (_WATCHED + 1e-6) * self.crossing
-        largest = float(self.largest_stresses(sudden)[watched].max())
-        still = largest_principal(records[REST].field(_STRESS)[-1])
-        at_rest = compared(
+        largest = float(largest_stresses(sudden)[watched].max())
+        compare = partial(compared, unit="MPa")
+        at_rest = compare(
             ramped,
             "ramped and damped: principal Cauchy stress at (0, a)",
             1e-6 * final,
-            "MPa",
-            1e-6 * PEAK if known else None,
-            SOURCE,
-            self.peak_tolerance,
+            reference=1e-6 * PEAK if known else None,
+            source=SOURCE,
+            tolerance=self.peak_tolerance,
         )
-        quasi_static = compared(
-            ramped,
-            "that over the same at equilibrium",
-            final / float(still[top]),
-            "1",
-            1.0,
-            _NEWTON,
-            self.tolerance,
-        )
-        ever = compared(
+        ever = compare(
             sudden,
             f"sudden: largest principal Cauchy stress in {_WATCHED:g} W/c_p",
             1e-6 * largest,
-            "MPa",
-            1e-6 * LARGEST if known else None,
-            _SPECTRAL,
-            _PEAK_TOLERANCE,
+            reference=1e-6 * LARGEST if known else None,
+            source=_SPECTRAL,
+            tolerance=_PEAK_TOLERANCE,
         )
+        quantity, ratio = "that over the same at equilibrium", final / still
         return [
-            _said(at_rest, final),
-            quasi_static,
+            _beside_paper(at_rest, final),
+            compared(ramped, quantity, ratio, "1", 1.0, _NEWTON, self.tolerance),
             peak_distance(ramped, self.radius, known),
-            _said(ever, largest),
+            _beside_paper(ever, largest),
             _beside_kirsch("at rest", final / self.traction, 3.0, ramped),
             _beside_kirsch("suddenly loaded", largest / self.traction, 6.0, sudden),
         ]
 
-    def largest_stresses(self, record: Record) -> Array:
-        """Largest principal Cauchy stress anywhere at every time, (t,) [Pa]."""
-        return np.array([largest_principal(one).max() for one in record.field(_STRESS)])
-
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases import _motion_picture as picture
-
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """The problem, the sheet at rest and how it comes there, and the waves."""
         sudden, ramped = records[SUDDEN], records[RAMPED]
-        known = is_known(self.hole_ratio, self.traction)
-        where = picture.Quarter(self.radius, self.width, self.crossing, self.traction)
-        paths = [
-            folder / "fig-16-sheet.png",
-            folder / "fig-17-final-stress.png",
-            folder / "fig-18-waves.png",
-        ]
-        picture.draw_problem(sudden, where, paths[0])
-        picture.draw_final(
-            sudden,
-            ramped,
-            where,
-            extension=EXTENSION if known else float(extensions(records[REST])[-1]) / self.width,
-            peak=PEAK if known else None,
-            path=paths[1],
-        )
-        picture.draw_waves(sudden, where, paths[2])
-        return paths
+        rest = float(extensions(records[REST])[-1]) / self.width
+        where = motion.Quarter(self.radius, self.width, self.crossing, self.traction)
+        levels = (EXTENSION, PEAK) if self.known else (rest, None)
+        return {
+            "fig-16-sheet": motion.problem(sudden, where),
+            "fig-17-final-stress": motion.final_stress(sudden, ramped, where, *levels),
+            "fig-18-waves": motion.waves(sudden, where),
+        }
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         tables = {}
         for name in (SUDDEN, RAMPED):
             record = records[name]
             top = at_hole(record, self.radius, 90.0)
+            stresses = record.field("cauchy_stress")[:]
             tables[f"{name}-history"] = {
                 "time [W/c_p]": record.times / self.crossing,
                 "mean u_x of the loaded edge over W [1]": extensions(record) / self.width,
-                "largest principal Cauchy stress [Pa]": self.largest_stresses(record),
-                "principal Cauchy stress at (0, a) [Pa]": np.array(
-                    [largest_principal(one[top : top + 1])[0] for one in record.field(_STRESS)]
-                ),
+                "largest principal Cauchy stress [Pa]": largest_stresses(record),
+                "principal Cauchy stress at (0, a) [Pa]": largest_principal(stresses[:, top]),
             }
         return tables
 
 
-def _finished(*records: Record) -> bool:
-    return all(record.outcome == FINISHED for record in records)
+def _pulled(builder: SceneBuilder, traction: float | str) -> SceneBuilder:
+    return builder.boundary("traction", where="right", traction={"x": traction})
 
 
-def _said(measured: Measurement, stress: float) -> Measurement:
+def _beside_paper(measured: Measurement, stress: float) -> Measurement:
     """The same beside what the paper says."""
     factor = f"the paper's is {60e6 / stress:.1f} times that"
     words = ", ".join(word for word in (measured.verdict, factor) if word)
@@ -314,18 +273,17 @@ def _said(measured: Measurement, stress: float) -> Measurement:
 
 
 def _beside_kirsch(when: str, factor: float, theory: float, record: Record) -> Measurement:
-    """How much more than at a small hole the stress is concentrated; nothing that must agree."""
+    """How much more than at a small hole the stress is concentrated; the two need not agree."""
+    more = "more by the size of the hole and by large strains"
     return Measurement(
-        quantity=f"{when}: largest principal Cauchy stress over the traction",
-        value=factor,
-        unit="1",
+        f"{when}: largest principal Cauchy stress over the traction",
+        factor,
+        "1",
         reference=theory,
         source=_KIRSCH,
         error=abs(factor / theory - 1.0),
-        verdict="more by the size of the hole and by large strains"
-        if factor > theory
-        else "less than at a small hole",
-        passed=_finished(record),
+        verdict=more if factor > theory else "less than at a small hole",
+        passed=finished(record),
         paper="60 MPa under 5 MPa: 12",
     )
 
@@ -333,8 +291,8 @@ def _beside_kirsch(when: str, factor: float, theory: float, record: Record) -> M
 def first_maximum(times: Array, values: Array) -> tuple[float, float]:
     """Time and value of the top of the first swing of `values` (t,).
 
-    Shorter waves ride on it: when it is tells the parabola through the highest hundredth, how far
-    it goes the largest value itself.
+    Shorter waves ride on it: its time is that of the parabola through the highest hundredth, its
+    value the largest.
     """
     highest = np.maximum.accumulate(values)
     back = np.flatnonzero((values < 0.7 * highest) & (highest > 0.5 * values.max()))

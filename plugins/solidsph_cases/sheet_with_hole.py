@@ -3,34 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, ClassVar, final
+from functools import partial
+from typing import final
 
 import attrs
 import numpy as np
 
 from solidsph.maths.arrays import Array
-from solidsph.registry.parameters import check_positive, number
-from solidsph.results.pictures import largest_principal
+from solidsph.maths.tensors import largest_principal
+from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
-from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Measurement
-from solidsph_cases._compare import FINISHED, compared
-from solidsph_cases._scheme import check_count, with_scheme
+from solidsph_cases._compare import compared, vanishing
+from solidsph_cases._scheme import check_all_positive, check_count, with_scheme
 from solidsph_cases._sheet import (
     EXTENSION,
     MATERIAL,
     PEAK,
     SOURCE,
     at_hole,
-    cells,
     check_hole,
     extensions,
-    half_square,
     is_known,
-    pushed,
+    rows_along,
+    sheet,
+    whole,
 )
+from solidsph_cases.drawing.fields import LARGEST_STRESS, circle, field, principal_stress
+from solidsph_cases.drawing.sheet import BELOW, Bar, Panel, Sheet, line, mark
 
 # So small is a load under which the sheet is linear, and a hole to which its edges are far.
 _SMALL_LOAD = 1e-3  # of Young's modulus
@@ -54,9 +55,9 @@ class SheetWithHole(Case):
     the consistent one and hourglass control a few per cent of that are left, away from the hole.
     """
 
-    title: ClassVar[str] = "A sheet with a hole, pulled"
-    source: ClassVar[str] = "Ismail & Reddy, section 5.4, at rest; Kirsch (1898) for small loads"
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
+    title = "A sheet with a hole, pulled"
+    source = "Ismail & Reddy, section 5.4, at rest; Kirsch (1898) for small loads"
+    sweep = {
         "spacing": (0.2, 0.1, 0.05, 1.0 / 30.0),
         "gradient": ("consistent", "quadratic", "corrected"),
         "cover": (2.2, 2.6, 3.0),
@@ -69,7 +70,7 @@ class SheetWithHole(Case):
     kernel: str = "modified-mollifier"
     cover: float = number(default=3.0)  # [spacings]
     gradient: str = "consistent"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     load_steps: int = 1
     tolerance: float = number(default=0.01)  # largest error of the displacement that passes [-]
@@ -77,8 +78,7 @@ class SheetWithHole(Case):
 
     def __attrs_post_init__(self) -> None:
         check_count("sheet-with-hole", "load_steps", self.load_steps, 1)
-        for name, unit in (("width", "m"), ("spacing", "m"), ("traction", "Pa")):
-            check_positive("sheet-with-hole", name, getattr(self, name), unit)
+        check_all_positive("sheet-with-hole", self, width="m", spacing="m", traction="Pa")
         check_hole("sheet-with-hole", self.hole_ratio, self.width, self.spacing)
 
     @property
@@ -91,137 +91,112 @@ class SheetWithHole(Case):
         return super().accuracy(measurements[1:2])
 
     def scenes(self) -> Mapping[str, Scene]:
-        W = self.width
-        builder = with_scheme(
-            Simulation.builder()
-            .title(self.title)
-            .body(
-                "sheet",
-                shape={
-                    "type": "difference",
-                    "of": _square(W),
-                    "minus": {"type": "disc", "radius": self.radius},
-                },
-                spacing=W / cells(W, self.spacing),
-                discretisation={"type": "fitted-moments", "of": self._rows()},
+        rows = rows_along(whole, self.hole_ratio, self.width, self.spacing)
+        builder = (
+            sheet(
+                title=self.title,
+                square=whole,
+                hole_ratio=self.hole_ratio,
+                width=self.width,
+                spacing=self.spacing,
+                discretisation={"type": "fitted-moments", "of": rows},
             )
-            .material(
-                "neo-hookean",
-                youngs_modulus=MATERIAL.youngs_modulus,
-                poissons_ratio=MATERIAL.poissons_ratio,
-                density=MATERIAL.density,
-            )
-            .boundary("symmetry", axis="x")
-            .boundary("symmetry", axis="y")
             .boundary("traction", where="right", traction={"x": self.traction})
             .boundary("traction", where="left", traction={"x": -self.traction})
             .duration(1.0)
-            .statics(load_steps=self.load_steps),
-            self,
+            .statics(load_steps=self.load_steps)
         )
-        return {"sheet": builder.scene()}
-
-    def _rows(self) -> Mapping[str, Any]:
-        """The lattice around a square hole, its rows moved outwards or inwards to the round one."""
-        W, count = self.width, cells(self.width, self.spacing)
-        half = half_square(self.hole_ratio, count) * W / count
-        return {
-            "type": "mapped",
-            "of": {"type": "lattice", "on_boundary": True},
-            "before": {"type": "difference", "of": _square(W), "minus": _square(half)},
-            "to": pushed(W, self.radius, half),
-        }
+        return {"sheet": with_scheme(builder, self).scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["sheet"]
         W, S = self.width, self.traction
-        extension = float(extensions(record)[-1]) / W
         stress = largest_principal(record.field("cauchy_stress")[-1])
         known = is_known(self.hole_ratio, S)
         top = at_hole(record, self.radius, 90.0)
+        extension = float(extensions(record)[-1]) / W
+        compare = partial(compared, record, tolerance=self.peak_tolerance)
         measured = [
             compared(
                 record,
                 "mean u_x of the loaded edge over W",
-                extension,
-                "1",
-                EXTENSION if known else None,
-                SOURCE,
-                self.tolerance,
+                *(extension, "1", EXTENSION if known else None, SOURCE, self.tolerance),
             ),
-            compared(
-                record,
+            compare(
                 "largest principal Cauchy stress at (0, a)",
-                1e-6 * stress[top],
-                "MPa",
-                1e-6 * PEAK if known else None,
-                SOURCE,
-                self.peak_tolerance,
+                *(1e-6 * stress[top], "MPa", 1e-6 * PEAK if known else None, SOURCE),
             ),
-            compared(
-                record,
+            compare(
                 "that over the largest anywhere",
-                stress[top] / stress.max(),
-                "1",
-                1.0,
-                "the peak is at (0, a)",
-                self.peak_tolerance,
+                *(stress[top] / stress.max(), "1", 1.0, "the peak is at (0, a)"),
             ),
         ]
-        small_load = _SMALL_LOAD * MATERIAL.youngs_modulus
-        if self.hole_ratio <= _SMALL_HOLE and small_load >= S:
+        if self.hole_ratio <= _SMALL_HOLE and _SMALL_LOAD * MATERIAL.youngs_modulus >= S:
             stresses, theory = around_hole(record, S)
-            measured.append(
+            miss = float(np.sqrt(np.mean((stresses - theory) ** 2))) / 3.0
+            measured += [
                 compared(
                     record,
                     "stress along the hole at (0, a) over the traction",
-                    hoop_stress(record)[top] / S,
-                    "1",
-                    3.0,
-                    _KIRSCH,
-                    _KIRSCH_TOLERANCE,
-                )
-            )
-            miss = float(np.sqrt(np.mean((stresses - theory) ** 2))) / 3.0
-            measured.append(
-                Measurement(
-                    quantity="root mean square miss around the hole, over the peak",
-                    value=miss,
-                    unit="1",
-                    reference=0.0,
-                    source=_KIRSCH,
-                    error=miss,
-                    passed=record.outcome == FINISHED and miss <= _KIRSCH_TOLERANCE,
-                )
-            )
+                    *(_hoop_stress(record)[top] / S, "1", 3.0, _KIRSCH, _KIRSCH_TOLERANCE),
+                ),
+                vanishing(
+                    record,
+                    "root mean square miss around the hole, over the peak",
+                    *(miss, _KIRSCH_TOLERANCE, _KIRSCH),
+                ),
+            ]
         return measured
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._sheet_picture import draw_sheet
-
-        path = folder / "sheet-with-hole.png"
-        draw_sheet(
-            records["sheet"], self.measure(records)[1], self.radius, self.width, self.title, path
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """The deformed sheet, and the stress on the line from the hole to the upper edge."""
+        record, W, a = records["sheet"], self.width, self.radius
+        stress = principal_stress(record, -1)
+        edge = W * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
+        before = {"color": "0.4", "linewidth": 1.0}
+        body = Panel(
+            field(record, -1, stress),
+            mark("plot", *circle(a), ":", **before),
+            mark("plot", *edge.T, ":", **before),
+            title="deformed; dotted: before",
+            x="x [m]",
+            y="y [m]",
         )
-        return [path]
-
-
-def _square(half: float) -> Mapping[str, Any]:
-    """A square around the origin."""
-    return {"type": "box", "lengths": [2.0 * half, 2.0 * half], "origin": [-half, -half]}
+        X, Y = record.particles.positions.T
+        above = np.flatnonzero((np.abs(X) < 0.1 * float(record.particles.spacings[0])) & (Y > 0.0))
+        above = above[np.argsort(Y[above])]
+        marks = [
+            mark("axvspan", 0.0, a / W, color="0.9"),
+            mark("text", 0.5 * a / W, 0.5, "hole", ha="center", rotation=90),
+            line(Y[above] / W, stress[above], "ko-", ms=4, label="particles on X = 0"),
+        ]
+        peak = self.measure(records)[1].reference
+        if peak is not None:
+            style = {"markersize": 12, "mfc": "none", "mec": "0.3", "mew": 1.8}
+            marks.append(line(a / W, peak, "s", label=f"reference peak: {peak:.2f} MPa", **style))
+        profile = Panel(
+            *marks,
+            x="Y / W",
+            y=f"{LARGEST_STRESS} [MPa]",
+            xlim=(0.0, 1.02),
+            ylim=(0.0, None),
+            legend={"loc": "upper right"},
+        )
+        title = f"{self.title}: {record.particles.count} particles"
+        bars = [Bar(f"{LARGEST_STRESS} [MPa]", [body], BELOW)]
+        rows = [[body, profile]]
+        return {"sheet-with-hole": Sheet(rows, (11.0, 6.0), title, widths=(1.1, 1.0), bars=bars)}
 
 
 def around_hole(record: Record, traction: float) -> tuple[Array, Array]:
     """Stress along the hole at its particles (k,), and Kirsch's, both over the traction [-]."""
     rim = record.particles.tagged("rim")
     x, y = record.particles.positions[rim].T
-    return hoop_stress(record)[rim] / traction, 1.0 - 2.0 * np.cos(2.0 * np.arctan2(y, x))
+    return _hoop_stress(record)[rim] / traction, 1.0 - 2.0 * np.cos(2.0 * np.arctan2(y, x))
 
 
-def hoop_stress(record: Record) -> Array:
+def _hoop_stress(record: Record) -> Array:
     """Cauchy stress along circles around the middle at the end, (n,) [Pa]."""
     x, y = record.particles.positions.T
     along = np.stack([-y, x], axis=1) / np.hypot(x, y)[:, None]
-    sigma = record.field("cauchy_stress")[-1]
-    hoop: Array = np.einsum("ni,nij,nj->n", along, sigma, along)
-    return hoop
+    return np.asarray(np.einsum("ni,nij,nj->n", along, record.field("cauchy_stress")[-1], along))

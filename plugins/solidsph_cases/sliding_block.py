@@ -4,25 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import cos, radians, sin
-from pathlib import Path
-from typing import ClassVar, final
+from typing import final
 
 import attrs
 import numpy as np
 
 from solidsph.maths.arrays import Array
-from solidsph.registry.parameters import check_positive, number
+from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
-from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Curves, Measurement, Trial
-from solidsph_cases._compare import FINISHED, compared
+from solidsph_cases._compare import compared, finished, vanishing
 from solidsph_cases._energy import residual_over_work
-from solidsph_cases._scheme import check_count, with_scheme
+from solidsph_cases._scheme import SOFT, box, check_all_positive, check_count, solid, with_scheme
+from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark
 
 LENGTH, HEIGHT = 0.2, 0.1  # [m]
 GRAVITY = 9.81  # [m/s^2]
-YOUNGS_MODULUS, POISSONS_RATIO, DENSITY = 1e6, 0.3, 1000.0  # [Pa], [-], [kg/m^3]
 
 _OUTPUTS = 200
 _TOLERANCE = 0.01
@@ -45,12 +43,10 @@ class SlidingBlock(Case):
     above the angle of friction, atan f, the other one just below.
     """
 
-    title: ClassVar[str] = "A block on an incline"
-    source: ClassVar[str] = _SOURCE
-    sweep: ClassVar[Mapping[str, Sequence[object]]] = {"along": (8, 12, 16)}
-    trials: ClassVar[Mapping[str, Trial]] = {
-        "slides, and sticks": Trial({}, {"along": 8, "duration": 0.2}),
-    }
+    title = "A block on an incline"
+    source = _SOURCE
+    sweep = {"along": (8, 12, 16)}
+    trials = {"slides, and sticks": Trial({}, {"along": 8, "duration": 0.2})}
 
     friction: float = number(default=0.3)  # f [-]
     steep: float = number(default=30.0)  # angle at which it slides [degrees]
@@ -61,44 +57,28 @@ class SlidingBlock(Case):
     kernel: str = "cubic-spline"
     cover: float = number(default=2.2)  # [spacings]
     gradient: str = "corrected"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     time_step_factor: float = number(default=0.5)  # of the CFL step
 
     def __attrs_post_init__(self) -> None:
         check_count("sliding-block", "along", self.along, 6)
-        check_positive("sliding-block", "duration", self.duration, "s")
-        check_positive("sliding-block", "ramp", self.ramp, "s")
-        check_positive("sliding-block", "steep", self.steep, "degrees")
-        check_positive("sliding-block", "flat", self.flat, "degrees")
+        units = {"duration": "s", "ramp": "s", "steep": "degrees", "flat": "degrees"}
+        check_all_positive("sliding-block", self, **units)
 
     def scenes(self) -> Mapping[str, Scene]:
         return {"slides": self._scene(self.steep), "sticks": self._scene(self.flat)}
 
     def _scene(self, degrees: float) -> Scene:
         angle, grows = radians(degrees), f"min(t/{self.ramp!r}, 1)"
+        weight = {
+            "x": f"{GRAVITY * sin(angle)!r}*{grows}",
+            "y": f"-{GRAVITY * cos(angle)!r}*{grows}",
+        }
+        title = f"{self.title} of {degrees:g} degrees"
         builder = (
-            Simulation.builder()
-            .title(f"{self.title} of {degrees:g} degrees")
-            .body(
-                "block",
-                shape={"type": "box", "lengths": [LENGTH, HEIGHT]},
-                spacing=LENGTH / self.along,
-            )
-            .material(
-                "neo-hookean",
-                youngs_modulus=YOUNGS_MODULUS,
-                poissons_ratio=POISSONS_RATIO,
-                density=DENSITY,
-            )
-            .effect(
-                "body-force",
-                acceleration={
-                    "x": f"{GRAVITY * sin(angle)!r}*{grows}",
-                    "y": f"-{GRAVITY * cos(angle)!r}*{grows}",
-                },
-                label="gravity",
-            )
+            solid(title, "block", box(LENGTH, HEIGHT), LENGTH / self.along, SOFT)
+            .effect("body-force", acceleration=weight, label="gravity")
             .effect(
                 "rigid-wall",
                 point={"y": 0.0},
@@ -113,15 +93,10 @@ class SlidingBlock(Case):
         return with_scheme(builder, self).scene()
 
     def moved(self, times: Array) -> Array:
-        """By an acceleration of 1 m/s^2 that grows as gravity does, (t,) [m]."""
+        """Way under an acceleration of 1 m/s^2 that grows as gravity does, (t,) [m]."""
         T = self.ramp
         after = np.maximum(times - T, 0.0)
         return np.asarray(np.minimum(times, T) ** 3 / (6.0 * T) + 0.5 * T * after + 0.5 * after**2)
-
-    @property
-    def angle_of_friction(self) -> float:
-        """atan f [degrees]"""
-        return float(np.degrees(np.arctan(self.friction)))
 
     def acceleration(self, degrees: float) -> float:
         """Of a block that slides at that angle [m/s^2]."""
@@ -130,43 +105,39 @@ class SlidingBlock(Case):
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         slides, sticks = records["slides"], records["sticks"]
-        way, stay = self.way(slides), self.way(sticks)
+        way = self.way(slides)
         # The least squares of the whole way.
         shape = self.moved(slides.times)
         found = float(way @ shape / (shape @ shape))
         free = GRAVITY * sin(radians(self.flat)) * float(self.moved(sticks.times)[-1])
-        moved = float(np.abs(stay).max()) / free
-        mass = DENSITY * LENGTH * HEIGHT
-        heat = self.heat(slides)[-1]
-        normal = mass * GRAVITY * cos(radians(self.steep))
+        moved = float(np.abs(self.way(sticks)).max()) / free
+        # What friction has taken and its springs do not hold.
+        held = slides.history["incline energy [J]"]
+        heat = np.asarray(-slides.history["work of incline [J]"] - (held - held[0]))[-1]
+        normal = SOFT.density * LENGTH * HEIGHT * GRAVITY * cos(radians(self.steep))
         grown = np.minimum(slides.times / self.ramp, 1.0)
         rubbed = float(np.sum(0.5 * (grown[1:] + grown[:-1]) * np.diff(way)))
+        angle = float(np.degrees(np.arctan(self.friction)))
         return [
             compared(
                 slides,
                 f"acceleration at {self.steep:g} degrees",
-                found,
-                "m/s^2",
-                self.acceleration(self.steep),
-                _SOURCE,
-                _TOLERANCE,
+                *(found, "m/s^2", self.acceleration(self.steep), _SOURCE, _TOLERANCE),
             ),
             Measurement(
-                quantity="heat of friction over friction times the way",
-                value=heat / (self.friction * normal * rubbed),
-                unit="1",
+                "heat of friction over friction times the way",
+                heat / (self.friction * normal * rubbed),
+                "1",
                 verdict="the rest makes the block tremble: nothing damps it",
-                passed=slides.outcome == FINISHED,
+                passed=finished(slides),
             ),
-            Measurement(
-                quantity=f"largest way at {self.flat:g} degrees over that without friction",
-                value=moved,
-                unit="1",
-                reference=0.0,
-                source=f"the angle of friction is {self.angle_of_friction:.3g} degrees",
-                error=moved,
+            vanishing(
+                sticks,
+                f"largest way at {self.flat:g} degrees over that without friction",
+                moved,
+                _STAYS,
+                f"the angle of friction is {angle:.3g} degrees",
                 verdict="stays" if moved <= _STAYS else "slides",
-                passed=sticks.outcome == FINISHED and moved <= _STAYS,
             ),
             residual_over_work(slides, "sliding"),
             residual_over_work(sticks, "sticking"),
@@ -178,17 +149,32 @@ class SlidingBlock(Case):
         x = record.positions[:][:, :, 0] @ V / V.sum()
         return np.asarray(x - x[0])
 
-    def heat(self, record: Record) -> Array:
-        """What friction has taken and its springs do not hold, (t,) [J]."""
-        held = record.history["incline energy [J]"]
-        return np.asarray(-record.history["work of incline [J]"] - (held - held[0]))
-
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._contact_pictures import draw_block
-
-        path = folder / "sliding-block.png"
-        draw_block(records, self, path)
-        return [path]
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """The ways of both blocks, and the one that slides at its start and end."""
+        slides, sticks = records["slides"], records["sticks"]
+        t = slides.times
+        law = self.acceleration(self.steep) * self.moved(t)
+        ways = Panel(
+            line(t, self.way(slides), label=f"{self.steep:g} degrees"),
+            line(t, law, "--", color="tab:orange", label="Coulomb's law"),
+            line(sticks.times, self.way(sticks), "k:", label=f"{self.flat:g} degrees"),
+            x="t [s]",
+            y="way down the incline [m]",
+            legend={},
+        )
+        turn = np.radians(-self.steep)
+        R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        ends = np.array([[-0.05, 0.0], [slides.positions[-1][:, 0].max() + 0.05, 0.0]])
+        block = Panel(
+            mark("plot", *(R @ slides.positions[0].T), "o", color="0.7", markersize=3.0),
+            mark("plot", *(R @ slides.positions[-1].T), "o", color="black", markersize=3.0),
+            mark("plot", *(R @ ends.T), "k-", linewidth=1.0),
+            x="[m]",
+            y="[m]",
+            aspect="equal",
+        )
+        title = f"{self.title}: {slides.particles.count} particles, f = {self.friction:g}"
+        return {"sliding-block": Sheet([[ways, block]], (11.0, 4.2), title)}
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         return {

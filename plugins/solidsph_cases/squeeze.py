@@ -1,10 +1,9 @@
-"""A block squeezed to a fifth of its volume between walls that do not rub."""
+"""A block squeezed to a fifth of its volume between frictionless walls."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, ClassVar, final
+from typing import final
 
 import attrs
 import numpy as np
@@ -13,14 +12,19 @@ from solidsph.errors import SceneError
 from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
-from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Measurement, Trial
-from solidsph_builtin.materials.neo_hookean import NeoHookean
 from solidsph_cases._compare import compared
 from solidsph_cases._energy import smallest_volume_ratio
-from solidsph_cases._scheme import check_count, with_scheme
+from solidsph_cases._scheme import (
+    ON_BOUNDARY,
+    SOFT,
+    between_walls,
+    box,
+    check_count,
+    in_motion,
+    solid,
+)
 
-MATERIAL = NeoHookean(youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
 SIDE = 1.0  # [m]
 
 
@@ -34,13 +38,10 @@ class Squeeze(Case):
     leaves it, by rounding alone.
     """
 
-    title: ClassVar[str] = "A block squeezed to a fifth"
-    source: ClassVar[str] = "uniform motion without acceleration; the law in closed form"
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
-        "particles": (7, 11, 15),
-        "gradient": ("consistent", "quadratic", "corrected"),
-    }
-    trials: ClassVar[Mapping[str, Trial]] = {
+    title = "A block squeezed to a fifth"
+    source = "uniform motion without acceleration; the law in closed form"
+    sweep = {"particles": (7, 11, 15), "gradient": ("consistent", "quadratic", "corrected")}
+    trials = {
         "to J = 0.2, 2D": Trial(),
         "to J = 0.2, 3D": Trial({"dimension": 3, "particles": 6}),
         "to J = 0.2, particles off by 10 %": Trial(
@@ -59,7 +60,7 @@ class Squeeze(Case):
     kernel: str = "cubic-spline"
     cover: float = number(default=2.2)  # [spacings]
     gradient: str = "consistent"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
     # Of the CFL step of the unloaded block: waves are faster in it the more it is squeezed.
@@ -76,60 +77,27 @@ class Squeeze(Case):
             )
 
     def scenes(self) -> Mapping[str, Scene]:
-        d = self.dimension
-        T = self.transits * SIDE / MATERIAL.wave_speed
+        d, spacing = self.dimension, SIDE / (self.particles - 1)
+        T = self.transits * SIDE / SOFT.wave_speed
         rate = (1.0 - self.volume_ratio) / T
+        jittered = {"type": "jittered", "of": ON_BOUNDARY, "amplitude": self.jitter, "seed": 1}
         builder = (
-            Simulation.builder()
-            .title(self.title)
-            .body(
-                "block",
-                shape={"type": "box", "lengths": [SIDE] * d},
-                spacing=SIDE / (self.particles - 1),
-                discretisation={
-                    "type": "jittered",
-                    "of": {"type": "lattice", "on_boundary": True},
-                    "amplitude": self.jitter,
-                    "seed": 1,
-                },
-            )
-            .material(
-                "neo-hookean",
-                youngs_modulus=MATERIAL.youngs_modulus,
-                poissons_ratio=MATERIAL.poissons_ratio,
-                density=MATERIAL.density,
-            )
+            solid(self.title, "block", box(*[SIDE] * d), spacing, SOFT, discretisation=jittered)
             .boundary("clamp", where="left", axes=["x"])
             .boundary("prescribed-motion", where="right", displacement={"x": f"-{rate!r}*X*t"})
             .initial(velocity={"x": f"-{rate!r}*X"})
-            .integrator(self.integrator, time_step_factor=self.time_step_factor)
-            .duration(T)
-            .outputs(100)
         )
-        for axis, sides in (("y", ("bottom", "top")), ("z", ("back", "front"))):
-            if "xyz".index(axis) < d:
-                for side in sides:
-                    builder = builder.boundary("clamp", where=side, axes=[axis])
-        return {"block": with_scheme(builder, self).scene()}
+        return {"block": in_motion(between_walls(builder, d), self, T, 100).scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["block"]
-        J = self.volume_ratio
         F = np.eye(self.dimension)
-        F[0, 0] = J
-        P = float(np.asarray(MATERIAL.first_piola(F, MATERIAL.params)[0][0]))
+        F[0, 0] = self.volume_ratio
+        P = float(np.asarray(SOFT.first_piola(F, SOFT.params)[0][0]))
         stress = record.field("cauchy_stress")[-1][:, 0, 0]
         worst = float(stress[np.argmax(np.abs(stress / P - 1.0))])
-        found = compared(
-            record,
-            "Cauchy stress along the pull at the end, of the worst particle",
-            worst,
-            "Pa",
-            P,
-            self.source,
-            self.tolerance,
-        )
-        return [found, smallest_volume_ratio(record)]
-
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        return []
+        quantity = "Cauchy stress along the pull at the end, of the worst particle"
+        return [
+            compared(record, quantity, worst, "Pa", P, self.source, self.tolerance),
+            smallest_volume_ratio(record),
+        ]

@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, ClassVar, final
+from math import nan
+from typing import final
 
 import attrs
 import numpy as np
 from scipy.optimize import brentq
 
 from solidsph.maths.arrays import Array
-from solidsph.registry.parameters import check_positive, number
+from solidsph.registry.construct import describe
+from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Measurement, Trial
-from solidsph_builtin.materials.neo_hookean import NeoHookean
-from solidsph_cases._compare import FINISHED, compared
+from solidsph_cases._compare import compared, finished
 from solidsph_cases._energy import residual_over_start, smallest_volume_ratio
-from solidsph_cases._scheme import check_count, with_scheme
+from solidsph_cases._scheme import SOFT, box, check_all_positive, check_count, with_scheme
+from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark
 
-LENGTH, WIDTH = 0.5, 0.2  # of both the layer and the slab [m]
-SOFT = NeoHookean(youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
+LENGTH = 0.5  # of both the layer and the slab [m]
 
 # Up to this part of the layer's wave speed the slab swings as the linear theory says.
 _SMALL = 0.02
@@ -44,10 +44,10 @@ class StiffnessJump(Case):
     below the tolerance from a ratio of 100 on.
     """
 
-    title: ClassVar[str] = "A stiff slab swings on a soft layer"
-    source: ClassVar[str] = "Timoshenko: a rod with a mass at its end"
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {"along": (10, 20, 40)}
-    trials: ClassVar[Mapping[str, Trial]] = {
+    title = "A stiff slab swings on a soft layer"
+    source = "Timoshenko: a rod with a mass at its end"
+    sweep = {"along": (10, 20, 40)}
+    trials = {
         "1:1000": Trial({}, {"along": 8, "across": 4, "tolerance": 0.06}),
         "1:1000, thrown hard": Trial({"speed": 0.3}, {"along": 8, "across": 4, "tolerance": 0.06}),
     }
@@ -59,7 +59,7 @@ class StiffnessJump(Case):
     kernel: str = "cubic-spline"
     cover: float = number(default=2.2)  # [spacings]
     gradient: str = "corrected"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     time_step_factor: float = number(default=0.5)  # of the CFL step
     tolerance: float = number(default=0.03)  # largest error of the period that passes [-]
@@ -67,13 +67,8 @@ class StiffnessJump(Case):
     def __attrs_post_init__(self) -> None:
         check_count("stiffness-jump", "along", self.along, 4)
         check_count("stiffness-jump", "across", self.across, 4)
-        for name in ("ratio", "speed", "tolerance"):
-            check_positive("stiffness-jump", name, getattr(self, name), "parts of one")
-
-    @property
-    def velocity(self) -> float:
-        """Of the slab at the start [m/s]"""
-        return self.speed * SOFT.wave_speed
+        units = dict.fromkeys(("ratio", "speed", "tolerance"), "parts of one")
+        check_all_positive("stiffness-jump", self, **units)
 
     @property
     def period(self) -> float:
@@ -84,28 +79,21 @@ class StiffnessJump(Case):
 
     def scenes(self) -> Mapping[str, Scene]:
         builder = Simulation.builder().title(self.title)
+        spacing = LENGTH / self.along
         for name, start, stiffness in (("layer", 0.0, 1.0), ("slab", LENGTH, self.ratio)):
+            material = attrs.evolve(SOFT, youngs_modulus=stiffness * SOFT.youngs_modulus)
             builder = builder.body(
                 name,
-                shape={
-                    "type": "box",
-                    "lengths": [LENGTH, self.across * LENGTH / self.along],
-                    "origin": [start, 0.0],
-                },
-                spacing=LENGTH / self.along,
-                material={
-                    "type": "neo-hookean",
-                    "youngs_modulus": stiffness * SOFT.youngs_modulus,
-                    "poissons_ratio": SOFT.poissons_ratio,
-                    "density": SOFT.density,
-                },
+                shape=box(LENGTH, self.across * LENGTH / self.along, origin=[start, 0.0]),
+                spacing=spacing,
+                material=describe("materials", material),
             )
         half = 0.5 * LENGTH / self.along
         builder = (
             builder.boundary("clamp", where="all", axes=["y"])
             .boundary("clamp", where=f"X < {half * 1.01!r}", axes=["x"])
             .effect("joint")
-            .initial(where=f"X > {LENGTH!r}", velocity={"x": self.velocity})
+            .initial(where=f"X > {LENGTH!r}", velocity={"x": self.speed * SOFT.wave_speed})
             .integrator("central-difference", time_step_factor=self.time_step_factor)
             .duration(_PERIODS * self.period)
             .outputs(_OUTPUTS)
@@ -115,23 +103,16 @@ class StiffnessJump(Case):
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["slab"]
         stretch = float(record.history["joint largest stretch [-]"].max())
-        whole = record.outcome == FINISHED and stretch < _JOINED
-        small = self.speed <= _SMALL
+        whole = finished(record) and stretch < _JOINED
+        period = self.period if self.speed <= _SMALL else None
+        found = self.swing_period(record)
         return [
-            compared(
-                record,
-                "period",
-                self.swing_period(record),
-                "s",
-                self.period if small else None,
-                self.source,
-                self.tolerance,
-            ),
+            compared(record, "period", found, "s", period, self.source, self.tolerance),
             smallest_volume_ratio(record),
             Measurement(
-                quantity="largest stretch of the joint",
-                value=stretch,
-                unit="1",
+                "largest stretch of the joint",
+                stretch,
+                "1",
                 source="what is joined stays together",
                 verdict="joined" if whole else "parted, or ended early",
                 passed=whole,
@@ -152,16 +133,39 @@ class StiffnessJump(Case):
         falls = np.flatnonzero((u[:-1] > 0.0) & (u[1:] <= 0.0))
         rises = np.flatnonzero((u[:-1] < 0.0) & (u[1:] >= 0.0))
         if not (falls.size and rises.size):
-            return float("nan")
+            return nan
         times = [
             record.times[k] + (record.times[k + 1] - record.times[k]) * u[k] / (u[k] - u[k + 1])
             for k in (int(falls[0]), int(rises[-1]))
         ]
         return float(2.0 * abs(times[1] - times[0]))
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._joint_picture import draw_swing
-
-        path = folder / "stiffness-jump.png"
-        draw_swing(records["slab"], self, path)
-        return [path]
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """The slab's displacement against time, and the stress along the axis at its farthest."""
+        record = records["slab"]
+        u, t = self.swing(record) / LENGTH, record.times / self.period
+        swing = np.abs(u).max() * np.sin(2.0 * np.pi * t)
+        label = "a rod with a mass, same amplitude"
+        motion = Panel(
+            line(t, u, label="simulated"),
+            line(t, swing, "--", color="tab:orange", label=label),
+            mark("margins", y=0.25),
+            x="time [periods of the linear theory]",
+            y="displacement of the slab [layers]",
+            legend={"loc": "upper center"},
+        )
+        X = record.particles.positions[:, 0]
+        sigma = record.field("cauchy_stress")[int(np.argmax(u))][:, 0, 0]
+        sigma = sigma / (SOFT.density * SOFT.wave_speed**2)
+        layer = X < LENGTH
+        stress = Panel(
+            line(X[layer], sigma[layer], "k.", markersize=4, label="layer"),
+            line(X[~layer], sigma[~layer], "x", color="tab:blue", label="slab"),
+            mark("axvline", LENGTH, color="0.6", linewidth=0.8),
+            x="X [m]",
+            y="Cauchy stress [moduli of the layer]",
+            legend={},
+        )
+        count = record.particles.count
+        title = f"{self.title}: moduli 1:{self.ratio:g}, {count} particles"
+        return {"stiffness-jump": Sheet([[motion, stress]], (10.0, 3.8), title)}

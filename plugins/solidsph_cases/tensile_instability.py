@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import inf
-from pathlib import Path
-from typing import Any, ClassVar, final
+from math import ceil, inf, nan
+from typing import final
 
 import attrs
 import numpy as np
@@ -17,11 +16,14 @@ from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
-from solidsph.studies.case import Case, Curves, Measurement
+from solidsph.studies.case import Case, Curves, Measurement, Picture
 from solidsph.studies.spectrum import spectrum
 from solidsph.studies.stability_map import StabilityMap
 from solidsph_builtin.materials.neo_hookean import NeoHookean
-from solidsph_cases._stability_map import FORMS, UPDATED, onset, stability_map
+from solidsph_cases._bar import along, displacements
+from solidsph_cases._scheme import ON_BOUNDARY, solid
+from solidsph_cases._stability_map import FORMS, TOTAL, UPDATED, GrowthMaps, onset, stability_map
+from solidsph_cases._tensile_pictures import configuration, motions
 
 # How long the growth is watched, in e-foldings of the rate that the spectrum predicts for the
 # updated form: from the smallest deviation that rounding leaves clean to the edge of linearity.
@@ -45,7 +47,7 @@ _MAP_STRETCHES = tuple(float(s) for s in np.linspace(0.3, 6.0, 39))
 _MAP_COVERS = tuple(float(c) for c in np.linspace(1.2, 5.5, 22))
 
 _PAPER = {
-    FORMS[0]: "behaves as expected: all particles track the centre one",
+    TOTAL: "behaves as expected: all particles track the centre one",
     UPDATED: "particles under increasing tension move closer together at times",
 }
 
@@ -62,13 +64,10 @@ class TensileInstability(Case):
     either form, at which stretch and cover the uniform state of an endless bar is unstable.
     """
 
-    title: ClassVar[str] = "A bar in tension, perturbed: total against updated Lagrangian"
-    source: ClassVar[str] = "Ismail & Reddy, section 5.2, Figs. 12 to 14"
-    figures: ClassVar[tuple[str, ...]] = ("fig-12", "fig-13", "fig-14")
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
-        "spacing": (5e-3, 2.5e-3, 1.25e-3),
-        "cover": (3.5, 5.5),
-    }
+    title = "A bar in tension, perturbed: total against updated Lagrangian"
+    source = "Ismail & Reddy, section 5.2, Figs. 12 to 14"
+    figures = ("fig-12", "fig-13", "fig-14")
+    sweep = {"spacing": (5e-3, 2.5e-3, 1.25e-3), "cover": (3.5, 5.5)}
 
     stretch: float = number(default=1.2)  # of the finite perturbation [-]
     perturbation: float = number(default=0.05)  # of the displacement [-]
@@ -117,9 +116,9 @@ class TensileInstability(Case):
         return attrs.evolve(self, stretches=self.stretches[:1])
 
     def scenes(self) -> Mapping[str, Scene]:
-        scenes = {form: self.scene(form, self.transits * self.transit) for form in FORMS}
+        scenes = {form: self.perturbed(form) for form in FORMS}
         for stretch in self.stretches:
-            rate = self.predicted_rate("updated-lagrangian", stretch)
+            rate = self.predicted_rate(UPDATED, stretch)
             # Where nothing grows, compression for one, ten transits show it.
             watch = min(_WATCHED_FOLDINGS / max(rate, 1e-300), 20.0 * self.transit)
             small = _LINEAR_START * self.spacing / (0.5 * self.length * abs(stretch - 1.0))
@@ -127,9 +126,36 @@ class TensileInstability(Case):
                 scenes[_rate_name(form, stretch)] = self._scene(form, stretch, small, watch)
         return scenes
 
-    def scene(self, form: str, duration: float) -> Scene:
-        """One form with the finite perturbation, for some time [s]."""
+    def perturbed(self, form: str) -> Scene:
+        """One form with the finite perturbation."""
+        duration = self.transits * self.transit
         return self._scene(form, self.stretch, self.perturbation, duration)
+
+    def _scene(self, form: str, stretch: float, perturbation: float, duration: float) -> Scene:
+        title = f"{self.title}: {form} at stretch {stretch:g}"
+        shape = {"type": "interval", "length": self.length}
+        centre = f"abs(X - {0.5 * self.length!r}) < {1e-6 * self.spacing!r}"
+        lattice = {**ON_BOUNDARY, "ghosts": ceil(self.cover)}
+        options = {"discretisation": lattice, "tags": {"centre": centre}}
+        uniform = f"{stretch - 1.0!r}*X"
+        return (
+            solid(title, "bar", shape, self.spacing, self.material, **options)
+            .kernel("modified-mollifier", cover=self.cover)
+            # Both forms with the paper's sums; differences keep the updated form's strain
+            # independent of where the bar stands.
+            .formulation(form, gradient="difference", divergence="plain")
+            # Under tension the updated form has no energy: its instability is what is measured.
+            .energy_tolerance("off" if form == UPDATED else 0.01)
+            .boundary("prescribed-motion", where="left", displacement={"x": uniform})
+            .boundary("prescribed-motion", where="right", displacement={"x": uniform})
+            .boundary("ghost-extension")
+            .initial(displacement={"x": uniform})
+            .initial(where="centre", displacement={"x": f"{uniform}*{1.0 + perturbation!r}"})
+            .integrator("central-difference", time_step_factor=0.5)
+            .duration(duration)
+            .outputs(200)
+            .scene()
+        )
 
     def predicted_rate(self, form: str, stretch: float) -> float:
         """Growth rate of the fastest mode about the uniform stretch [1/s]."""
@@ -154,111 +180,16 @@ class TensileInstability(Case):
             for form in FORMS
         }
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph.studies.stability_picture import draw_growth
-        from solidsph_cases._tensile_picture import draw_configuration, draw_forms
-
-        paths = [
-            folder / "fig-12-configuration.png",
-            folder / "fig-13-14-tensile-instability.png",
-            folder / "fig-13-14-stability-map.png",
-        ]
-        draw_configuration(records[FORMS[0]], self.stretch, self.perturbation, paths[0])
-        draw_forms(
-            {form: records[form] for form in FORMS},
-            stretch=self.stretch,
-            perturbation=self.perturbation,
-            transit=self.transit,
-            path=paths[1],
-        )
-        draw_growth(
-            self.maps(),
-            paths[2],
-            title="Small deviations from a uniform stretch of an endless bar, "
-            f"Poisson's ratio {self.poissons_ratio:g}: where they grow",
-            mark=(self.cover, "cover of Figs. 13 and 14"),
-        )
-        return paths
-
-    def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
-        X, start = displacements(records[FORMS[0]])
-        curves: dict[str, Curves] = {
-            "fig-12-configuration": {
-                "X [mm]": 1e3 * X,
-                "uniform displacement [mm]": 1e3 * (self.stretch - 1.0) * X,
-                "displacement at the start [mm]": 1e3 * start[0],
-            }
-        }
-        for figure, form in zip(("fig-13", "fig-14"), FORMS, strict=True):
-            X, u = displacements(records[form])
-            curves[f"{figure}-{form}"] = {
-                "time [transits]": records[form].times / self.transit,
-                **{f"u at X = {1e3 * x:g} mm [mm]": 1e3 * u[:, k] for k, x in enumerate(X)},
-            }
-        total, updated = self.maps().values()
-        covers, stretches = np.meshgrid(total.covers, total.stretches, indexing="ij")
-        curves["fig-13-14-stability-map"] = {
-            "cover [spacings]": covers.ravel(),
-            "stretch [1]": stretches.ravel(),
-            **{
-                f"{form}: growth rate [1/transit of a spacing]": one.rates.ravel()
-                for form, one in self.maps().items()
-            },
-            f"{UPDATED}: has neighbours [1]": updated.connected.ravel().astype(np.float64),
-        }
-        return curves
-
-    def _scene(self, form: str, stretch: float, perturbation: float, duration: float) -> Scene:
-        half = 0.5 * self.length
-        tolerance = 1e-6 * self.spacing
-        uniform = f"{stretch - 1.0!r}*X"
-        return (
-            Simulation.builder()
-            .title(f"{self.title}: {form} at stretch {stretch:g}")
-            .body(
-                "bar",
-                shape={"type": "interval", "length": self.length},
-                spacing=self.spacing,
-                discretisation={
-                    "type": "lattice",
-                    "on_boundary": True,
-                    "ghosts": int(np.ceil(self.cover)),
-                },
-                tags={"centre": f"abs(X - {half!r}) < {tolerance!r}"},
-            )
-            .kernel("modified-mollifier", cover=self.cover)
-            .material(
-                "neo-hookean",
-                youngs_modulus=self.youngs_modulus,
-                poissons_ratio=self.poissons_ratio,
-                density=self.density,
-            )
-            # Both forms with the paper's sums; differences keep the updated form's strain
-            # independent of where the bar stands.
-            .formulation(form, gradient="difference", divergence="plain")
-            # Under tension the updated form has no energy: its instability is what is measured.
-            .energy_tolerance("off" if form == "updated-lagrangian" else 0.01)
-            .boundary("prescribed-motion", where="left", displacement={"x": uniform})
-            .boundary("prescribed-motion", where="right", displacement={"x": uniform})
-            .boundary("ghost-extension")
-            .initial(displacement={"x": uniform})
-            .initial(where="centre", displacement={"x": f"{uniform}*{1.0 + perturbation!r}"})
-            .integrator("central-difference", time_step_factor=0.5)
-            .duration(duration)
-            .outputs(200)
-            .scene()
-        )
-
     def _spread(self, form: str, record: Record) -> Measurement:
         """Largest deviation at the end of the finite perturbation, over that at the start."""
-        deviations = np.abs(deviation(record, self.stretch)).max(axis=1)
-        ratio = float(deviations[-1] / deviations[0])
-        gap = float(np.diff(_bar_positions(record), axis=1).min() / self.spacing)
-        should_grow = form == "updated-lagrangian" and self.stretch > 1.1
+        ratio = spread(record, self.stretch)
+        x = along(record) + displacements(record)
+        gap = float(np.diff(x, axis=1).min() / self.spacing)
+        should_grow = form == UPDATED and self.stretch > 1.1
         return Measurement(
-            quantity=f"{form}, stretch {self.stretch:g}: deviation at the end over the start",
-            value=ratio,
-            unit="1",
+            f"{form}, stretch {self.stretch:g}: deviation at the end over the start",
+            ratio,
+            "1",
             source="section 5.2: the total form's disturbance spreads, the updated form's clumps",
             verdict=f"{'grew' if ratio > 1.0 else 'spread'}, closest pair {gap:.2f} spacings",
             passed=(ratio > 1.0) == should_grow,
@@ -269,25 +200,24 @@ class TensileInstability(Case):
         predicted = self.predicted_rate(form, stretch) * self.transit
         times = record.times / self.transit
         amplitudes = np.linalg.norm(deviation(record, stretch), axis=1)
-        grew = amplitudes.max() > _NO_GROWTH * amplitudes[0]
+        grew = bool(amplitudes.max() > _NO_GROWTH * amplitudes[0])
         # Without growth, the trend of the whole run: falling, as the disturbance spreads.
         measured = (
             growth_rate(times, amplitudes, _LINEAR_END * self.spacing)
             if grew
             else float(np.polyfit(times, np.log(amplitudes), 1)[0])
         )
-        unstable = predicted * times[-1] > np.log(_NO_GROWTH)
+        unstable = bool(predicted * times[-1] > np.log(_NO_GROWTH))
         error = abs(measured / predicted - 1.0) if unstable else None
         return Measurement(
-            quantity=f"{form}, stretch {stretch:g}: growth rate",
-            value=measured,
-            unit="1/transit",
+            f"{form}, stretch {stretch:g}: growth rate",
+            measured,
+            "1/transit",
             reference=predicted if unstable else 0.0,
             source="spectrum of the discrete system, linearised numerically",
             error=error,
             verdict="unstable" if grew else "stable",
-            passed=grew == unstable == (form == "updated-lagrangian")
-            and (error is None or error < 0.1),
+            passed=grew == unstable == (form == UPDATED) and (error is None or error < 0.1),
         )
 
     def _of_the_maps(self) -> Sequence[Measurement]:
@@ -299,19 +229,19 @@ class TensileInstability(Case):
             ]
         )
         spacings = self.length / self.spacing  # in a transit
-        fastest = float(total.rates[elliptic].max()) * spacings
         stable = not total.grows[elliptic].any()
         begins = onset(UPDATED, self.poissons_ratio, self.cover, 1.0 / spacings)
         tension = updated.connected & (updated.stretches > 1.0)
         squeezed = np.broadcast_to(updated.stretches < 1.0, tension.shape)
-        over = f"stretch {_MAP_STRETCHES[0]:g} to {_MAP_STRETCHES[-1]:g}, cover " + (
-            f"{_MAP_COVERS[0]:g} to {_MAP_COVERS[-1]:g}"
+        over = (
+            f"stretch {_MAP_STRETCHES[0]:g} to {_MAP_STRETCHES[-1]:g}, "
+            f"cover {_MAP_COVERS[0]:g} to {_MAP_COVERS[-1]:g}"
         )
         return [
             Measurement(
-                quantity=f"{FORMS[0]}, {over}: fastest growth where the material is stable",
-                value=fastest,
-                unit="1/transit",
+                f"{TOTAL}, {over}: fastest growth where the material is stable",
+                float(total.rates[elliptic].max()) * spacings,
+                "1/transit",
                 reference=0.0,
                 source="constant operators: s^2 = -P'(stretch) |g(k)|^2 / rho",
                 verdict="stable" if stable else "unstable",
@@ -319,50 +249,79 @@ class TensileInstability(Case):
                 paper="the configuration should be totally stable",
             ),
             Measurement(
-                quantity=f"{UPDATED}, cover {self.cover:g}: stretch from which a transit is an "
-                "e-folding",
-                value=begins,
-                unit="1",
+                f"{UPDATED}, cover {self.cover:g}: stretch from which a transit is an e-folding",
+                begins,
+                "1",
                 verdict="unstable in tension" if begins > 1.0 else "no such stretch up to 2",
                 passed=begins > 1.0,
                 paper="adjacent particles move out of phase with each other",
             ),
             *(
                 Measurement(
-                    quantity=f"{UPDATED}: unstable part of the map in {name}",
-                    value=float(updated.grows[where].mean()),
-                    unit="1",
+                    f"{UPDATED}: unstable part of the map in {name}",
+                    float(updated.grows[where].mean()),
+                    "1",
                     verdict="where particles still have neighbours",
                 )
                 for name, where in (("tension", tension), ("compression", squeezed))
             ),
         ]
 
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Picture]:
+        """The perturbed bar, how its particles move in both forms, and the map."""
+        forms = {form: records[form] for form in FORMS}
+        title = (
+            "Small deviations from a uniform stretch of an endless bar, "
+            f"Poisson's ratio {self.poissons_ratio:g}: where they grow"
+        )
+        cover = (self.cover, "cover of Figs. 13 and 14")
+        return {
+            "fig-12-configuration": configuration(forms[TOTAL], self.stretch, self.perturbation),
+            "fig-13-14-tensile-instability": motions(
+                forms, self.stretch, self.perturbation, self.transit
+            ),
+            "fig-13-14-stability-map": GrowthMaps(self.maps(), title, cover),
+        }
+
+    def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
+        X, start = along(records[TOTAL]), displacements(records[TOTAL])[0]
+        curves: dict[str, Curves] = {
+            "fig-12-configuration": {
+                "X [mm]": 1e3 * X,
+                "uniform displacement [mm]": 1e3 * (self.stretch - 1.0) * X,
+                "displacement at the start [mm]": 1e3 * start,
+            }
+        }
+        for figure, form in zip(("fig-13", "fig-14"), FORMS, strict=True):
+            u = 1e3 * displacements(records[form])
+            curves[f"{figure}-{form}"] = {
+                "time [transits]": records[form].times / self.transit,
+                **{f"u at X = {1e3 * x:g} mm [mm]": u[:, k] for k, x in enumerate(X)},
+            }
+        maps = self.maps()
+        updated = maps[UPDATED]
+        covers, stretches = np.meshgrid(updated.covers, updated.stretches, indexing="ij")
+        table = {"cover [spacings]": covers.ravel(), "stretch [1]": stretches.ravel()}
+        for form, found in maps.items():
+            table[f"{form}: growth rate [1/transit of a spacing]"] = found.rates.ravel()
+        connected = updated.connected.ravel().astype(np.float64)
+        table[f"{UPDATED}: has neighbours [1]"] = connected
+        return {**curves, "fig-13-14-stability-map": table}
+
 
 def _rate_name(form: str, stretch: float) -> str:
     return f"{form}-rate-{stretch:g}"
 
 
-def _bar_positions(record: Record) -> Array:
-    """Current positions of the bar's particles at every time, left to right, (t, n)."""
-    particles = record.particles
-    real = np.flatnonzero(~particles.ghosts)
-    order = real[np.argsort(particles.positions[real, 0])]
-    positions: Array = record.positions[:][:, order, 0]
-    return positions
-
-
-def displacements(record: Record) -> tuple[Array, Array]:
-    """X (n,) and the displacements u (t, n) of the bar's particles, left to right [m]."""
-    particles = record.particles
-    X = np.sort(particles.positions[~particles.ghosts, 0])
-    return X, _bar_positions(record) - X
-
-
 def deviation(record: Record, stretch: float) -> Array:
     """Displacement from the uniform stretch at every time [m], left to right, (t, n)."""
-    X, u = displacements(record)
-    return u - (stretch - 1.0) * X
+    return np.asarray(displacements(record) - (stretch - 1.0) * along(record))
+
+
+def spread(record: Record, stretch: float) -> float:
+    """Largest deviation at the end over that at the start [-]."""
+    deviations = np.abs(deviation(record, stretch)).max(axis=1)
+    return float(deviations[-1] / deviations[0])
 
 
 def growth_rate(times: Array, amplitudes: Array, end: float) -> float:
@@ -372,5 +331,5 @@ def growth_rate(times: Array, amplitudes: Array, end: float) -> float:
     chosen = np.zeros(len(amplitudes), dtype=np.bool_)
     chosen[:last] = amplitudes[:last] > _LAST_DECADES * amplitudes[:last].max()
     if chosen.sum() < 3:  # gone past the end between two outputs: the rate cannot be told
-        return float("nan")
+        return nan
     return float(np.polyfit(times[chosen], np.log(amplitudes[chosen]), 1)[0])

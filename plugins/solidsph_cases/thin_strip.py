@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, ClassVar, final
+from typing import final
 
 import attrs
 
 from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
-from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Measurement, Trial
-from solidsph_builtin.materials.neo_hookean import NeoHookean
 from solidsph_cases._energy import energy_kept, smallest_volume_ratio
-from solidsph_cases._scheme import check_count, with_scheme
+from solidsph_cases._scheme import SOFT, box, check_count, in_motion, solid
 
-MATERIAL = NeoHookean(youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
 SPACING = 0.05  # [m]
 
 
@@ -26,14 +22,14 @@ SPACING = 0.05  # [m]
 class ThinStrip(Case):
     """The middle of a free strip is pushed aside; nothing else acts on it, and nothing damps it.
 
-    One row of particles has its neighbours in a line, which determine no gradient across: that is
-    to be refused, not guessed.
+    One row of particles has its neighbours in a line, which determine no gradient across: that
+    must be refused, not guessed.
     """
 
-    title: ClassVar[str] = "A strip of few particles across"
-    source: ClassVar[str] = "conservation of energy"
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {"across": (2, 3, 5), "hourglass": (0.1, 0.5)}
-    trials: ClassVar[Mapping[str, Trial]] = {
+    title = "A strip of few particles across"
+    source = "conservation of energy"
+    sweep = {"across": (2, 3, 5), "hourglass": (0.1, 0.5)}
+    trials = {
         "one particle across": Trial(
             {"across": 1}, must_fail="neighbours in a line determine no gradient across it"
         ),
@@ -48,7 +44,7 @@ class ThinStrip(Case):
     kernel: str = "cubic-spline"
     cover: float = number(default=2.2)  # [spacings]
     gradient: str = "quadratic"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
     time_step_factor: float = number(default=0.3)  # of the CFL step
@@ -63,32 +59,12 @@ class ThinStrip(Case):
         return 1.0 / self.across
 
     def scenes(self) -> Mapping[str, Scene]:
-        c, length = MATERIAL.wave_speed, SPACING * self.along
+        c, length = SOFT.wave_speed, SPACING * self.along
         bump = f"exp(-(X - {0.5 * length!r})**2/{(0.15 * length) ** 2!r})"
-        builder = (
-            Simulation.builder()
-            .title(self.title)
-            .body(
-                "strip",
-                shape={"type": "box", "lengths": [length, SPACING * self.across]},
-                spacing=SPACING,
-            )
-            .material(
-                "neo-hookean",
-                youngs_modulus=MATERIAL.youngs_modulus,
-                poissons_ratio=MATERIAL.poissons_ratio,
-                density=MATERIAL.density,
-            )
-            .initial(velocity={"y": f"{self.speed * c!r}*{bump}"})
-            .integrator(self.integrator, time_step_factor=self.time_step_factor)
-            .duration(self.transits * length / c)
-            .outputs(200)
-        )
-        return {"strip": with_scheme(builder, self).scene()}
+        builder = solid(self.title, "strip", box(length, SPACING * self.across), SPACING, SOFT)
+        builder = builder.initial(velocity={"y": f"{self.speed * c!r}*{bump}"})
+        return {"strip": in_motion(builder, self, self.transits * length / c, 200).scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["strip"]
         return [energy_kept(record, self.energy_tolerance), smallest_volume_ratio(record)]
-
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        return []

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import ceil, pi
-from pathlib import Path
-from typing import Any, ClassVar, final
+from typing import Any, final
 
 import attrs
 import numpy as np
 
 from solidsph.maths.arrays import Array
-from solidsph.registry.parameters import check_positive, number
+from solidsph.registry.parameters import number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
-from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Curves, Measurement, Trial
-from solidsph_cases._compare import FINISHED
+from solidsph_builtin.materials.neo_hookean import NeoHookean
+from solidsph_cases._compare import finished, vanishing
 from solidsph_cases._energy import energy_kept, smallest_volume_ratio
-from solidsph_cases._scheme import check_count, with_scheme
+from solidsph_cases._scheme import FITTED, box, check_all_positive, check_count, in_motion, solid
+from solidsph_cases.drawing.fields import scatter
+from solidsph_cases.drawing.sheet import Bar, Panel, Sheet, line, mark, zero
 
 SIDE, HEIGHT = 1.0, 6.0  # [m]
-DENSITY, YOUNGS_MODULUS = 1100.0, 17e6  # [kg/m^3], [Pa]
 
 # At 400 rad/s corners are faster than waves: the law stiffens so much that the step must be a
 # tenth, and so twisted a column writhes, so that its axis need not stay.
@@ -40,13 +40,10 @@ class TwistingColumn(Case):
     the axis of the column stays where it is, which no scheme knows beforehand.
     """
 
-    title: ClassVar[str] = "A twisting column"
-    source: ClassVar[str] = "Lee, Gil & Bonet (2013): E 17 MPa, rho 1100, nu 0.45 and 0.495"
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
-        "across": (4, 6, 8),
-        "gradient": ("quadratic", "corrected"),
-    }
-    trials: ClassVar[Mapping[str, Trial]] = {
+    title = "A twisting column"
+    source = "Lee, Gil & Bonet (2013): E 17 MPa, rho 1100, nu 0.45 and 0.495"
+    sweep = {"across": (4, 6, 8), "gradient": ("quadratic", "corrected")}
+    trials = {
         **{
             f"{rate:g} rad/s, nu {nu:g}": Trial(
                 {"rate": rate, "poissons_ratio": nu}, {"across": 4, "duration": 0.05}
@@ -72,7 +69,7 @@ class TwistingColumn(Case):
     kernel: str = "cubic-spline"
     cover: float = number(default=2.2)  # [spacings]
     gradient: str = "quadratic"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 names none
+    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
     time_step_factor: float = number(default=0.3)  # of the CFL step
@@ -81,73 +78,40 @@ class TwistingColumn(Case):
 
     def __attrs_post_init__(self) -> None:
         check_count("twisting-column", "across", self.across, 3)
-        check_positive("twisting-column", "duration", self.duration, "s")
-        check_positive("twisting-column", "rate", self.rate, "rad/s")
+        check_all_positive("twisting-column", self, duration="s", rate="rad/s")
 
     def scenes(self) -> Mapping[str, Scene]:
         profile = f"{self.rate!r}*sin({0.5 * pi / HEIGHT!r}*Z)"
+        shape = box(SIDE, SIDE, HEIGHT, origin=[-0.5 * SIDE, -0.5 * SIDE, 0.0])
+        rubber = NeoHookean(17e6, self.poissons_ratio, 1100.0)
+        spacing = SIDE / (self.across - 1)
         builder = (
-            Simulation.builder()
-            .title(self.title)
-            .body(
-                "column",
-                shape={
-                    "type": "box",
-                    "lengths": [SIDE, SIDE, HEIGHT],
-                    "origin": [-0.5 * SIDE, -0.5 * SIDE, 0.0],
-                },
-                spacing=SIDE / (self.across - 1),
-                discretisation={
-                    "type": "fitted-moments",
-                    "of": {"type": "lattice", "on_boundary": True},
-                },
-            )
-            .material(
-                "neo-hookean",
-                youngs_modulus=YOUNGS_MODULUS,
-                poissons_ratio=self.poissons_ratio,
-                density=DENSITY,
-            )
+            solid(self.title, "column", shape, spacing, rubber, discretisation=FITTED)
             .boundary("clamp", where="front")
             .initial(velocity={"x": f"-{profile}*Y", "y": f"{profile}*X"})
-            .integrator(self.integrator, time_step_factor=self.time_step_factor)
-            .duration(self.duration)
-            .outputs(ceil(400.0 * self.duration))
         )
-        return {"column": with_scheme(builder, self).scene()}
+        outputs = ceil(400.0 * self.duration)
+        return {"column": in_motion(builder, self, self.duration, outputs).scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["column"]
-        done = record.outcome == FINISHED
-        sway = float(self.sway(record).max() / SIDE)
-        angles = self.angles(record)
-        return [
-            energy_kept(record, self.energy_tolerance),
-            Measurement(
-                quantity="largest sway of the axis over the side",
-                value=sway,
-                unit="1",
-                reference=0.0,
-                source="symmetry",
-                error=sway,
-                passed=done and sway <= self.axis_tolerance,
-            ),
-            smallest_volume_ratio(record),
-            Measurement(
-                quantity="largest twist of the top",
-                value=float(np.degrees(angles.max())),
-                unit="degrees",
-                source=_SOURCE,
-                passed=done,
-            ),
-        ]
-
-    def sway(self, record: Record) -> Array:
-        """Distance of the centre of mass from the axis at every time, (t,) [m]."""
+        # Distance of the centre of mass from the axis.
         masses = record.particles.volumes / record.particles.volumes.sum()
         centre = np.einsum("n,tni->ti", masses, record.positions[:])
-        sway: Array = np.hypot(centre[:, 0], centre[:, 1])
-        return sway
+        sway = float(np.hypot(centre[:, 0], centre[:, 1]).max() / SIDE)
+        quantity = "largest sway of the axis over the side"
+        return [
+            energy_kept(record, self.energy_tolerance),
+            vanishing(record, quantity, sway, self.axis_tolerance, "symmetry"),
+            smallest_volume_ratio(record),
+            Measurement(
+                "largest twist of the top",
+                float(np.degrees(self.angles(record).max())),
+                "degrees",
+                source=_SOURCE,
+                passed=finished(record),
+            ),
+        ]
 
     def angles(self, record: Record) -> Array:
         """Twist of the top about the axis at every time, (t,) [rad]."""
@@ -158,21 +122,41 @@ class TwistingColumn(Case):
         x = record.positions[:][:, top]
         start = np.arctan2(X[top, 1], X[top, 0])
         turned = np.unwrap(np.arctan2(x[..., 1], x[..., 0]) - start, axis=0)
-        angles: Array = turned.mean(axis=1)
-        return angles
+        return np.asarray(turned.mean(axis=1))
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._column_picture import draw_column
-
-        path = folder / "twisting-column.png"
-        draw_column(records["column"], self.angles(records["column"]), self.title, path)
-        return [path]
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """Particles of the surface, coloured by speed, at four times, and the twist of the top."""
+        record = records["column"]
+        times, X = record.times, record.particles.positions[:, :2]
+        edge = np.any(np.isclose(X, X.min(axis=0)) | np.isclose(X, X.max(axis=0)), axis=1)
+        shown = np.linspace(0, len(times) - 1, 5).astype(int)[1:]
+        speeds = np.linalg.norm(record.field("velocity")[:], axis=2)
+        colours = {"vmin": 0.0, "vmax": float(speeds[shown].max()), "depthshade": False}
+        frames = [
+            Panel(
+                scatter(record.positions[k][edge], speeds[k][edge], "viridis", s=10, **colours),
+                mark("set_box_aspect", (1.0, 1.0, 4.0)),
+                title=f"t = {times[k]:.3g} s",
+                projection="3d",
+                x="x [m]",
+                y="y [m]",
+                zlabel="z [m]",
+                xlim=(-1.0, 1.0),
+                ylim=(-1.0, 1.0),
+                zlim=(0.0, 8.0),
+                xticks=[-1, 1],
+                yticks=[-1, 1],
+            )
+            for k in shown
+        ]
+        degrees = np.degrees(self.angles(record))
+        history = Panel(line(times, degrees), zero(), x="time [s]", y="twist of the top [degrees]")
+        title = f"{self.title}: {record.particles.count} particles"
+        bars = [Bar("speed [m/s]", frames[-1:], {"shrink": 0.5})]
+        sheet = Sheet([[*frames, history, history]], (13.0, 6.5), title, bars=bars)
+        return {"twisting-column": sheet}
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         record = records["column"]
-        return {
-            "twisting-column": {
-                "time [s]": record.times,
-                "twist of the top [rad]": self.angles(record),
-            }
-        }
+        table = {"time [s]": record.times, "twist of the top [rad]": self.angles(record)}
+        return {"twisting-column": table}

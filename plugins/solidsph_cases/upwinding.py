@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import pi
-from pathlib import Path
-from typing import Any, ClassVar, final
+from typing import final
 
 import attrs
 import numpy as np
@@ -18,7 +17,8 @@ from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Curves, Measurement
 from solidsph.studies.spectrum import spectrum
-from solidsph_cases._scheme import check_count
+from solidsph_cases._scheme import ON_BOUNDARY, check_count
+from solidsph_cases.drawing.sheet import Mark, Panel, Sheet, line, mark
 
 # A growth by less than this in the time of a wave across a spacing is rounding of the spectrum.
 _NO_GROWTH = 1e-4
@@ -46,13 +46,10 @@ class Upwinding(Case):
     symmetric gradient does not see.
     """
 
-    title: ClassVar[str] = "Upwinding by a kernel that is not symmetric"
-    source: ClassVar[str] = "Ismail & Reddy, section 6; the spectrum of the discrete bar"
-    figures: ClassVar[tuple[str, ...]] = ("section-6-upwinding",)
-    sweep: ClassVar[Mapping[str, Sequence[Any]]] = {
-        "particles": (30, 60, 120),
-        "cover": (2.5, 3.5, 5.5),
-    }
+    title = "Upwinding by a kernel that is not symmetric"
+    source = "Ismail & Reddy, section 6; the spectrum of the discrete bar"
+    figures = ("section-6-upwinding",)
+    sweep = {"particles": (30, 60, 120), "cover": (2.5, 3.5, 5.5)}
 
     skews: Sequence[float] = (0.0, 0.25, 0.5, 0.75)
     particles: int = 60
@@ -81,42 +78,41 @@ class Upwinding(Case):
         return {}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
-        found = {name: self._modes(name) for name in ("variational", "plain")}
-        most = max(self.skews)
+        growths, alternating = (values.tolist() for values in self._modes("variational"))
+        plain = dict(zip(self.skews, self._modes("plain")[0].tolist(), strict=True))
         measured = []
-        variational = (values.tolist() for values in found["variational"])
-        for skew, growth, own in zip(self.skews, *variational, strict=True):
+        for skew, growth, seen in zip(self.skews, growths, alternating, strict=True):
+            name = f"variational divergence, skew {skew:g}"
+            blind = seen < _BLIND * _ALTERNATING
             measured += [
                 Measurement(
-                    quantity=f"variational divergence, skew {skew:g}: fastest growth",
-                    value=growth,
-                    unit="c/spacing",
+                    f"{name}: fastest growth",
+                    growth,
+                    "c/spacing",
                     reference=0.0,
                     source="the forces derive from an energy: nothing grows, and nothing decays",
                     verdict="no energy lost or won",
                     passed=abs(growth) < _NO_GROWTH,
-                    paper=_SECTION if skew == most else "",
+                    paper=_SECTION if skew == max(self.skews) else "",
                 ),
                 Measurement(
-                    quantity=f"variational divergence, skew {skew:g}: alternating motion",
-                    value=own,
-                    unit="c/spacing",
+                    f"{name}: alternating motion",
+                    seen,
+                    "c/spacing",
                     reference=_ALTERNATING,
                     source="a wave of two spacings",
-                    error=abs(own / _ALTERNATING - 1.0),
-                    verdict="not seen" if own < _BLIND * _ALTERNATING else "seen",
-                    passed=(own < _BLIND * _ALTERNATING) == (skew == 0.0),
+                    error=abs(seen / _ALTERNATING - 1.0),
+                    verdict="not seen" if blind else "seen",
+                    passed=blind == (skew == 0.0),
                 ),
             ]
-        growths = dict(zip(self.skews, found["plain"][0].tolist(), strict=True))
-        for skew, growth in growths.items():
-            grows = growth > max(_NO_GROWTH, _BY_SKEW * growths[0.0])
+        for skew, growth in plain.items():
+            grows = growth > max(_NO_GROWTH, _BY_SKEW * plain[0.0])
             measured.append(
                 Measurement(
-                    quantity=f"plain divergence, skew {skew:g}: fastest growth",
-                    value=growth,
-                    unit="c/spacing",
-                    reference=None,
+                    f"plain divergence, skew {skew:g}: fastest growth",
+                    growth,
+                    "c/spacing",
                     source=_SECTION,
                     verdict="waves against the axis grow" if grows else "no more than at a surface",
                     passed=grows == (skew != 0.0),
@@ -124,12 +120,38 @@ class Upwinding(Case):
             )
         return measured
 
-    def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        from solidsph_cases._upwinding_picture import draw_modes
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
+        """The growth and the frequency of the alternating motion over the skew."""
+        table = self.curves(records)["upwinding"]
+        skew = table["skew [-]"]
 
-        path = folder / "section-6-upwinding.png"
-        draw_modes(self.curves(records)["upwinding"], _ALTERNATING, self.title, path)
-        return [path]
+        def curves(quantity: str) -> list[Mark]:
+            styles = {"variational": ("o-", "black"), "plain": ("s--", "0.5")}
+            return [
+                line(
+                    *(skew, table[f"{quantity}, {name} [c/spacing]"], style),
+                    color=color,
+                    label=f"{name} divergence",
+                )
+                for name, (style, color) in styles.items()
+            ]
+
+        wave = {"color": "0.7", "linewidth": 3.0, "zorder": 0, "label": "a wave of two spacings"}
+        growth = Panel(
+            *curves("growth"),
+            x="skew of the kernel [-]",
+            y="fastest growth [wave speed / spacing]",
+            legend={},
+        )
+        seen = Panel(
+            *curves("alternating motion"),
+            mark("axhline", _ALTERNATING, **wave),
+            x="skew of the kernel [-]",
+            y="alternating motion: frequency\n[wave speed / spacing]",
+            ylim=(0.0, None),
+            legend={},
+        )
+        return {"section-6-upwinding": Sheet([[growth, seen]], (11.0, 4.2), self.title)}
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:
         variational, plain = self._modes("variational"), self._modes("plain")
@@ -163,7 +185,7 @@ class Upwinding(Case):
                 "bar",
                 shape={"type": "interval", "length": 1.0},
                 spacing=1.0 / (self.particles - 1),
-                discretisation={"type": "lattice", "on_boundary": True},
+                discretisation=ON_BOUNDARY,
             )
             .kernel(self.kernel, cover=self.cover)
             .material("neo-hookean", youngs_modulus=1.0, poissons_ratio=0.0, density=1.0)

@@ -13,14 +13,9 @@ from solidsph.registry import registry
 from solidsph.studies.case_run import run_case
 from solidsph_cases import _boundary_ways as ways
 from solidsph_cases import boundary_values
-from solidsph_cases._line import Line, complete_line
-from solidsph_cases.boundary_values import (
-    BoundaryValues,
-    block_condition,
-    largest_error,
-    smoothed,
-)
-from solidsph_cases.interpolation import F
+from solidsph_cases._boundary_ways import block_condition, largest_error, smoothed
+from solidsph_cases._line import F, Line, complete_line
+from solidsph_cases.boundary_values import BoundaryValues
 
 MOLLIFIER = "modified-mollifier"
 CELLS = 12  # a coarse line, whose ends do not see each other at any of these covers

@@ -15,10 +15,10 @@ from solidsph.registry import registry
 from solidsph.registry.construct import construct
 from solidsph.studies.case_run import run_case
 from solidsph_cases import _error_law, falling_edge, interpolation
-from solidsph_cases._line import bare_line, complete_line, irregular_line, whole_line
+from solidsph_cases._line import F, bare_line, complete_line, irregular_line, whole_line
 from solidsph_cases._moments import of_continuum
 from solidsph_cases.falling_edge import FallingEdge, edge, slope_error
-from solidsph_cases.interpolation import F, Interpolation, approximated
+from solidsph_cases.interpolation import Interpolation, approximated
 from solidsph_cases.kernel_profiles import KernelProfiles
 
 MOLLIFIER = "modified-mollifier"

@@ -15,7 +15,7 @@ from solidsph.studies.case import Measurement
 from solidsph.studies.case_run import CaseResult, run_case
 from solidsph_cases._bar import LENGTH, first_rise
 from solidsph_cases._bar_histories import Histories
-from solidsph_cases._bar_waves import FREE, HELD, BarWaves, Pulse, Smooth, Square
+from solidsph_cases._bar_waves import FREE, HELD, BarWaves, Pulse, smooth_pulse, square_pulse
 from solidsph_cases.wave_bar import PAPER, READINGS, STRAIN, WaveBar
 
 PULSE = 10e-6  # [s]
@@ -32,7 +32,7 @@ def waves(pulse: Pulse, left: float = FREE) -> BarWaves:
 @pytest.mark.parametrize("left", [FREE, HELD])
 def test_the_solution_keeps_momentum_and_compatibility(left: float) -> None:
     """rho v_t = T_X and T_t = rho c^2 v_X, by differences, through reflections at both ends."""
-    exact = waves(Smooth(PULSE), left)
+    exact = waves(smooth_pulse(PULSE), left)
     X, t = np.linspace(0.01, 0.14, 60), np.linspace(1e-6, 150e-6, 240)[:, None]
     step = 1e-8  # s
 
@@ -51,7 +51,7 @@ def test_the_solution_keeps_momentum_and_compatibility(left: float) -> None:
 
 def test_the_ends_do_what_they_are_told() -> None:
     t = np.linspace(0.0, 200e-6, 4001)
-    pulse = Smooth(PULSE)
+    pulse = smooth_pulse(PULSE)
     for left in (FREE, HELD):
         at_wall = waves(pulse, left).velocity(np.array(LENGTH), t)
         assert np.abs(at_wall).max() < 1e-12  # m/s; the pulse moves at 2e-3
@@ -64,7 +64,7 @@ def test_the_ends_do_what_they_are_told() -> None:
 def test_the_wall_doubles_and_a_free_end_turns_the_sign() -> None:
     transit = LENGTH / C
     middle = 0.5 * PULSE
-    for pulse in (Smooth(PULSE), Square(PULSE)):
+    for pulse in (smooth_pulse(PULSE), square_pulse(PULSE)):
         free, held = waves(pulse), waves(pulse, HELD)
         for exact in (free, held):
             wall = exact.stress(np.array(LENGTH), np.array(transit + middle))
@@ -76,7 +76,7 @@ def test_the_wall_doubles_and_a_free_end_turns_the_sign() -> None:
 
 @pytest.mark.parametrize("left", [FREE, HELD])
 def test_energy_is_what_the_end_supplied(left: float) -> None:
-    exact = waves(Smooth(PULSE), left)
+    exact = waves(smooth_pulse(PULSE), left)
     X = np.linspace(0.0, LENGTH, 6001)
     supplied = 100e3**2 / (RHO * C) * PULSE * 3.0 / 8.0  # the mean of sin^4
     for time in (15e-6, 40e-6, 65e-6, 100e-6):
@@ -86,7 +86,7 @@ def test_energy_is_what_the_end_supplied(left: float) -> None:
         assert energy == pytest.approx(supplied, rel=1e-6)
 
 
-@pytest.mark.parametrize("pulse", [Smooth(PULSE), Square(PULSE)])
+@pytest.mark.parametrize("pulse", [smooth_pulse(PULSE), square_pulse(PULSE)])
 def test_formulas_of_scenes_are_the_pulse_and_its_integral(pulse: Pulse) -> None:
     t = np.linspace(0.0, 3.0 * PULSE, 3001) + 1e-9
     shape = Expression.parse(pulse.formula, ("t",))({"t": t})

@@ -56,6 +56,15 @@ def test_listing_plugins_imports_none_of_them() -> None:
     assert not {name for name in loaded if name.startswith("solidsph_builtin")}
 
 
+def test_loading_cases_loads_no_matplotlib() -> None:
+    loaded = modules_after(
+        "from solidsph.registry import registry\n"
+        "assert [registry.load('cases', name) for name in registry.names('cases')]"
+    )
+    assert "solidsph_cases.drawing.sheet" in loaded
+    assert not {name for name in loaded if name.startswith("matplotlib")}
+
+
 def test_installed_entry_points_are_those_of_pyproject() -> None:
     """An edited entry point has no effect until the package is installed again."""
     declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]

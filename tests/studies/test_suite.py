@@ -138,6 +138,8 @@ def test_the_command(tmp_path: Path) -> None:
     assert brief.returncode == 0, brief.stdout
     assert "as expected, including the trials that must fail" in brief.stdout
     assert (tmp_path / "results/stability/suite.png").exists()
+    mirrored = json.loads(solidsph("stability", "inside-out", "--json", cwd=tmp_path).stdout)
+    assert "turned inside out" in mirrored["trials"][0]["reason"]
     updated = ("--formulation", "updated-lagrangian", "--brief", "--json")
     surprised = solidsph("stability", "stretched-bar", *updated, cwd=tmp_path)
     assert surprised.returncode == 1

@@ -202,3 +202,8 @@ def particles_first(values: Tensor, count: int) -> Array:
         for j in range(d):
             out[:, i, j] = values[i][j]
     return out
+
+
+def largest_principal(stress: Array) -> Array:
+    """Largest principal value of symmetric stresses (n, d, d), in the plane if d = 2, (n,)."""
+    return np.asarray(np.linalg.eigvalsh(stress)[:, -1], dtype=np.float64)

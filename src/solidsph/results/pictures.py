@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from solidsph.maths.arrays import Array
+from solidsph.maths.tensors import largest_principal
 from solidsph.results.record import Record
 
 _STRESS = "cauchy_stress"
@@ -31,11 +32,6 @@ def draw(record: Record, folder: Path, stem: str, field: str = _STRESS) -> Seque
         _draw_bodies(record, field, motion)
     _draw_energies(record.times, record.history, energy)
     return [motion, energy]
-
-
-def largest_principal(stress: Array) -> Array:
-    """Largest principal value of symmetric stresses (n, d, d), in the plane if d = 2, (n,)."""
-    return np.asarray(np.linalg.eigvalsh(stress)[:, -1], dtype=np.float64)
 
 
 def _magnitudes(values: Array) -> Array:

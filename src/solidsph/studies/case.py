@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, Protocol, TypeAlias
 
 import attrs
 
@@ -16,6 +16,13 @@ from solidsph.scene.scene import Scene
 
 Curves: TypeAlias = Mapping[str, Array]
 """Columns of a table, each (k,), by headings "quantity [unit]"."""
+
+
+class Picture(Protocol):
+    """A picture that is drawn when it is saved."""
+
+    def save(self, path: Path) -> Path:
+        """Draw it into a file; returns the path."""
 
 
 @attrs.frozen
@@ -73,9 +80,15 @@ class Case(ABC):
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         """Compare the records of those scenes with the reference."""
 
-    @abstractmethod
+    def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Picture]:
+        """The pictures of those records by file name, without its ending."""
+        return {}
+
     def draw(self, records: Mapping[str, Record], folder: Path) -> Sequence[Path]:
-        """Write the pictures into `folder` and return their paths."""
+        """Write the case's pictures into `folder`; returns their paths."""
+        return [
+            picture.save(folder / f"{name}.png") for name, picture in self.pictures(records).items()
+        ]
 
     def priced(self) -> Case:
         """Case to run in a cost sweep: itself, or the part of it that matters there."""
