@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import attrs
 import numpy as np
 
-from solidsph.errors import PartWarning
+from solidsph.errors import PartWarning, PortableError
 
 
 @attrs.frozen
@@ -38,11 +38,11 @@ class Verdict:
     checked: bool = True
 
 
-class Broken(Exception):  # noqa: N818 (an outcome of a check, no error)
+class Broken(PortableError):  # noqa: N818 (an outcome of a check, no error)
     """Ends a check: the promise is broken, as the message says."""
 
 
-class NotPromised(Exception):  # noqa: N818 (an outcome of a check, no error)
+class NotPromised(PortableError):  # noqa: N818 (an outcome of a check, no error)
     """Ends a check: the part declares that it does not promise this, as the message says."""
 
 
