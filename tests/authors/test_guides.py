@@ -159,7 +159,7 @@ def test_a_body_at_rest_turns_backwards_in_a_turning_frame(guide) -> None:
 
 def test_two_bodies_on_a_tether_swing_about_each_other(guide) -> None:
     """Each moves as a rigid body: d(t) = d(0) cos(w t), w^2 = k (1 / m + 1 / M)."""
-    guide("first-effect")
+    guide("first-general-effect")
     k, time = 2e4, 0.05
     simulation = (
         bar(5)
