@@ -92,6 +92,7 @@ def foreign(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Callable[[str, str, str, str], None]]:
     """Installs distributions of one module each, into folders of their own on the path."""
+    installed: list[str] = []
 
     def install(distribution: str, module: str, source: str, points: str) -> None:
         folder = tmp_path / distribution
@@ -103,8 +104,8 @@ def foreign(
         )
         (info / "entry_points.txt").write_text(textwrap.dedent(points))
         monkeypatch.syspath_prepend(str(folder))
+        installed.append(module)
 
     yield install
-    for name in list(sys.modules):
-        if name.startswith("foreign_"):
-            del sys.modules[name]
+    for name in installed:
+        sys.modules.pop(name, None)

@@ -29,9 +29,10 @@ from solidsph.interfaces.integrator import Integrator, PointwiseIntegrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.law import Law, memory_name
 from solidsph.interfaces.material import Material
-from solidsph.interfaces.plan import BodySize, Compilation, Operations, Plan
+from solidsph.interfaces.plan import BodySize, Compilation, Operations, Piece, Plan, Way
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel, smoothing_kernel
+from solidsph.interfaces.subset import Subset
 from solidsph.interfaces.terms import (
     Constraint,
     EnergyTerm,
@@ -73,8 +74,11 @@ from solidsph.model.regions import AXES, EVERYWHERE, Where
 from solidsph.registry.construct import construct
 from solidsph.registry.parameters import check_positive, number, optional_number
 from solidsph.results.record import Record
+from solidsph.run.built_scene import BuiltScene
+from solidsph.run.hooks import implementation as hookimpl
 from solidsph.run.stable_step import lattice_frequency
 from solidsph.scene.scene import Scene
+from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.studies.case import Case, Curves, Measurement, Trial
 from solidsph.system.encoding import decoded
 from solidsph.system.files import content, located
@@ -87,6 +91,7 @@ __all__ = [
     "BodySize",
     "BoundaryHandler",
     "BuildError",
+    "BuiltScene",
     "Case",
     "Compilation",
     "Component",
@@ -125,6 +130,7 @@ __all__ = [
     "PairTable",
     "Pairs",
     "Particles",
+    "Piece",
     "Plan",
     "PluginError",
     "PointwiseDivergence",
@@ -135,6 +141,7 @@ __all__ = [
     "Response",
     "Scalar",
     "Scene",
+    "SceneBuilder",
     "SceneError",
     "ScheduledConstraint",
     "ScheduledLoad",
@@ -144,6 +151,7 @@ __all__ = [
     "StepError",
     "StressFields",
     "StressTerm",
+    "Subset",
     "Surface",
     "SurfaceLoad",
     "Tensor",
@@ -152,6 +160,7 @@ __all__ = [
     "Trial",
     "Vector",
     "VectorField",
+    "Way",
     "Where",
     "add",
     "cauchy_stress",
@@ -165,6 +174,7 @@ __all__ = [
     "determinant",
     "dot",
     "green_lagrange",
+    "hookimpl",
     "identity",
     "inverse",
     "inverse_transpose",

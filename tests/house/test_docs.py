@@ -6,6 +6,8 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
+
 from solidsph import Scene, Simulation, solve
 from solidsph.registry import registry
 
@@ -93,3 +95,40 @@ def test_every_warning_is_listed() -> None:
 
     text = (ROOT / "docs/scenes.md").read_text()
     assert [name for name in ADVICE if f"`{name}`" not in text] == []
+
+
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs/decisions").glob("*.md")),
+]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text(encoding="utf-8"))
+    files = [one for one in targets if "://" not in one]
+    assert [one for one in files if not (page.parent / one).exists()] == []
+
+
+def test_every_page_is_in_the_index() -> None:
+    text = (ROOT / "docs/index.md").read_text(encoding="utf-8")
+    pages = [str(path.relative_to(ROOT / "docs")) for path in PAGES[2:] if path.stem != "index"]
+    assert [name for name in pages if f"({name})" not in text] == []
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        "CONTRIBUTING.md",
+        "docs/authors.md",
+        *sorted(f"docs/decisions/{p.name}" for p in PAGES if p.parent.name == "decisions"),
+    ],
+)
+def test_files_that_a_page_names_are_there(page: str) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    named = re.findall(r"`((?:src|plugins|tests|docs|benchmarks)/[\w/.-]+)`", text)
+    # A word in capitals stands for any name.
+    files = [one for one in named if not re.search(r"/[A-Z]+", one)]
+    assert [one for one in files if not (ROOT / one).exists()] == []

@@ -35,6 +35,5 @@ def test_the_scene_names_what_it_shows_and_runs(name: str) -> None:
 
 
 def test_every_effect_has_its_section() -> None:
-    # Those that have pages of their own, or need no more than their row.
-    elsewhere = {"hourglass-control", "artificial-viscosity", "body-force", "mass-damping"}
+    elsewhere = {"hourglass-control"}  # which has a page of its own
     assert set(registry.names("effects")) - elsewhere <= set(SECTIONS)

@@ -1,4 +1,4 @@
-"""A third party's pair term in one module: compiled into the loop, priced, put to sleep."""
+"""The pair term of docs/first-pair-term.md: compiled into the loop, priced, put to sleep."""
 
 from __future__ import annotations
 
@@ -8,72 +8,19 @@ import pytest
 from solidsph.costs.counted import counted
 from solidsph.engines.compiled.loop import CompiledLoop
 from solidsph.interfaces.plan import Way
-from solidsph.registry.construct import construct
 from solidsph.run.step_by_step import StepByStep
 from solidsph.scene.scene_builder import SceneBuilder
-from solidsph.testing import conformance
+from tests.helpers.guides import Guide
 from tests.helpers.scenes import box
-
-EFFECT = """
-    from math import sqrt
-    import attrs
-    import numpy as np
-    from solidsph.interfaces.compilable_terms import PairLoad, PairTable
-    from solidsph.interfaces.effect import Effect
-
-    @attrs.frozen
-    class Springs(Effect):
-        # A spring of stiffness k between any two neighbours of a body.
-
-        conserves_momentum = True
-        k: float = 10.0  # [N/m]
-
-        def bind(self, model, label):
-            tables = []
-            for body in model.bodies:
-                pairs = body.pairs()
-                real = ~body.particles.ghosts
-                acts = (pairs.distances > 0.0) & real[pairs.rows] & real[pairs.columns]
-                counts = np.bincount(pairs.rows[acts], minlength=body.particles.count)
-                columns = pairs.columns[acts] + body.extent.start
-                tables.append((counts, columns, pairs.distances[acts]))
-            counts, columns, lengths = (np.concatenate(one) for one in zip(*tables))
-            table = PairTable(
-                starts=np.concatenate([[0], np.cumsum(counts)]),
-                columns=columns.astype(np.int32),
-                values=np.column_stack([np.full(len(columns), self.k), lengths]),
-            )
-            # Gershgorin: twice the sum of a particle's springs over its mass.
-            real = model.masses > 0.0
-            most = (counts[real] / model.masses[real]).max()
-            return Bound(label, table, sqrt(2.0 * self.k * most))
-
-    @attrs.frozen(eq=False)
-    class Bound(PairLoad):
-        label: str
-        pairs: PairTable
-        stiffness_rate: float
-
-        @staticmethod
-        def pull(offset, velocity, values):
-            square = 0.0
-            for x in offset:
-                square = square + x * x
-            return values[0] * (1.0 - values[1] / np.sqrt(square))
-
-        def report(self, observation):
-            return {}
-"""
 
 
 @pytest.fixture
 def springs(foreign) -> None:
-    points = "[solidsph.effects]\nsprings = foreign_springs:Springs"
-    foreign("foreign-springs", "foreign_springs", EFFECT, points)
+    Guide.read("first-pair-term").install(foreign)
 
 
 def moving(cells: int = 6) -> SceneBuilder:
-    return box(2, cells).effect("springs", k=50.0).initial(velocity={"x": "Y", "y": "X*Y"})
+    return box(2, cells).effect("springs", stiffness=50.0).initial(velocity={"x": "Y", "y": "X*Y"})
 
 
 def test_whole_steps_are_compiled_with_it(springs: None) -> None:
@@ -102,8 +49,3 @@ def test_it_sleeps(springs: None) -> None:
     plain = builder.build().run().state
     asleep = builder.sleep(slabs=4).build().run().state
     assert np.abs(asleep.positions - plain.positions).max() < 1e-9
-
-
-def test_it_passes_the_kit(springs: None) -> None:
-    results = conformance("effects", construct("effects", "springs"))
-    assert [one for one in results if not one.passed] == []

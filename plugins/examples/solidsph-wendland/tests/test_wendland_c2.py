@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from solidsph_wendland import WendlandC2
 
-from solidsph.registry.construct import construct
+from solidsph.parts import construct
 from solidsph.testing import MASS_TOLERANCE, Check, checks, smoothed_mass
 from solidsph.testing.strategies import dimensions, support_radii
 

@@ -7,8 +7,7 @@ from typing import ClassVar, final
 
 import attrs
 
-from solidsph import Kernel
-from solidsph.maths.arrays import Scalar
+from solidsph.parts import Kernel, Scalar
 
 
 @final
