@@ -24,7 +24,7 @@ from table import Table
 
 from solidsph import Simulation, SolidsphError
 from solidsph.commands import prediction as told
-from solidsph.costs.shares import shares
+from solidsph.costs.effect_shares import effect_shares
 from solidsph.registry import registry
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.studies.receipts import measured_shares
@@ -94,7 +94,7 @@ def both(name: str, engine: str) -> dict[str, Any]:
         return {"problem": str(cause).splitlines()[-1].strip()}
     return {
         "particles": simulation.particles.count,
-        "predicted": shares(simulation, told.calibrated())["it"].time,
+        "predicted": effect_shares(simulation, told.calibrated())["it"].time,
         "measured": measured_shares(simulation)["it"],
     }
 

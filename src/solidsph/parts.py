@@ -71,7 +71,7 @@ from solidsph.model.neighbours import Pairs, neighbour_pairs
 from solidsph.model.particles import Face, Particles, State
 from solidsph.model.regions import AXES, EVERYWHERE, Where
 from solidsph.registry.construct import construct
-from solidsph.registry.parameters import check_positive, number, optional_number
+from solidsph.registry.parameters import check_positive, formula, number, optional_number
 from solidsph.results.record import Record
 from solidsph.run.stable_step import lattice_frequency
 from solidsph.scene.scene import Scene
@@ -164,6 +164,7 @@ __all__ = [
     "decoded",
     "determinant",
     "dot",
+    "formula",
     "green_lagrange",
     "identity",
     "inverse",

@@ -47,7 +47,7 @@ class Simulation(BuiltScene):
         Args:
             record: HDF5 file to write; the folder is made if it is missing. A record that is there
                 is replaced when the first output is complete; anything else is left alone.
-            observers: objects with methods of `solidsph.run.hooks.Moments`, heard in this run only.
+            observers: objects with methods of `solidsph.run.hooks.Hooks`, heard in this run only.
             since: what is taken over from an earlier run that `record` holds; `solidsph.resume`
                 finds it.
 

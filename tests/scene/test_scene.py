@@ -116,7 +116,7 @@ def test_a_scene_of_functions_runs_but_has_no_file_form() -> None:
         ("[body.block]", "[body.left]", "names a set of particles already"),
         ("[body.block]", "[body.X]", "is a variable or constant of formulas"),
         ("[body.block]", '[body.""]', "must begin with a letter"),
-        ('where = "left"', 'where = "left"\nlabel = "a\\u0000b"', "cannot be shown"),
+        ('where = "left"', 'where = "left"\nlabel = "a\\u0000b"', "unprintable"),
         ("traction = {x", "traction = {z", "'z' in a 2D scene"),
         ("traction = {x", "traction = {u", "unknown component 'u'"),
         ("min(t/0.005, 1)", "min(t/0.005)", "min takes 2 arguments"),

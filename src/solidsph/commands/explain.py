@@ -14,11 +14,11 @@ from solidsph.commands.console import say, show_json, show_table
 from solidsph.commands.target import parameters, resolve
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.cluster import Cluster
-from solidsph.costs.estimated import estimated
-from solidsph.costs.foreseen import foreseen
-from solidsph.costs.model import Prediction, predicted
+from solidsph.costs.effect_shares import Share, effect_shares
+from solidsph.costs.estimate import estimate_work
+from solidsph.costs.model import Prediction, predict
+from solidsph.costs.prediction import predict_run
 from solidsph.costs.process import machine_memory
-from solidsph.costs.shares import Share, shares
 from solidsph.errors import SceneError
 from solidsph.interfaces.plan import Compilation
 from solidsph.registry import registry
@@ -132,13 +132,13 @@ def _explained(
     if on_paper is not None and on_paper.memory > machine_memory():
         return on_paper, _too_large(scene, on_paper, machine, cluster)
     simulation, build = told.built(scene)
-    found = foreseen(simulation, machine, built=build, compiled=compiled)
+    found = predict_run(simulation, machine, built=build, compiled=compiled)
     return found, {
         "parts": _parts(scene, simulation.parts),
         "numbers": _numbers(simulation),
         "work": told.work_rows(found.work),
         "cost": told.prediction_rows(found),
-        "effects": _effects(simulation.effects, simulation, shares(simulation, machine)),
+        "effects": _effects(simulation.effects, simulation, effect_shares(simulation, machine)),
         "warnings": [
             {"name": a.name, "found": a.found, "expected": a.expected, "remedy": a.remedy}
             for a in advised(simulation)
@@ -152,7 +152,7 @@ def _on_paper(
 ) -> Prediction | None:
     """A first estimate; nothing where a part is wrong or strange, which the build will tell."""
     try:
-        return predicted(estimated(scene), machine, compiled=compiled)
+        return predict(estimate_work(scene), machine, compiled=compiled)
     except Exception:
         return None
 

@@ -12,11 +12,11 @@ import click
 
 from solidsph.costs import calibration
 from solidsph.costs.calibration import Calibration
-from solidsph.costs.cluster import Cluster, ClusterPrice, priced
+from solidsph.costs.cluster import Cluster, ClusterEstimate, estimate_on_cluster
 from solidsph.costs.coefficients import REFERENCE
-from solidsph.costs.foreseen import foreseen
 from solidsph.costs.model import Built, Prediction
-from solidsph.costs.process import company, machine_memory, memory_now, peak_memory
+from solidsph.costs.prediction import predict_run
+from solidsph.costs.process import excess_load, machine_memory, memory_now, peak_memory
 from solidsph.costs.work import Work
 from solidsph.interfaces.plan import Compilation
 from solidsph.scene.scene import Scene
@@ -59,12 +59,12 @@ def of_run(
     The machine is calibrated only where there is something worth predicting.
     """
     try:
-        about = foreseen(simulation, REFERENCE, built=build, compiled=compiled)
-        known = calibration.kept()
+        about = predict_run(simulation, REFERENCE, built=build, compiled=compiled)
+        known = calibration.cached_calibration()
         if known is None and about.run_seconds < _NOT_WORTH_IT:
             return about
         machine = known or calibrated()
-        return foreseen(simulation, machine, built=build, compiled=compiled)
+        return predict_run(simulation, machine, built=build, compiled=compiled)
     except Exception:
         return None
 
@@ -133,15 +133,15 @@ def prediction_rows(prediction: Prediction) -> list[Row]:
 
 def _limited(prediction: Prediction) -> str:
     text = f"limited by: {prediction.limit}"
-    busy = company()
+    busy = excess_load()
     return text if busy < 0.5 else f"{text}; {busy:.1f} other programs want a core: it takes longer"
 
 
 def cluster_rows(
     prediction: Prediction, machine: Calibration, cluster: Cluster
-) -> tuple[ClusterPrice, list[Row]]:
+) -> tuple[ClusterEstimate, list[Row]]:
     """A scene larger than this machine, on paper."""
-    price = priced(prediction, machine, cluster)
+    price = estimate_on_cluster(prediction, machine, cluster)
     a = attrs.asdict(cluster)
     rows: list[tuple[str, Any, str]] = [
         ("memory [GiB]", prediction.memory / 2**30, "MORE THAN THIS MACHINE HAS"),

@@ -149,9 +149,9 @@ def _make_way(path: Path, *, overwrite: bool) -> None:
 
 
 def _checked(scene: Scene) -> None:
-    from solidsph.costs.fits import check_fits
+    from solidsph.costs.memory_check import check_memory
 
-    check_fits(scene)
+    check_memory(scene)
 
 
 def _unchecked(scene: Scene) -> None:

@@ -17,7 +17,7 @@ from solidsph.interfaces.terms import (
 from solidsph.maths.arrays import Array
 from solidsph.results.layout import field_name, static_fields, tag_name
 from solidsph.run.energy import BY_BODY, ledger
-from solidsph.scene import returned_values
+from solidsph.scene.checks.returned import check_report
 
 OWN = {"velocity": "m/s", "cauchy_stress": "Pa", "volume_ratio": "-"}
 """Fields of every record, and their units."""
@@ -35,7 +35,7 @@ def history(
     columns = dict(ledger(observation, initial, conditions))
     for condition in conditions:
         reported = condition.report(observation)
-        wrong = returned_values.columns(condition.label, reported)
+        wrong = check_report(condition.label, reported)
         if wrong:
             raise PluginError(f"{wrong}. This is a fault of the part with that label")
         for name, value in reported.items():

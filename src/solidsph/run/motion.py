@@ -9,7 +9,7 @@ from solidsph.errors import PluginError, SolidsphError, UnsoundError
 from solidsph.interfaces.time_loop import StepError, TimeLoop
 from solidsph.registry.origin import culprit
 from solidsph.run.built_scene import BuiltScene
-from solidsph.run.hooks import heard_by
+from solidsph.run.hooks import failed_plugin
 from solidsph.run.outcome import Result
 from solidsph.run.restart_point import RestartPoint
 from solidsph.run.session import session
@@ -36,7 +36,7 @@ def run_motion(
 
     Args:
         simulation: what to run.
-        listeners: objects with methods of `solidsph.run.hooks.Moments`, heard in this run only.
+        listeners: objects with methods of `solidsph.run.hooks.Hooks`, heard in this run only.
         since: what is taken over from an earlier run.
         judge: called at the end of the duration; it raises UnsoundError if the run is wrong.
 
@@ -86,7 +86,7 @@ def run_motion(
     except (SolidsphError, OSError, MemoryError, Warning):
         raise
     except Exception as cause:
-        who = culprit(cause, simulation.parts) or heard_by(cause, simulation.manager)
+        who = culprit(cause, simulation.parts) or failed_plugin(cause, simulation.manager)
         if not who:
             raise
         raise PluginError(

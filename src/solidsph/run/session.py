@@ -19,7 +19,7 @@ def session(simulation: BuiltScene, listeners: Sequence[object]) -> Iterator[Non
 
     Args:
         simulation: what is run.
-        listeners: objects with methods of `solidsph.run.hooks.Moments`, heard in this session only.
+        listeners: objects with methods of `solidsph.run.hooks.Hooks`, heard in this session only.
     """
     manager, hook = simulation.manager, simulation.manager.hook
     outcome = "stopped"
