@@ -207,8 +207,8 @@ def test_an_energy_that_is_not_the_forces_own_is_told_of(kind: type[Load]) -> No
     [
         (Moves, "read-only"),
         (Complex, "complex128; real numbers are expected"),
-        (OtherName, "remembers 'time'"),
-        (OtherNameLater, "remembers 'time'"),
+        (OtherName, "stores 'time'"),
+        (OtherNameLater, "stores 'time'"),
     ],
 )
 def test_what_would_go_wrong_in_the_run_is_refused(kind: type[Load], told: str) -> None:

@@ -350,9 +350,11 @@ def test_the_cover_of_a_scene_is_found_once_whatever_its_bodies(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked: list[float] = []
-    held = solidsph.scene.default_cover.held
+    ratio = solidsph.scene.default_cover.wave_number_ratio
     monkeypatch.setattr(
-        solidsph.scene.default_cover, "held", lambda *one: asked.append(one[2]) or held(*one)
+        solidsph.scene.default_cover,
+        "wave_number_ratio",
+        lambda *one: asked.append(one[2]) or ratio(*one),
     )
 
     def times(bodies: int) -> int:
@@ -408,7 +410,7 @@ def test_a_scene_that_needs_more_memory_than_is_free_is_refused(
     with pytest.raises(SceneError) as caught:
         memory_check.check_memory(large(0.004))
     # (1 / 0.004)^3 = 1.56e7 particles; 1 GiB is free.
-    for expected in ("1.56e+07 particles", "has 1 GiB free", "a spacing", "--beyond-memory"):
+    for expected in ("1.56e+07 particles", "only 1 GiB are free", "the spacing", "--beyond-memory"):
         assert expected in str(caught.value)
     memory_check.check_memory(large(0.05))  # 8000 particles fit
     monkeypatch.setattr(memory_check, "available_memory", lambda: 2**50)

@@ -611,5 +611,5 @@ def test_a_unit_load_on_steel_is_in_equilibrium(material: str, traction: float) 
 
 
 def test_a_load_that_positions_cannot_hold_is_told() -> None:
-    with pytest.raises(ConvergenceError, match="less than positions can hold"):
+    with pytest.raises(ConvergenceError, match="less than the rounding error of positions"):
         equilibrium(steel(1e-6))

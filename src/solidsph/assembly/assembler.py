@@ -105,16 +105,17 @@ class Assembler:
         ):
             for label, part in several.items():
                 terms += self._problems.attempt(bind, kind, part, model, label) or []
-        self._placed.stop_if_any()
         return terms
 
     def _start_and_steps(self, model: DiscreteModel, terms: Sequence[Term]) -> tuple[State, int]:
-        """Initial state and number of steps, once the terms are known to fit each other."""
+        """Initial state and number of steps, after checks that the terms fit each other."""
         scene, problems = self._scene, self._problems
         integrator = problems.settled(self._parts.integrator)
         formulation = problems.settled(self._parts.formulation)
         loads = _loads(terms)
+        # A term that could not be bound would only reduce the stable step.
         step = problems.attempt(step_size, scene, integrator, loads, model.bodies)
+        self._placed.stop_if_any()
         constraints = _constraints(terms, model.particles)
         problems.add(check_constraints(constraints, model.particles))
         problems.add(check_loads(loads, model.particles, formulation))

@@ -46,7 +46,7 @@ class SchemeOptions:
             SceneError: there is no such scene, case or part.
         """
         from solidsph.registry.construct import describe
-        from solidsph.scene.default_cover import own_cover
+        from solidsph.scene.default_cover import kernel_cover
         from solidsph.scene.scene import Scene
         from solidsph.studies.scheme import Scheme
         from solidsph.testing import example_part
@@ -61,7 +61,7 @@ class SchemeOptions:
         changes: dict[str, Any] = {}
         if self.kernel is not None:
             changes["kernel"] = example_part("kernels", self.kernel)
-            changes["cover"] = own_cover(changes["kernel"])
+            changes["cover"] = kernel_cover(changes["kernel"])
         if self.cover is not None:
             changes["cover"] = self.cover
         if self.material is not None:

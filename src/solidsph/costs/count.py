@@ -67,11 +67,7 @@ def record_bytes(particles: int, dimension: int, outputs: int, fields: int = 0) 
 
 
 def _static_work(simulation: Simulation, wanted: StaticsScene) -> StaticWork:
-    particles, bodies = simulation.particles, simulation.model.bodies
-    d = particles.dimension
-    held = np.zeros(particles.positions.shape, dtype=np.bool_)
-    for motion in simulation.dynamics.constraints:
-        held |= motion.held
+    bodies, d = simulation.model.bodies, simulation.particles.dimension
     linear = all(not body.material.objective for body in bodies)
     factors = [
         estimate_factorisation(
@@ -82,7 +78,7 @@ def _static_work(simulation: Simulation, wanted: StaticsScene) -> StaticWork:
     return StaticWork(
         load_steps=wanted.load_steps,
         iterations=wanted.load_steps * (1 if linear else ITERATIONS),
-        freedoms=int((~held & ~particles.ghosts[:, None]).sum()),
+        freedoms=int(simulation.dynamics.free.sum()),
         entries=sum(_coupled(body) for body in bodies) * d * d,
         fill=sum(part.fill for part in factors),
         multiplications=sum(part.multiplications for part in factors),

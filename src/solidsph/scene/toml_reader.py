@@ -136,7 +136,7 @@ def _scene(table: Mapping[str, Any], problems: Problems) -> tuple[dict[str, Any]
     values |= _fields(SceneData, simple, "", problems)
     for key, kind in (("sleep", SleepScene), ("statics", StaticsScene)):
         if key in table:
-            values[key] = problems.attempt(_parameters, table[key], key, kind, problems)
+            values[key] = problems.attempt(_simple, table[key], key, kind, problems)
     for key, nested in _NESTED.items():
         part = table.get(key)
         if isinstance(part, Mapping):
@@ -165,7 +165,7 @@ def _fields(
 
 def _body(name: str, body: Any, problems: Problems) -> BodyScene | None:
     what = f"body.{name}"
-    fields = [field.name for field in attrs.fields(BodyScene)]
+    fields = _names_of(BodyScene)
     known = _check_keys(_mapping(body, what), fields, what, problems)
     for key, unit in (("shape", "a shape"), ("spacing", "metres")):
         if key not in known and not _is_mistyped(body, key, fields):
@@ -192,16 +192,18 @@ def _imposed(entry: Any, what: str, problems: Problems) -> ImposedScene:
     return ImposedScene(part, label)
 
 
-def _initial(entry: Any, what: str, problems: Problems) -> InitialScene:
-    fields = [field.name for field in attrs.fields(InitialScene)]
-    return InitialScene(**_check_keys(_mapping(entry, what), fields, what, problems))
+def _initial(entry: Any, what: str, problems: Problems) -> Any:
+    return _simple(entry, what, InitialScene, problems)
 
 
-def _parameters(entry: Any, what: str, kind: type[Any], problems: Problems) -> Any:
-    """Table [sleep] or [statics]."""
-    fields = [field.name for field in attrs.fields(kind)]
-    known = _check_keys(_mapping(entry, what), fields, what, problems)
+def _simple(entry: Any, what: str, kind: type[Any], problems: Problems) -> Any:
+    """An object of class `kind` from a table of its fields."""
+    known = _check_keys(_mapping(entry, what), _names_of(kind), what, problems)
     return kind(**_fields(kind, known, f"{what}.", problems))
+
+
+def _names_of(kind: type[Any]) -> list[str]:
+    return [field.name for field in attrs.fields(kind)]
 
 
 def _number(value: Any, what: str) -> float:

@@ -81,7 +81,7 @@ class Watchdog:
         self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
     ) -> None:
         if _ACCOUNTS in kept:
-            self._accounts = Accounts.taken(kept[_ACCOUNTS])
+            self._accounts = Accounts.from_array(kept[_ACCOUNTS])
         else:  # nobody watched until here
             self._accounts.add(observation)
         self.good, self._is_clean = Good(observation.state, kept), True
@@ -117,7 +117,7 @@ class Watchdog:
 
     @implementation
     def solidsph_keep(self, simulation: BuiltScene, kept: dict[str, Array]) -> None:
-        kept[_ACCOUNTS] = self._accounts.kept()
+        kept[_ACCOUNTS] = self._accounts.to_array()
 
     @implementation
     def solidsph_failure(self, simulation: BuiltScene, state: State, error: DivergedError) -> None:
