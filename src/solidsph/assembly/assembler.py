@@ -19,7 +19,6 @@ from solidsph.assembly.initial_state import initial_state, reference_observation
 from solidsph.assembly.step_size import step_size
 from solidsph.engines.history import HistoryFields, modified
 from solidsph.interfaces.discrete_model import DiscreteModel
-from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.terms import Constraint, Load, StressTerm, Term
 from solidsph.model.particles import Particles, State
@@ -64,13 +63,25 @@ class Assembler:
         model = self._model()
         terms = self._terms(model)
         initial, steps = self._start_and_steps(model, terms)
-        internal = self._internal_forces(model, terms, steps)
+        dynamics = self._dynamics(model, terms, steps)
         histories = [b for b in model.bodies if isinstance(b.material, HistoryMaterial)]
         if histories:
             terms.append(HistoryFields(histories, model.particles.count))
         self._problems.add(clashes(reference_observation(initial, model, terms), terms))
         self._problems.stop_if_any()
-        built = self._built(kind, model, terms, internal, initial, steps)
+        built = kind(
+            scene=self._scene,
+            model=model,
+            dynamics=dynamics,
+            terms=tuple(terms),
+            effects=self._parts.effects,
+            integrator=self._problems.settled(self._parts.integrator),
+            engine=self._problems.settled(self._parts.engine),
+            initial=initial,
+            steps=steps,
+            parts=tuple(self._placed.used),
+            manager=self._manager,
+        )
         self._check_built(built)
         return built
 
@@ -126,46 +137,23 @@ class Assembler:
         steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
         return problems.settled(initial), steps
 
-    def _internal_forces(
-        self, model: DiscreteModel, terms: Sequence[Term], steps: int
-    ) -> InternalForces:
+    def _dynamics(self, model: DiscreteModel, terms: Sequence[Term], steps: int) -> Dynamics:
+        """Equation of motion, with the internal forces that the engine prepares."""
         problems, stresses = self._problems, _stresses(terms)
         engine = problems.settled(self._parts.engine)
         # Equilibria are found with assembled matrices: there is nothing to compile for.
         evaluations = steps if self._scene.statics is None else 1
         internal = problems.attempt(engine.prepare, model.bodies, stresses, evaluations)
-        internal = problems.settled(internal)
-        return problems.settled(problems.attempt(modified, internal, model.bodies, terms, stresses))
-
-    def _built(
-        self,
-        kind: type[S],
-        model: DiscreteModel,
-        terms: Sequence[Term],
-        internal: InternalForces,
-        initial: State,
-        steps: int,
-    ) -> S:
-        dynamics = Dynamics(
+        internal = problems.attempt(
+            modified, problems.settled(internal), model.bodies, terms, stresses
+        )
+        return Dynamics(
             particles=model.particles,
             masses=model.masses,
-            internal=internal,
+            internal=problems.settled(internal),
             constraints=_constraints(terms, model.particles),
             loads=_loads(terms),
             step_size=self._scene.duration / steps,
-        )
-        return kind(
-            scene=self._scene,
-            model=model,
-            dynamics=dynamics,
-            terms=tuple(terms),
-            effects=self._parts.effects,
-            integrator=self._problems.settled(self._parts.integrator),
-            engine=self._problems.settled(self._parts.engine),
-            initial=initial,
-            steps=steps,
-            parts=tuple(self._placed.used),
-            manager=self._manager,
         )
 
     def _check_built(self, built: BuiltScene) -> None:

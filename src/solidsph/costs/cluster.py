@@ -63,9 +63,9 @@ def estimate_on_cluster(
     nodes = min(_MOST_NODES, max(1, ceil(each * n / room)))
     while nodes < _MOST_NODES and each * _with_halo(n / nodes, nodes, work.cover, d) > room:
         nodes += max(1, nodes // 100)
-    own = n / nodes
-    share = _with_halo(own, nodes, work.cover, d) / n
-    halo = share * n - own
+    local = n / nodes
+    share = _with_halo(local, nodes, work.cover, d) / n
+    halo = share * n - local
     by_cores = step_seconds(work, machine, threads=1) * share / (cluster.cores * cluster.efficiency)
     by_memory = work.touched * share / (1e9 * cluster.bandwidth)
     computing = max(by_cores, by_memory)
@@ -87,8 +87,8 @@ def estimate_on_cluster(
     )
 
 
-def _with_halo(own: float, nodes: int, reach: float, d: int) -> float:
-    """Particles of a cube of `own` particles with its halo; a single node has no halo."""
+def _with_halo(local: float, nodes: int, reach: float, d: int) -> float:
+    """Particles of a cube of `local` particles with its halo; a single node has no halo."""
     if nodes == 1:
-        return own
-    return float((own ** (1.0 / d) + 2.0 * reach) ** d)
+        return local
+    return float((local ** (1.0 / d) + 2.0 * reach) ** d)

@@ -57,10 +57,12 @@ class _BodyTangent:
         ghosts = self.body.particles.ghosts
         if not self.body.material.objective:  # linear forces have no geometric stiffness
             return np.zeros((n, d, d))
-        material, one = self.body.material, np.eye(d)
-        before = np.where(ghosts[:, None, None], one, self.deformation_gradients(displacements))
-        after = np.where(ghosts[:, None, None], one, self.deformation_gradients(placed))
-        dF = self.deformation_gradients(change) - one
+        material, identity = self.body.material, np.eye(d)
+        before = np.where(
+            ghosts[:, None, None], identity, self.deformation_gradients(displacements)
+        )
+        after = np.where(ghosts[:, None, None], identity, self.deformation_gradients(placed))
+        dF = self.deformation_gradients(change) - identity
         dP = particles_first(
             material.tangent(components_first(before), components_first(dF), material.params), n
         )

@@ -50,19 +50,13 @@ def check_particles(discretisation: object, particles: Any, dimension: int) -> I
 
 def check_material(material: Material) -> Iterator[str]:
     """Yield problems unless density and wave speed are positive."""
-    for name in ("density", "wave_speed"):
-        value = getattr(material, name)
-        if not _is_number(value) or not value > 0.0:
-            who = described(entry_of("materials", material))
-            yield f"{who}: {name} is {value!r}; a positive number is expected"
+    yield from _check_positive("materials", material, "density")
+    yield from _check_positive("materials", material, "wave_speed")
 
 
 def check_integrator(integrator: Integrator) -> Iterator[str]:
     """Yield a problem unless the stability limit is positive."""
-    value: Any = getattr(integrator, "stability_limit", None)
-    if not _is_number(value) or not value > 0.0:
-        who = described(entry_of("integrators", integrator))
-        yield f"{who}: stability_limit is {value!r}; a positive number is expected"
+    yield from _check_positive("integrators", integrator, "stability_limit")
 
 
 def check_bound(kind: str, label: str, part: object, bound: Any) -> Iterator[str]:
@@ -133,6 +127,13 @@ def check_report(label: str, columns: Any) -> str:
         if not isfinite(value):
             return f"{label!r}: `report` has {name!r}: {value!r}, which is not finite"
     return ""
+
+
+def _check_positive(kind: str, part: object, name: str) -> Iterator[str]:
+    value: Any = getattr(part, name, None)
+    if not _is_number(value) or not value > 0.0:
+        who = described(entry_of(kind, part))
+        yield f"{who}: {name} is {value!r}; a positive number is expected"
 
 
 def _is_number(value: Any, *, finite: bool = True) -> bool:
