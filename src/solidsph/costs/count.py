@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from solidsph.costs.factorisation import estimate_factorisation
 from solidsph.costs.work import Loop, StaticWork, Work
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.terms import FieldTerm
-from solidsph.maths.arrays import Array
 from solidsph.scene.default_cover import cover_of
 from solidsph.scene.scene_data import StaticsScene
 from solidsph.simulation import Simulation
@@ -101,7 +101,7 @@ def _cells(body: Body) -> tuple[float, ...]:
     return full_box(np.ptp(positions, axis=0) / _spacing(body) + 1.0, len(positions))
 
 
-def full_box(sides: Array, particles: float) -> tuple[float, ...]:
+def full_box(sides: NDArray[np.float64], particles: float) -> tuple[float, ...]:
     """Particles along each axis of a box of `particles` with the proportions of `sides` (d,)."""
     share = min(1.0, particles / float(np.prod(sides)))
     return tuple(float(side) * share ** (1.0 / len(sides)) for side in sides)
