@@ -128,7 +128,7 @@ def test_an_exact_dirichlet_condition_is_met_in_equilibrium() -> None:
 
 def test_the_updated_form_is_refused() -> None:
     simulation = box(2).formulation("updated-lagrangian", gradient="difference").build()
-    with pytest.raises(SolidsphError, match="take 'total-lagrangian'"):
+    with pytest.raises(SolidsphError, match="use 'total-lagrangian'"):
         tangent(simulation, np.zeros_like(simulation.particles.positions))
 
 
