@@ -554,7 +554,8 @@ def test_the_critical_step_parts_bounded_from_unbounded(d: int) -> None:
 
     def largest_velocity(part: float) -> float:
         count = 400
-        fixed = attrs.evolve(simulation, step_size=part * limit.step, steps=count)
+        dynamics = attrs.evolve(simulation.dynamics, step_size=part * limit.step)
+        fixed = attrs.evolve(simulation, dynamics=dynamics, steps=count)
         state = fixed.start()
         for _ in range(count):
             state = fixed.integrator.advance(state, fixed.dynamics, fixed.step_size)

@@ -153,14 +153,11 @@ def _fields(
 ) -> dict[str, Any]:
     """Values of `table` that are fields of `kind`, each read by the type of its field."""
     types = get_type_hints(kind)
-    values = {}
-    for key, value in table.items():
-        if key in types:
-            read = _READERS.get(types[key])
-            value = problems.attempt(read, value, f"{prefix}{key}") if read else value
-            if value is not None:
-                values[key] = value
-    return values
+    values = {
+        key: problems.attempt(_READERS.get(types[key], _unchecked), value, f"{prefix}{key}")
+        for key, value in table.items()
+    }
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def _body(name: str, body: Any, problems: Problems) -> BodyScene | None:
@@ -233,6 +230,10 @@ def _names(value: Any, what: str) -> tuple[str, ...]:
 def _text(value: Any, what: str) -> str:
     if not isinstance(value, str):
         raise SceneError(f"{what} must be text, got {value!r}")
+    return value
+
+
+def _unchecked(value: Any, what: str) -> Any:
     return value
 
 
