@@ -39,7 +39,7 @@ class ParticleSetNames:
             return "names a set of particles already; choose another"
         if similar:
             return (
-                f"cannot be distinguished from {similar!r} in a condition, where both are written "
+                f"is the same as {similar!r} in a condition, where both are written "
                 f"{variable(name)!r}; choose another"
             )
         return ""
