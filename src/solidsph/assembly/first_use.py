@@ -59,7 +59,7 @@ def check_first_use(simulation: BuiltScene, parts: Sequence[tuple[str, Any]]) ->
 def _problems(simulation: BuiltScene, parts: Sequence[tuple[str, Any]]) -> list[str]:
     # Wrong shapes must not pass by broadcasting.
     modules = {type(part).__module__ for kind, part in parts if kind in ("effects", "boundaries")}
-    wrong = force_problems(simulation, modules)
+    wrong = _force_problems(simulation, modules)
     if wrong:
         raise BuildError(wrong)
     problems: list[str] = []
@@ -75,7 +75,7 @@ def _problems(simulation: BuiltScene, parts: Sequence[tuple[str, Any]]) -> list[
     return problems
 
 
-def force_problems(simulation: BuiltScene, modules: set[str]) -> list[str]:
+def _force_problems(simulation: BuiltScene, modules: set[str]) -> list[str]:
     """Problems of the forces of loads whose classes are of `modules`."""
     # Read-only, so that a load that writes to its arguments fails here and not in the motion.
     state, d = read_only(simulation.initial), simulation.particles.dimension
