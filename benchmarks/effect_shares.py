@@ -24,7 +24,7 @@ from table import Table
 
 from solidsph import Simulation, SolidsphError
 from solidsph.commands.prediction import this_machine
-from solidsph.costs.shares import shares
+from solidsph.costs.effect_shares import shares
 from solidsph.registry import registry
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.studies.receipts import measured_shares

@@ -29,10 +29,10 @@ from scipy.optimize import nnls
 
 from solidsph import Simulation
 from solidsph.costs import terms
-from solidsph.costs.calibration import Calibration, calibrated
-from solidsph.costs.counted import counted
+from solidsph.costs.calibration import Calibration, measure_calibration
+from solidsph.costs.count import count_work
 from solidsph.costs.process import memory_now, peak_memory
-from solidsph.costs.terms import CostTerm, Yard
+from solidsph.costs.terms import CostTerm
 from solidsph.costs.work import Work
 from solidsph.scene.scene_builder import SceneBuilder
 
@@ -156,7 +156,7 @@ def measured(specimen: Specimen) -> tuple[Work, dict[str, float]]:
     simulation = specimen.builder().build()
     found = {"build": clock() - begun, "build memory": float(peak_memory() - bare)}
     built, left = peak_memory(), memory_now()
-    work = counted(simulation)
+    work = count_work(simulation)
     with tempfile.TemporaryDirectory() as folder:
         if specimen.statics:
             begun = clock()
@@ -234,7 +234,7 @@ def fitted(rows: Sequence[tuple[Work, dict[str, float]]], units: Calibration) ->
         A, b = np.zeros((len(own), len(names))), np.ones(len(own))
         for k, (row, value) in enumerate(own):
             for term in row:
-                A[k, place[term.name]] += term.count * unit(units, term.yard) / value
+                A[k, place[term.name]] += term.count * term.unit.size(units) / value
         # Columns of very different size: scaled to their largest, and back.
         scale = np.maximum(A.max(axis=0), 1e-300)
         solution, _ = nnls(A / scale, b)
@@ -250,14 +250,9 @@ def fitted(rows: Sequence[tuple[Work, dict[str, float]]], units: Calibration) ->
 
 
 def _median_calibration(count: int = 7) -> dict[str, Any]:
-    """The middle of several, yardstick by yardstick."""
-    several = [attrs.asdict(calibrated()) for _ in range(count)]
+    """The median of several calibrations, unit by unit."""
+    several = [attrs.asdict(measure_calibration()) for _ in range(count)]
     return {name: median(one[name] for one in several) for name in several[0]}
-
-
-def unit(units: Calibration, yard: Yard) -> float:
-    """What a term is counted in, [s] or [bytes]."""
-    return 1.0 if yard is Yard.BYTES else float(getattr(units, yard.value))
 
 
 def _number(value: float) -> str:

@@ -27,8 +27,8 @@ from table import Table
 
 from solidsph import Scene, Simulation
 from solidsph.commands.prediction import build_timed, this_machine
-from solidsph.costs.counted import counted
-from solidsph.costs.model import predicted
+from solidsph.costs.count import count_work
+from solidsph.costs.model import predict
 from solidsph.costs.process import peak_memory
 from solidsph.scene.scene_builder import SceneBuilder
 
@@ -106,12 +106,12 @@ SCENES: Mapping[str, Callable[[], SceneBuilder]] = {
 }
 
 
-def predict(file: Path) -> dict[str, Any]:
+def predicted(file: Path) -> dict[str, Any]:
     """What `solidsph explain` expects, by the clock on the wall and by that of the processor."""
     begun = time.process_time()
     simulation, build = build_timed(Scene.read(file))
     spent = time.process_time() - begun
-    found = predicted(counted(simulation), this_machine(), built=build)
+    found = predict(count_work(simulation), this_machine(), built=build)
     return {
         "seconds": found.seconds,
         "processor": found.run_seconds + spent,
@@ -171,7 +171,7 @@ def main() -> None:
     options = parser.parse_args()
     if options.predict or options.measure:
         file = options.predict or options.measure
-        found = predict(file) if options.predict else measure(file, file.with_suffix(".h5"))
+        found = predicted(file) if options.predict else measure(file, file.with_suffix(".h5"))
         print(json.dumps(found))
         return
     if options.threads:

@@ -72,7 +72,7 @@ from solidsph.model.neighbours import Pairs, neighbour_pairs
 from solidsph.model.particles import Face, Particles, State
 from solidsph.model.regions import AXES, EVERYWHERE, Where
 from solidsph.registry.construct import construct
-from solidsph.registry.parameters import check_positive, number, optional_number
+from solidsph.registry.parameters import check_positive, formula, number, optional_number
 from solidsph.results.record import Record
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.hooks import implementation as hookimpl
@@ -173,6 +173,7 @@ __all__ = [
     "decoded",
     "determinant",
     "dot",
+    "formula",
     "green_lagrange",
     "hookimpl",
     "identity",

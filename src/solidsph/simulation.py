@@ -16,7 +16,7 @@ from solidsph.run.built_scene import BuiltScene
 from solidsph.run.motion import run_motion, time_loop
 from solidsph.run.outcome import Result
 from solidsph.run.restart_point import RestartPoint
-from solidsph.run.session import alone
+from solidsph.run.session import exclusive
 from solidsph.scene.scene import Scene
 from solidsph.watch.soundness import Soundness
 
@@ -24,15 +24,15 @@ from solidsph.watch.soundness import Soundness
 @final
 @attrs.frozen(eq=False)
 class Simulation(BuiltScene):
-    """Everything that a run needs. Running does not change it, so it can be run again."""
+    """Everything that a run needs. A run does not change it, so it can be repeated."""
 
     @classmethod
     def builder(cls, scene: Scene | None = None) -> Builder[Simulation]:
-        """A builder, empty or holding a scene."""
+        """Builder of a simulation, empty or with the contents of `scene`."""
         return Builder(cls, scene)
 
     def time_loop(self) -> TimeLoop:
-        """What carries out the steps."""
+        """Loop that computes the steps."""
         return time_loop(self)
 
     def run(
@@ -42,29 +42,28 @@ class Simulation(BuiltScene):
         observers: Sequence[object] = (),
         since: RestartPoint | None = None,
     ) -> Result:
-        """Run the scene: find the equilibrium if it has [statics], follow the motion if not.
+        """Run the scene: find the equilibrium if it has [statics], else follow the motion.
 
         Args:
-            record: HDF5 file to write; the folder is made if it is missing. A record that is there
-                is replaced when the first output is complete; anything else is left alone.
-            observers: objects with methods of `solidsph.run.hooks.Moments`, heard in this run only.
-            since: what is taken over from an earlier run that `record` holds; `solidsph.resume`
-                finds it.
+            record: HDF5 file to write; its folder is created. An existing record is replaced when
+                the first output is complete; other files are never replaced.
+            observers: objects with methods of `solidsph.run.hooks.Hooks`, called in this run only.
+            since: restart point in the earlier run of `record`, from `solidsph.resume`.
 
         Raises:
-            DivergedError: the motion went wrong; what was recorded before stays readable.
-            UnsoundError: it got to its end, but its energies do not add up; all is recorded.
+            DivergedError: the motion diverged; earlier outputs stay readable.
+            UnsoundError: the run is complete and recorded, but its energies do not balance.
             ConvergenceError: no equilibrium was found.
-            BusyError: this simulation is being run already, in another thread.
+            BusyError: this simulation is running already, in another thread.
             RecordError: the record cannot be written, or another run writes it.
         """
         wanted = self.scene.statics
         if wanted is None:
             return self.run_motion(record=record, observers=observers, since=since)
-        from solidsph.statics.run import run_statics  # brings the sparse solvers with it
+        from solidsph.statics.run import run_statics  # imports the sparse solvers
 
-        return self._heard(
-            lambda heard: run_statics(self, wanted, heard, since), record, observers, since
+        return self._run_with(
+            lambda listeners: run_statics(self, wanted, listeners, since), record, observers, since
         )
 
     def run_motion(
@@ -74,31 +73,31 @@ class Simulation(BuiltScene):
         observers: Sequence[object] = (),
         since: RestartPoint | None = None,
     ) -> Result:
-        """Advance from the start to the end of the duration, also a scene that has [statics].
+        """Follow the motion to the end of the duration, even if the scene has [statics].
 
         Arguments and errors are those of `run`.
         """
         soundness = Soundness()
-        return self._heard(
-            lambda heard: run_motion(self, heard, since, judge=soundness.judge),
+        return self._run_with(
+            lambda listeners: run_motion(self, listeners, since, judge=soundness.judge),
             record,
             [soundness, *observers],
             since,
         )
 
-    def _heard(
+    def _run_with(
         self,
         run: Callable[[Sequence[object]], Result],
         record: Path | str | None,
         observers: Sequence[object],
         since: RestartPoint | None,
     ) -> Result:
-        """Run with these observers, and with those that write the record if one is wanted."""
+        """Run with observers, and with those that write the record if there is one."""
         with ExitStack() as stack:
-            stack.enter_context(alone(self))
+            stack.enter_context(exclusive(self))
             if record is None:
                 return run(observers)
-            from solidsph.results.recording import recording  # brings the file library with it
+            from solidsph.results.recording import recording  # imports the file library
 
             path = Path(record)
             checkpointer, recorder = stack.enter_context(recording(path, since))

@@ -198,7 +198,7 @@ def test_honest_effects_are_used_without_a_word(kind: type[Load]) -> None:
 
 @pytest.mark.parametrize("kind", [HalfTheFloor, HalfTheHertzian, Turns, HalfLater])
 def test_an_energy_that_is_not_the_forces_own_is_told_of(kind: type[Load]) -> None:
-    with pytest.warns(PartWarning, match="what it stores changes by"):
+    with pytest.warns(PartWarning, match="the stored energy changes by"):
         scene(kind).build()
 
 
@@ -207,8 +207,8 @@ def test_an_energy_that_is_not_the_forces_own_is_told_of(kind: type[Load]) -> No
     [
         (Moves, "read-only"),
         (Complex, "complex128; real numbers are expected"),
-        (OtherName, "remembers 'time'"),
-        (OtherNameLater, "remembers 'time'"),
+        (OtherName, "stores 'time'"),
+        (OtherNameLater, "stores 'time'"),
     ],
 )
 def test_what_would_go_wrong_in_the_run_is_refused(kind: type[Load], told: str) -> None:

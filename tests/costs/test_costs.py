@@ -16,24 +16,23 @@ import pytest
 
 from solidsph import Simulation
 from solidsph.commands import prediction as predictions
-from solidsph.costs import calibration, yardsticks
-from solidsph.costs import timed as timed_module
+from solidsph.costs import calibration, microbenchmarks, timing
 from solidsph.costs.calibration import Calibration
-from solidsph.costs.cluster import Cluster, priced
+from solidsph.costs.cluster import Cluster, estimate_on_cluster
 from solidsph.costs.coefficients import REFERENCE
-from solidsph.costs.counted import ITERATIONS, counted
-from solidsph.costs.dissection import dissected
-from solidsph.costs.estimated import ball, cut_off, estimated, lattice_neighbours
-from solidsph.costs.foreseen import foreseen
-from solidsph.costs.model import Built, coefficient, predicted
-from solidsph.costs.shares import shares, without
-from solidsph.costs.timed import timed
-from solidsph.costs.work import Loop, Piece
+from solidsph.costs.count import ITERATIONS, count_work
+from solidsph.costs.effect_shares import effect_shares, without
+from solidsph.costs.estimate import ball, cut_off, estimate_work, lattice_neighbours
+from solidsph.costs.factorisation import estimate_factorisation
+from solidsph.costs.model import Built, coefficient, predict
+from solidsph.costs.prediction import predict_run
+from solidsph.costs.timing import time_uncounted
+from solidsph.costs.work import Loop
 from solidsph.errors import SceneError
 from solidsph.interfaces.effect import Effect
-from solidsph.interfaces.plan import Way
+from solidsph.interfaces.plan import Piece, Way
 from solidsph.interfaces.terms import Load
-from solidsph.run.stable_step import largest_step
+from solidsph.run.stable_step import stable_step
 from tests.commands.test_cli import solidsph
 from tests.helpers.scenes import SCENE_TOML, SOFT
 from tests.helpers.waiting import HANG
@@ -71,7 +70,7 @@ def block(cells: int, d: int, cover: float = 2.6, **body):
 
 def test_a_bar_is_counted_as_by_hand() -> None:
     simulation = bar().build()
-    work = counted(simulation)
+    work = count_work(simulation)
     (part,) = work.operations
     assert (work.particles, work.pairs, work.visited) == (10, PAIRS, PAIRS)
     assert work.evaluations == simulation.steps + 1  # one a step, and one at the start
@@ -88,7 +87,7 @@ def test_a_bar_is_counted_as_by_hand() -> None:
 
 
 def test_moving_neighbours_are_counted_at_the_start() -> None:
-    (part,) = counted(bar(formulation="updated-lagrangian").build()).operations
+    (part,) = count_work(bar(formulation="updated-lagrangian").build()).operations
     assert (part.way, part.pairs) == (Way.PRODUCTS_ANEW, PAIRS)
     assert part.held == 10 * 8  # the sums of the kernel; all else is formed anew
 
@@ -96,7 +95,7 @@ def test_moving_neighbours_are_counted_at_the_start() -> None:
 @pytest.mark.parametrize(("engine", "bytes_each"), [("compiled", 8), ("compiled-float32", 4)])
 def test_the_compiled_engine_visits_the_same_pairs(engine: str, bytes_each: int) -> None:
     simulation = bar(engine).build()
-    work = counted(simulation)
+    work = count_work(simulation)
     stencils, rows = work.operations
     assert (stencils.way, rows.way) == (Way.STENCILS, Way.ROWS)
     assert stencils.pairs + rows.pairs == work.pairs == PAIRS
@@ -111,15 +110,15 @@ def test_the_compiled_engine_visits_the_same_pairs(engine: str, bytes_each: int)
 def test_effects_add_the_pairs_that_they_visit() -> None:
     plain, viscous = bar().build(), bar().effect("artificial-viscosity").build()
     # Each pair but the ten of a particle with itself.
-    assert counted(viscous).visited == counted(plain).visited + PAIRS - 10
-    held = counted(bar().effect("hourglass-control").build())
+    assert count_work(viscous).visited == count_work(plain).visited + PAIRS - 10
+    held = count_work(bar().effect("hourglass-control").build())
     assert held.visited > 3 * PAIRS  # the gradient's twice, and the nearest between
     assert held.operations[-1].way is Way.HOURGLASS_PRODUCTS
 
 
 def test_counts_are_the_same_every_time(tmp_path: Path) -> None:
     def twice(builder):
-        return counted(builder().build()), counted(builder().build())
+        return count_work(builder().build()), count_work(builder().build())
 
     for builder in (bar, lambda: block(8, 3).effect("hourglass-control")):
         first, second = twice(builder)
@@ -135,16 +134,16 @@ def test_counts_are_the_same_every_time(tmp_path: Path) -> None:
 
 def test_a_statics_scene_counts_iterations_and_what_its_factors_take() -> None:
     simulation = block(10, 2).boundary("clamp", where="left").statics(load_steps=2).build()
-    statics = counted(simulation).statics
+    statics = count_work(simulation).statics
     assert statics is not None
     assert statics.freedoms == 2 * 90  # a hundred particles, ten of them clamped
     assert statics.iterations == 2 * ITERATIONS
     linear = block(10, 2).material("linear-elastic", **SOFT).statics().build()
-    assert counted(linear).statics.iterations == 1  # its forces are linear
+    assert count_work(linear).statics.iterations == 1  # its forces are linear
 
 
 def test_what_nothing_separates_is_a_full_block() -> None:
-    full = dissected((4.0, 3.0), reach=4.0, components=2)
+    full = estimate_factorisation((4.0, 3.0), reach=4.0, components=2)
     assert full.fill == (2 * 12) ** 2
     assert full.multiplications == (2 * 12) ** 3 // 3
 
@@ -152,7 +151,7 @@ def test_what_nothing_separates_is_a_full_block() -> None:
 def test_dissection_grows_as_the_theory_says() -> None:
     """n log n entries and n^(3/2) multiplications in the plane, n^(4/3) and n^2 in space."""
     for d, (entries, work) in {2: (1.0, 1.5), 3: (4.0 / 3.0, 2.0)}.items():
-        small, large = (dissected((side,) * d, 1.0, 1) for side in (4096.0, 8192.0))
+        small, large = (estimate_factorisation((side,) * d, 1.0, 1) for side in (4096.0, 8192.0))
         grown = 2.0**d
         # The logarithm is what is left of the plane's entries: 13/12 at these sizes.
         assert large.fill / small.fill == pytest.approx(grown**entries, rel=0.12)
@@ -185,7 +184,7 @@ def test_the_ball_and_what_a_surface_cuts_off() -> None:
 )
 def test_the_estimate_is_near_the_count(d: int, cells: int, discretisation, share: float) -> None:
     builder = block(cells, d, discretisation=discretisation)
-    work, about = counted(builder.build()), estimated(builder.scene())
+    work, about = count_work(builder.build()), estimate_work(builder.scene())
     assert not about.counted
     assert about.particles == pytest.approx(work.particles, rel=0.01)
     assert about.pairs == pytest.approx(work.pairs, rel=share)
@@ -243,9 +242,9 @@ def test_a_billion_particles_are_priced_and_not_built(tmp_path: Path) -> None:
 def test_a_cluster_by_hand() -> None:
     from solidsph import Scene
 
-    work = estimated(Scene.from_toml(BILLION))
-    paper = predicted(work, REFERENCE)
-    price = priced(paper, REFERENCE, Cluster())
+    work = estimate_work(Scene.from_toml(BILLION))
+    paper = predict(work, REFERENCE)
+    price = estimate_on_cluster(paper, REFERENCE, Cluster())
     side = (1e9 / price.nodes) ** (1.0 / 3.0)
     halo = (side + 2.0 * 2.6) ** 3 - side**3
     assert price.halo == pytest.approx(halo, rel=1e-6)
@@ -257,31 +256,31 @@ def test_a_cluster_by_hand() -> None:
     # A cluster of one node of one core has this machine's time, on one thread.
     alone = Cluster(cores=1, efficiency=1.0, memory=1e9, bandwidth=1e9)
     single = attrs.evolve(REFERENCE, threads=1)
-    here = predicted(work, single)
-    there = priced(here, single, alone)
+    here = predict(work, single)
+    there = estimate_on_cluster(here, single, alone)
     assert (there.nodes, there.halo, there.exchanging) == (1, 0, 0.0)
     assert there.computing * work.evaluations == pytest.approx(here.steps)
 
 
 def test_a_faster_machine_is_predicted_to_be_faster() -> None:
-    work = counted(block(10, 2).build())
+    work = count_work(block(10, 2).build())
     double = Calibration(
         **{
             name: value if name in ("threads", "bare") else 0.5 * value
             for name, value in attrs.asdict(REFERENCE).items()
         }
     )
-    slow, fast = predicted(work, REFERENCE), predicted(work, double)
+    slow, fast = predict(work, REFERENCE), predict(work, double)
     assert fast.seconds == pytest.approx(0.5 * slow.seconds)
     assert fast.memory == slow.memory
     assert slow.limit in slow.parts
 
 
 def test_what_was_built_or_compiled_before_is_not_predicted_again() -> None:
-    work = counted(bar("compiled").build())
-    first = predicted(work, REFERENCE)
+    work = count_work(bar("compiled").build())
+    first = predict(work, REFERENCE)
     built = Built(seconds=1.25, peak=10**9, left=10**6)
-    again = predicted(work, REFERENCE, built=built, compiled=work.compilations)
+    again = predict(work, REFERENCE, built=built, compiled=work.compilations)
     assert first.compiling > 0.0 == again.compiling
     assert again.build == 1.25
     assert again.memory == 10**9  # the peak of the build, which the run stays below
@@ -304,8 +303,8 @@ def test_a_calibration_does_little(monkeypatch: pytest.MonkeyPatch) -> None:
         task()
         return 1.0
 
-    monkeypatch.setattr(yardsticks, "best", once)
-    found = yardsticks.measured()
+    monkeypatch.setattr(microbenchmarks, "best", once)
+    found = microbenchmarks.measure()
     # Of a round, since each takes a second here. What is copied is 16 MiB a thread, of four calls.
     assert (found.compiling, found.sparse) == (1.0, 1.0 / 30_000)
     assert (found.copying, found.filing) == (1.0 / 2**24, 1.0 / (2**17 * 24))
@@ -316,7 +315,7 @@ def test_a_calibration_does_little(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_calibration_is_kept(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(calibration, "_LONGEST", HANG)
     found = calibration.this_machine()
-    monkeypatch.setattr(calibration, "calibrated", lambda: pytest.fail("measured again"))
+    monkeypatch.setattr(calibration, "measure_calibration", lambda: pytest.fail("measured again"))
     assert calibration.this_machine() is found  # of the process
     calibration.this_machine.cache_clear()
     assert calibration.this_machine() == found  # of the file
@@ -331,28 +330,28 @@ def test_a_broken_cache_is_ignored(
 ) -> None:
     cache.parent.mkdir(parents=True)
     cache.write_text(broken)
-    assert calibration.kept() is None
-    monkeypatch.setattr(calibration, "calibrated", lambda: REFERENCE)
+    assert calibration.cached_calibration() is None
+    monkeypatch.setattr(calibration, "measure_calibration", lambda: REFERENCE)
     assert calibration.this_machine() is REFERENCE
-    assert calibration.kept() == REFERENCE  # and replaced
+    assert calibration.cached_calibration() == REFERENCE  # and replaced
 
 
 def test_an_old_cache_is_ignored(cache: Path) -> None:
     cache.parent.mkdir(parents=True)
     cache.write_text(REFERENCE.to_json())
-    assert calibration.kept() == REFERENCE
+    assert calibration.cached_calibration() == REFERENCE
     written = cache.stat().st_mtime
     # An hour ahead is the clock of a file server; days ahead are a clock that was put right.
     for later, found in ((3600.0, REFERENCE), (-2 * 86400.0, None), (2 * 86400.0, None)):
         os.utime(cache, (written + later, written + later))
-        assert calibration.kept() == found
+        assert calibration.cached_calibration() == found
 
 
 def test_without_a_place_for_the_cache_nothing_fails(
     cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cache.parent.write_text("a file where the folder would be")
-    monkeypatch.setattr(calibration, "calibrated", lambda: REFERENCE)
+    monkeypatch.setattr(calibration, "measure_calibration", lambda: REFERENCE)
     assert calibration.this_machine() is REFERENCE
 
 
@@ -417,7 +416,7 @@ def test_a_case_is_the_sum_of_its_scenes(tmp_path: Path) -> None:
 
 
 def test_a_prediction_is_never_why_a_run_fails() -> None:
-    assert predictions.predict_run(None, None) is None  # type: ignore[arg-type]
+    assert predictions.try_prediction(None, None) is None  # type: ignore[arg-type]
     assert predictions.comparison(None, 1.0, 1) == {}
 
 
@@ -443,10 +442,10 @@ class _Blowing(Load):
 
 def test_what_is_not_known_is_priced_by_defaults() -> None:
     simulation = bar().effect(Wind()).build()
-    work = counted(simulation)
+    work = count_work(simulation)
     assert work.operations[-1].way is Way.UNKNOWN
     assert work.visited == PAIRS  # it says of no pairs that it visits them
-    prediction = predictions.predict_run(simulation, None)
+    prediction = predictions.try_prediction(simulation, None)
     assert prediction is not None
     assert prediction.steps > 0.0
     assert coefficient("UNKNOWN 2D pair") >= coefficient("PRODUCTS 2D pair") > 0.0
@@ -464,7 +463,7 @@ def test_a_load_in_the_compiled_loop_costs_by_the_particles_that_it_acts_on() ->
         return builder.effect("mass-damping", rate=1.0, where=where, label="drag").build()
 
     everywhere, few = (
-        shares(load_on(where), REFERENCE)["drag"].time for where in ("all", "X < 0.1")
+        effect_shares(load_on(where), REFERENCE)["drag"].time for where in ("all", "X < 0.1")
     )
     # A tenth of the particles: two columns of twenty. Shares are of what differs by themselves.
     assert few / (1.0 - few) == pytest.approx(0.1 * everywhere / (1.0 - everywhere), rel=1e-9)
@@ -473,13 +472,13 @@ def test_a_load_in_the_compiled_loop_costs_by_the_particles_that_it_acts_on() ->
 def test_shares_are_of_what_the_effects_add() -> None:
     builder = bar().effect("artificial-viscosity", label="v").effect("mass-damping", rate=9.0)
     simulation = builder.build()
-    found = shares(simulation, REFERENCE)
+    found = effect_shares(simulation, REFERENCE)
     assert 0.0 < found["mass-damping"].time < found["v"].time < 1.0
     # The stable step is 2 over the sum of frequency and rates, of which damping has 9 1/s.
     viscous = bar().effect("artificial-viscosity").build()
     assert found["mass-damping"].step == pytest.approx(
-        largest_step(simulation.integrator, simulation.effects.values(), simulation.model.bodies)
-        / largest_step(viscous.integrator, viscous.effects.values(), viscous.model.bodies)
+        stable_step(simulation.integrator, simulation.dynamics.loads, simulation.model.bodies)
+        / stable_step(viscous.integrator, viscous.dynamics.loads, viscous.model.bodies)
     )
     assert found["v"].step < 0.9 < found["mass-damping"].step < 1.0
     assert without(simulation, "v").step_size == simulation.step_size
@@ -504,28 +503,29 @@ def heated(conductivity: float | None) -> Simulation:
 
 
 def test_only_what_is_of_no_declared_kind_is_timed(monkeypatch: pytest.MonkeyPatch) -> None:
-    # Of a clock by which whatever is timed takes a second.
-    monkeypatch.setattr(timed_module, "time", SimpleNamespace(perf_counter=count().__next__))
+    # Of a clock by which whatever is time_uncounted takes a second.
+    monkeypatch.setattr(timing, "time", SimpleNamespace(perf_counter=count().__next__))
     plain, hot = heated(None), heated(1.0)
-    assert timed(plain, counted(plain)).loads == {}
-    found = timed(hot, counted(hot))
+    assert time_uncounted(plain, count_work(plain)).loads == {}
+    found = time_uncounted(hot, count_work(hot))
     assert list(found.loads) == ["heat"]
     assert found.seconds == 1.0  # of one evaluation
     assert found.without("heat").seconds == 0.0
-    # What is timed is not counted as well.
-    ways = {part.way for part in found.rest(counted(hot), hot).operations}
-    assert Way.UNKNOWN in {part.way for part in counted(hot).operations}
+    # What is time_uncounted is not counted as well.
+    ways = {part.way for part in found.without_timed(count_work(hot), hot).operations}
+    assert Way.UNKNOWN in {part.way for part in count_work(hot).operations}
     assert not any(
-        p.way is Way.UNKNOWN and p.pairs for p in found.rest(counted(hot), hot).operations
+        p.way is Way.UNKNOWN and p.pairs
+        for p in found.without_timed(count_work(hot), hot).operations
     )
     assert Way.PRODUCTS in ways
 
 
 def test_what_was_timed_is_in_the_prediction() -> None:
     hot = heated(1.0)
-    work = counted(hot)
-    rest = predicted(timed(hot, work).rest(work, hot), REFERENCE)
-    more = predicted(timed(hot, work).rest(work, hot), REFERENCE, besides=1e-3)
+    work = count_work(hot)
+    rest = predict(time_uncounted(hot, work).without_timed(work, hot), REFERENCE)
+    more = predict(time_uncounted(hot, work).without_timed(work, hot), REFERENCE, extra=1e-3)
     assert more.steps - rest.steps == pytest.approx(1e-3 * work.evaluations)
-    assert foreseen(hot, REFERENCE).steps > rest.steps
-    assert foreseen(hot, REFERENCE).work == work
+    assert predict_run(hot, REFERENCE).steps > rest.steps
+    assert predict_run(hot, REFERENCE).work == work

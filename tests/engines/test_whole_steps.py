@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from solidsph.costs.counted import counted
+from solidsph.costs.count import count_work
 from solidsph.costs.work import Loop
 from solidsph.run.step_by_step import StepByStep
 from solidsph.scene.scene_builder import SceneBuilder
@@ -45,4 +45,4 @@ def test_all_that_ask_get_one_answer(name: str) -> None:
     simulation = made.build()
     assert simulation.plan.compiles_steps is expected
     assert isinstance(simulation.time_loop(), StepByStep) is not expected
-    assert (counted(simulation).loop is Loop.COMPILED) is expected
+    assert (count_work(simulation).loop is Loop.COMPILED) is expected

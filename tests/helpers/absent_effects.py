@@ -130,14 +130,14 @@ def instructions(simulation: Simulation) -> int:
 
 
 def _import() -> None:
-    plain = Assembler.built
+    plain = Assembler.assemble
 
     def importing(self: Assembler, kind: type[Simulation]) -> Simulation:
         for entry in registry.available("effects"):
             import_module(entry.target.partition(":")[0])
         return plain(self, kind)
 
-    Assembler.built = importing  # type: ignore[method-assign]
+    Assembler.assemble = importing  # type: ignore[method-assign]
 
 
 def _branch() -> None:
@@ -152,14 +152,14 @@ def _branch() -> None:
 
 
 def _array() -> None:
-    plain = Assembler.built
+    plain = Assembler.assemble
     kept = []
 
     def keeping(self: Assembler, kind: type[Simulation]) -> Simulation:
         kept.extend(np.zeros(8) for _ in registry.names("effects"))
         return plain(self, kind)
 
-    Assembler.built = keeping  # type: ignore[method-assign]
+    Assembler.assemble = keeping  # type: ignore[method-assign]
 
 
 def _result() -> None:

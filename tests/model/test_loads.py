@@ -238,15 +238,15 @@ def test_faces_that_are_met_and_not_named_are_told_with_their_shares(
 @pytest.mark.parametrize(
     ("bodies", "tags", "told"),
     [
-        (("plate-1", "plate_1"), {}, "body 'plate_1': its name cannot be told from 'plate-1'"),
-        (("one",), {"a-b": "X > 0", "a_b": "X < 9"}, "tag 'a_b' cannot be told from 'a-b'"),
-        (("one", "far-end"), {"far_end": "X > 0"}, "tag 'far_end' cannot be told from 'far-end'"),
-        (("left_ghosts",), {}, "body 'left_ghosts': its name cannot be told from 'left-ghosts'"),
-        (("one",), {"left_ghosts": "X > 0"}, "'left_ghosts' cannot be told from 'left-ghosts'"),
-        (("not",), {}, "body 'not': its name is a word of Python"),
-        (("one",), {"in": "X > 0"}, "tag 'in' is a word of Python"),
-        (("one",), {"True": "X > 0"}, "tag 'True' is a word of Python"),
-        (("is",), {}, "is a word of Python"),
+        (("plate-1", "plate_1"), {}, "body 'plate_1': its name is the same as 'plate-1'"),
+        (("one",), {"a-b": "X > 0", "a_b": "X < 9"}, "tag 'a_b' is the same as 'a-b'"),
+        (("one", "far-end"), {"far_end": "X > 0"}, "tag 'far_end' is the same as 'far-end'"),
+        (("left_ghosts",), {}, "body 'left_ghosts': its name is the same as 'left-ghosts'"),
+        (("one",), {"left_ghosts": "X > 0"}, "'left_ghosts' is the same as 'left-ghosts'"),
+        (("not",), {}, "body 'not': its name is a keyword of Python"),
+        (("one",), {"in": "X > 0"}, "tag 'in' is a keyword of Python"),
+        (("one",), {"True": "X > 0"}, "tag 'True' is a keyword of Python"),
+        (("is",), {}, "is a keyword of Python"),
         (("one",), {"X": "X > 0"}, "tag 'X' is a variable or constant of formulas"),
         (("pi",), {}, "is a variable or constant of formulas"),
         (("t",), {}, "is a variable or constant of formulas"),
@@ -271,7 +271,7 @@ def test_names_that_no_condition_could_tell_apart_are_refused(
 
 def test_names_of_polygons_edges_and_of_functions() -> None:
     triangle = {"type": "polygon", "vertices": [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]}
-    with pytest.raises(BuildError, match="tag 'edge_0' cannot be told from 'edge-0'"):
+    with pytest.raises(BuildError, match="tag 'edge_0' is the same as 'edge-0'"):
         scene(0.1, triangle, tags={"edge_0": "X > 0.5"}).build()
     # A function is called, and a name is not: the two are told apart.
     named = scene(tags={"max": "X > 0.5", "clip": "X > 0.2"})

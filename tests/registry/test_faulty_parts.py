@@ -57,7 +57,7 @@ def test_what_cannot_be_used_is_refused_at_the_build(name: str) -> None:
 
 
 FAILING = {
-    "a report that is no number": (bed(kind=faulty.NoNumber), "is no number"),
+    "a report that is no number": (bed(kind=faulty.NoNumber), "is not finite"),
     "a report that writes positions": (bed(kind=faulty.Writes), "faulty:Bed.*read-only"),
     "a report that writes masses": (bed(kind=faulty.WritesMasses), "faulty:Bed.*read-only"),
     "an error inside a step": (bed(kind=faulty.Fails), "faulty:Bed.*ZeroDivisionError"),
@@ -82,7 +82,7 @@ def test_what_fails_in_the_run_is_named(name: str, tmp_path: Path) -> None:
     ("builder", "told"),
     [
         (thrown(box(2, 5)).material(faulty.HalfTheStress(**SOFT)), "HalfTheStress.*stress"),
-        (bed(kind=faulty.HalfOfIt), "what it stores changes by"),
+        (bed(kind=faulty.HalfOfIt), "the stored energy changes by"),
         (bed(declared=0.1, stiffness=1e6), "stiffness_rate is 15.8"),
         (thrown(box(2, 5)).integrator(faulty.BackToZero()), "BackToZero.*bookkeeping"),
     ],

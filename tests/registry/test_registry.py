@@ -106,7 +106,7 @@ def test_distributions_can_be_restricted(monkeypatch: pytest.MonkeyPatch, foreig
 def test_hook_plugins_listen_and_broken_ones_are_left_out_loudly(
     foreign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from solidsph.run.hooks import STRICT, listeners
+    from solidsph.run.hooks import STRICT, load_hook_plugins
 
     foreign(
         "foreign-hooks",
@@ -132,21 +132,21 @@ def test_hook_plugins_listen_and_broken_ones_are_left_out_loudly(
         "[solidsph.hooks]\nmisspelt = foreign_misspelt",
     )
     with pytest.warns(UserWarning, match=r"'misspelt' .* foreign-misspelt 1.2.*configrue"):
-        manager = listeners()
+        manager = load_hook_plugins()
     manager.hook.solidsph_configure(builder="this one")
     import foreign_hooks
 
     assert foreign_hooks.heard == ["this one"]
     monkeypatch.setenv(STRICT, "1")
     with pytest.raises(PluginError, match="misspelt"):
-        listeners()
+        load_hook_plugins()
 
 
 def test_of_two_hooks_of_one_name_the_first_is_heard(
     foreign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """And the warning names both, whatever is wrong with the second."""
-    from solidsph.run.hooks import STRICT, listeners
+    from solidsph.run.hooks import STRICT, load_hook_plugins
 
     script = """
     from solidsph.run.hooks import implementation
@@ -158,7 +158,7 @@ def test_of_two_hooks_of_one_name_the_first_is_heard(
     foreign("foreign-alpha", "foreign_alpha", script, "[solidsph.hooks]\near = foreign_alpha")
     foreign("foreign-beta", "foreign_beta", script, "[solidsph.hooks]\near = foreign_beta")
     with pytest.warns(UserWarning, match="is left out") as warned:
-        manager = listeners()
+        manager = load_hook_plugins()
     manager.hook.solidsph_configure(builder="this one")
     loaded = [
         sys.modules[f"foreign_{name}"]
@@ -170,7 +170,7 @@ def test_of_two_hooks_of_one_name_the_first_is_heard(
     assert any("foreign-alpha 1.2" in one and "foreign-beta 1.2" in one for one in texts)
     monkeypatch.setenv(STRICT, "1")
     with pytest.raises(PluginError, match="has that name already"):
-        listeners()
+        load_hook_plugins()
 
 
 def test_hooks_hear_the_life_of_a_run(foreign) -> None:

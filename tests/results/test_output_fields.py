@@ -122,7 +122,12 @@ def test_names_are_compared_at_the_build(first, second, what) -> None:
 
 @pytest.mark.parametrize(
     ("label", "message"),
-    [("", "is empty"), ("  \t", "is empty"), ("x" * 201, "201 signs"), ("a\0b", "cannot be shown")],
+    [
+        ("", "is empty"),
+        ("  \t", "is empty"),
+        ("x" * 201, "201 characters"),
+        ("a\0b", "unprintable"),
+    ],
 )
 def test_labels_that_name_nothing(label: str, message: str) -> None:
     with pytest.raises(BuildError, match=message):

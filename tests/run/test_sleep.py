@@ -188,14 +188,14 @@ def test_slabs_cut_the_longest_side_and_hold_some_rows() -> None:
 @pytest.mark.parametrize(
     ("builder", "said"),
     [
-        (strip().effect("kelvin-voigt", time=1e-3), "particle by particle"),
+        (strip().effect("kelvin-voigt", time=1e-3), "restricted to awake particles"),
         (bar(100).formulation("updated-lagrangian"), "cannot form the forces of some"),
         (
             strip().material("viscoelastic", **UNIT, prony=[{"share": 0.5, "time": 1.0}]),
             "cannot form the forces of some",
         ),
         (Simulation.builder(strip().scene()).sleep(tolerance=2.0), "between 0 and 1"),
-        (Simulation.builder(strip().scene()).sleep(slabs=1), "from 2 on"),
+        (Simulation.builder(strip().scene()).sleep(slabs=1), "of at least 2"),
     ],
 )
 def test_what_cannot_sleep_is_refused(builder: SceneBuilder, said: str) -> None:

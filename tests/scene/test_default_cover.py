@@ -20,7 +20,7 @@ from solidsph.interfaces.kernel import Kernel
 from solidsph.maths.arrays import Array
 from solidsph.registry import registry
 from solidsph.registry.construct import construct
-from solidsph.scene.default_cover import BLIND, cover_of, held, own_cover
+from solidsph.scene.default_cover import BLIND, cover_of, kernel_cover, wave_number_ratio
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.statics.equilibrium import equilibrium
 from solidsph.studies.scheme import Scheme
@@ -103,7 +103,7 @@ def test_a_blind_cover_is_warned_of_and_a_good_one_is_not(kernel: str, cover: fl
     ids=str,
 )
 def test_a_kernels_own_cover(kernel: Any, cover: float) -> None:
-    assert own_cover(construct("kernels", kernel)) == pytest.approx(cover)
+    assert kernel_cover(construct("kernels", kernel)) == pytest.approx(cover)
 
 
 def test_with_the_nearest_neighbours_alone_the_wave_number_is_a_sine() -> None:
@@ -111,8 +111,8 @@ def test_with_the_nearest_neighbours_alone_the_wave_number_is_a_sine() -> None:
     for kernel in KERNELS:
         part = construct("kernels", kernel)
         # One of 200 waves is at pi / 2 exactly.
-        assert held(part, 1, 1.5) == pytest.approx(2.0 / np.pi, rel=1e-12)
-        assert held(part, 1, own_cover(part)) > BLIND
+        assert wave_number_ratio(part, 1, 1.5) == pytest.approx(2.0 / np.pi, rel=1e-12)
+        assert wave_number_ratio(part, 1, kernel_cover(part)) > BLIND
 
 
 def test_anyones_kernel_has_a_cover_of_its_own() -> None:
@@ -127,9 +127,9 @@ def test_anyones_kernel_has_a_cover_of_its_own() -> None:
         def slope(q: Any, params: tuple[float, ...]) -> Any:
             return -80.0 * np.asarray(q) * np.maximum(1.0 - 2.0 * np.asarray(q), 0.0) ** 3
 
-    wendland = own_cover(construct("kernels", "wendland-c2"))
+    wendland = kernel_cover(construct("kernels", "wendland-c2"))
     # Tenths of one are fifths of the other.
-    assert own_cover(Half()) == pytest.approx(2.0 * wendland, abs=0.11)
+    assert kernel_cover(Half()) == pytest.approx(2.0 * wendland, abs=0.11)
 
 
 def test_a_profile_that_is_none_is_told_as_such() -> None:
@@ -171,7 +171,7 @@ def test_no_scene_of_the_docs_is_blind() -> None:
     for scene in scenes:
         d = construct("shapes", next(iter(scene.bodies.values())).shape).dimension
         kernel = construct("kernels", scene.kernel)
-        assert held(kernel, d, cover_of(scene)) > BLIND, scene.title
+        assert wave_number_ratio(kernel, d, cover_of(scene)) > BLIND, scene.title
 
 
 def test_every_installed_kernel_was_looked_at() -> None:

@@ -13,12 +13,12 @@ import pytest
 import solidsph.scene.default_cover
 from solidsph import Scene, Simulation, cli
 from solidsph.commands.target import resolve
-from solidsph.costs import fits
-from solidsph.costs.estimated import estimated
+from solidsph.costs import memory_check
+from solidsph.costs.estimate import estimate_work
 from solidsph.errors import BuildError, SceneError
 from solidsph.registry.construct import construct
 from solidsph.registry.problems import MOST_OF_A_KIND, Problems
-from solidsph.scene import compatibility
+from solidsph.scene.checks import geometry
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 from tests.helpers.scenes import SCENE_TOML, box
 
@@ -278,9 +278,11 @@ def test_the_cover_of_a_scene_is_found_once_whatever_its_bodies(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked: list[float] = []
-    held = solidsph.scene.default_cover.held
+    ratio = solidsph.scene.default_cover.wave_number_ratio
     monkeypatch.setattr(
-        solidsph.scene.default_cover, "held", lambda *one: asked.append(one[2]) or held(*one)
+        solidsph.scene.default_cover,
+        "wave_number_ratio",
+        lambda *one: asked.append(one[2]) or ratio(*one),
     )
 
     def times(bodies: int) -> int:
@@ -292,7 +294,7 @@ def test_the_cover_of_a_scene_is_found_once_whatever_its_bodies(
                 f"b{k}", shape={"type": "interval", "length": 1.0, "origin": 2.0 * k}, spacing=0.1
             )
         asked.clear()
-        estimated(scene.duration(1e-3).scene())
+        estimate_work(scene.duration(1e-3).scene())
         scene.build()
         return len(asked)
 
@@ -303,8 +305,8 @@ def test_of_many_bodies_in_one_place_few_pairs_are_looked_at(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     looked: list[object] = []
-    overlap = compatibility.overlap
-    monkeypatch.setattr(compatibility, "overlap", lambda *one: looked.append(one) or overlap(*one))
+    overlap = geometry.overlap
+    monkeypatch.setattr(geometry, "overlap", lambda *one: looked.append(one) or overlap(*one))
     scene = Simulation.builder().material(
         "neo-hookean", youngs_modulus=1e6, poissons_ratio=0.3, density=1e3
     )
@@ -332,20 +334,22 @@ def large(spacing: float, **body: object) -> Scene:
 def test_a_scene_that_needs_more_memory_than_is_free_is_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(fits, "available_memory", lambda: 2**30)
+    monkeypatch.setattr(memory_check, "available_memory", lambda: 2**30)
     with pytest.raises(SceneError) as caught:
-        fits.check_fits(large(0.004))
+        memory_check.check_memory(large(0.004))
     # (1 / 0.004)^3 = 1.56e7 particles; 1 GiB is free.
-    for expected in ("1.56e+07 particles", "has 1 GiB free", "a spacing", "--beyond-memory"):
+    for expected in ("1.56e+07 particles", "only 1 GiB are free", "the spacing", "--beyond-memory"):
         assert expected in str(caught.value)
-    fits.check_fits(large(0.05))  # 8000 particles fit
-    monkeypatch.setattr(fits, "available_memory", lambda: 2**50)
-    fits.check_fits(large(0.004))
+    memory_check.check_memory(large(0.05))  # 8000 particles fit
+    monkeypatch.setattr(memory_check, "available_memory", lambda: 2**50)
+    memory_check.check_memory(large(0.004))
 
 
 def test_what_is_wrong_is_left_to_the_build(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fits, "available_memory", lambda: 0)
-    fits.check_fits(Simulation.builder(large(0.004)).kernel("no-such").material("no-such").scene())
+    monkeypatch.setattr(memory_check, "available_memory", lambda: 0)
+    memory_check.check_memory(
+        Simulation.builder(large(0.004)).kernel("no-such").material("no-such").scene()
+    )
 
 
 # Standard streams

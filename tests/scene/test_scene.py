@@ -9,6 +9,7 @@ import attrs
 import pytest
 
 from solidsph import BuildError, Scene, SceneError, Simulation
+from solidsph.registry.construct import construct
 from solidsph_builtin.kernels.gaussian import Gaussian
 from tests.helpers.scenes import SCENE_TOML, box
 
@@ -50,6 +51,12 @@ def test_builder_and_toml_say_the_same() -> None:
 def test_a_scene_of_objects_is_written_by_their_registered_names() -> None:
     scene = box(2).kernel(Gaussian(cut=2.5), cover=2.8).scene()
     assert '[kernel]\ntype = "gaussian"\ncut = 2.5\ncover = 2.8' in scene.to_toml()
+
+
+def test_an_engine_may_be_a_table() -> None:
+    scene = Scene.from_toml('engine = {type = "matrix"}\n' + SCENE_TOML)
+    assert Scene.from_toml(scene.to_toml()).engine == scene.engine == {"type": "matrix"}
+    assert Simulation.builder(scene).build().engine == construct("engines", "matrix")
 
 
 def test_a_scene_of_functions_runs_but_has_no_file_form() -> None:
@@ -116,7 +123,7 @@ def test_a_scene_of_functions_runs_but_has_no_file_form() -> None:
         ("[body.block]", "[body.left]", "names a set of particles already"),
         ("[body.block]", "[body.X]", "is a variable or constant of formulas"),
         ("[body.block]", '[body.""]', "must begin with a letter"),
-        ('where = "left"', 'where = "left"\nlabel = "a\\u0000b"', "cannot be shown"),
+        ('where = "left"', 'where = "left"\nlabel = "a\\u0000b"', "unprintable"),
         ("traction = {x", "traction = {z", "'z' in a 2D scene"),
         ("traction = {x", "traction = {u", "unknown component 'u'"),
         ("min(t/0.005, 1)", "min(t/0.005)", "min takes 2 arguments"),

@@ -77,9 +77,9 @@ def test_no_integrator_counts_as_used() -> None:
 @pytest.mark.parametrize(
     ("added", "expected"),
     [
-        (MOVING, "statics: an integrator is named"),
-        ("[integrator]\ntime_step = 1e-6\n", "statics: a time step is named"),
-        ('[[initial]]\nvelocity = {x = "1"}\n', "statics: an initial state is named"),
+        (MOVING, "statics: an integrator is given"),
+        ("[integrator]\ntime_step = 1e-6\n", "statics: a time step is given"),
+        ('[[initial]]\nvelocity = {x = "1"}\n', "statics: an initial state is given"),
     ],
 )
 def test_words_of_a_motion_beside_statics_are_a_problem(added: str, expected: str) -> None:

@@ -8,7 +8,6 @@ import attrs
 import pytest
 
 from solidsph import SceneError
-from solidsph.costs.counted import counted
 from solidsph.registry import registry
 from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
@@ -63,7 +62,7 @@ def test_a_point_counts_what_no_machine_changes() -> None:
     )
     built = Simulation.builder(with_settings(case, {"cover": 2.2}).scenes()["csm3"]).build()
     assert one.steps == built.steps
-    assert one.pair_evaluations == built.steps * counted(built).visited
+    assert one.pair_evaluations == built.steps * count_work(built).visited
     assert merge_repeats([one, two]).seconds == (*one.seconds, *two.seconds)
 
 

@@ -16,6 +16,7 @@ from solidsph.interfaces.terms import Observation, StressTerm, Term
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import Where
+from solidsph.registry.parameters import formula
 from solidsph_builtin.boundaries._dirichlet import factorised
 from solidsph_builtin.boundaries._images import interpolation
 from solidsph_builtin.boundaries._reports import COMPONENTS, asked_resultant
@@ -37,7 +38,7 @@ class ApproximateNeumann(BoundaryHandler):
     loads_surface: ClassVar[bool] = True
 
     where: Where  # a face such as "left", or a condition on the surface
-    traction: Mapping[str, Component]  # such as {x = 0, y = "-1e5"} [Pa]
+    traction: Mapping[str, Component] = formula()  # such as {x = 0, y = "-1e5"} [Pa]
     ghosts: Where = "ghosts"  # those whose stress may change with it
 
     example: ClassVar[Mapping[str, Any]] = {"where": "left", "traction": {"x": "1e3*sin(300*t)"}}

@@ -16,6 +16,7 @@ from solidsph.interfaces.terms import Term
 from solidsph.maths.arrays import Array
 from solidsph.model.fields import Component
 from solidsph.model.regions import Where
+from solidsph.registry.parameters import formula
 from solidsph_builtin.boundaries._dirichlet import Solve, factorised, smoothed_value
 
 
@@ -30,9 +31,9 @@ class ExactDirichlet(BoundaryHandler):
     """
 
     where: Where  # boundary particles
-    displacement: Mapping[str, Component]  # such as {x = "0.1*Y"} [m]
+    displacement: Mapping[str, Component] = formula()  # such as {x = "0.1*Y"} [m]
     ghosts: Where = "ghosts"  # those that may change with them
-    extension: Mapping[str, Component] | None = None  # at ghosts; reflected if None
+    extension: Mapping[str, Component] | None = formula(default=None)  # at ghosts; else reflected
 
     example: ClassVar[Mapping[str, Any]] = {
         "where": "left",

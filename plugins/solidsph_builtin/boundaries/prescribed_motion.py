@@ -12,6 +12,7 @@ from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.terms import Term
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import Where
+from solidsph.registry.parameters import formula
 from solidsph_builtin.boundaries._imposed import imposed_motion
 
 
@@ -25,7 +26,7 @@ class PrescribedMotion(BoundaryHandler):
     """
 
     where: Where
-    displacement: Mapping[str, Component]  # such as {x = "0.1*t", y = 0} [m]
+    displacement: Mapping[str, Component] = formula()  # such as {x = "0.1*t", y = 0} [m]
 
     example: ClassVar[Mapping[str, Any]] = {
         "where": "left",

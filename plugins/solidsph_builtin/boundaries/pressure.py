@@ -18,6 +18,7 @@ from solidsph.maths.tensors import cofactor, components_first, particles_first
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.particles import Face
 from solidsph.model.regions import Where
+from solidsph.registry.parameters import formula
 from solidsph_builtin.boundaries._reports import asked_resultant
 from solidsph_builtin.effects._gradients import BodyGradient, in_the_reference
 
@@ -34,7 +35,7 @@ class Pressure(BoundaryHandler):
     loads_surface: ClassVar[bool] = True
 
     where: Where  # a face such as "inner", or a condition on the surface
-    pressure: Component  # p such as "5e6*min(t/1e-3, 1)", positive when it pushes [Pa]
+    pressure: Component = formula()  # p such as "5e6*min(t/1e-3, 1)", positive when it pushes [Pa]
 
     example: ClassVar[Mapping[str, Any]] = {"where": "left", "pressure": "1e3*sin(300*t)"}
 

@@ -16,6 +16,7 @@ from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField, scheduled_forces
 from solidsph.model.particles import Face
 from solidsph.model.regions import Where
+from solidsph.registry.parameters import formula
 from solidsph_builtin.boundaries._reports import COMPONENTS, asked_resultant
 
 
@@ -35,7 +36,7 @@ class Traction(BoundaryHandler):
     loads_surface: ClassVar[bool] = True
 
     where: Where  # a face such as "right", or a condition on the surface
-    traction: Mapping[str, Component]  # such as {x = "5e6*min(t/1e-3, 1)"} [Pa]
+    traction: Mapping[str, Component] = formula()  # such as {x = "5e6*min(t/1e-3, 1)"} [Pa]
 
     example: ClassVar[Mapping[str, Any]] = {"where": "left", "traction": {"x": "1e3*sin(300*t)"}}
 

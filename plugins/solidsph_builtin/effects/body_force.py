@@ -14,6 +14,7 @@ from solidsph.interfaces.terms import Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField, scheduled_forces
 from solidsph.model.regions import Where
+from solidsph.registry.parameters import formula
 
 
 @final
@@ -23,7 +24,7 @@ class BodyForce(Effect):
 
     answers: ClassVar[frozenset[Need] | None] = frozenset()
 
-    acceleration: Mapping[str, Component]  # b such as {y = -9.81} [m/s^2]
+    acceleration: Mapping[str, Component] = formula()  # b such as {y = -9.81} [m/s^2]
     where: Where = "all"
 
     example: ClassVar[Mapping[str, Any]] = {"acceleration": {"x": "-9.81*cos(50*t)"}}

@@ -22,7 +22,7 @@ from solidsph.maths.arrays import Array, Indices, Tensor
 from solidsph.maths.tensors import particles_first
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import Where
-from solidsph.registry.parameters import check_positive, number
+from solidsph.registry.parameters import check_positive, formula, number
 from solidsph.run.stable_step import lattice_frequency
 from solidsph_builtin.effects._gradients import BodyGradient, in_the_reference
 
@@ -68,8 +68,8 @@ class Heat(Effect):
     conductivity: float = number()  # k [W/(m K)]
     heat_capacity: float = number()  # c per mass [J/(kg K)]
     expansion: float = number(default=0.0)  # linear [1/K]
-    initial: Component = 0.0  # T at the start, of X, Y, Z [K]
-    source: Component = 0.0  # of X, Y, Z and t [W/m^3]
+    initial: Component = formula(default=0.0)  # T at the start, of X, Y, Z [K]
+    source: Component = formula(default=0.0)  # of X, Y, Z and t [W/m^3]
     held: Sequence[Any] = attrs.field(default=(), converter=_places)
     largest: float = number(default=1000.0)  # |T| up to which the time step is stable [K]
 

@@ -22,7 +22,7 @@ from solidsph.interfaces.terms import (
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import AXES, Where
-from solidsph.registry.parameters import check_positive, number, optional_number
+from solidsph.registry.parameters import check_positive, formula, number, optional_number
 from solidsph_builtin.boundaries._reports import resultant
 from solidsph_builtin.effects._slip import slid
 
@@ -59,7 +59,7 @@ class RigidWall(Effect):
     friction: float = number(default=0.0)  # coefficient [-]
     strength: float = number(default=1.0)  # [-]
     clearance: float | None = optional_number()  # [spacings]; the depth below the surface if none
-    displacement: Mapping[str, Component] | None = None  # such as {y = "-0.1*t"} [m]
+    displacement: Mapping[str, Component] | None = formula(default=None)  # {y = "-0.1*t"} [m]
 
     example: ClassVar[Mapping[str, Any]] = {"point": {"x": 0.05}, "normal": {"x": 1.0}}
 

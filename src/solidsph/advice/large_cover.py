@@ -10,7 +10,7 @@ from solidsph.advice.advice import Advice
 from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.effect import Need
 from solidsph.interfaces.formulation import Configuration
-from solidsph.scene.default_cover import BLIND, held, own_cover
+from solidsph.scene.default_cover import BLIND, kernel_cover, wave_number_ratio
 
 # Beyond these, in spacings, a kernel smooths details away and each evaluation costs several times
 # that of the usual 3.
@@ -27,12 +27,12 @@ def large_cover(facts: SceneFacts) -> Iterator[Advice]:
     d, cover = facts.dimension, facts.cover
     body = facts.simulation.model.bodies[0]
     kernel = body.smoothing.kernel
-    share = held(kernel, d, cover)
+    share = wave_number_ratio(kernel, d, cover)
     # Sums that are right at the surface cause no saw-tooth there.
     if share < BLIND and not facts.fits_surface and facts.lacks(Need.UNSEEN_MOTIONS):
         # Next neighbours alone would hold waves by 2 / pi of their wave number.
         part = max(0.0, 50.0 * np.pi * share)
-        best = own_cover(kernel)
+        best = kernel_cover(kernel)
         yield Advice(
             finding=f"with cover = {cover:g}, {type(kernel).__name__} in {d}D holds neighbours in "
             f"a row against each other at {part:.2g} % of the frequency that next neighbours alone "

@@ -1,322 +1,184 @@
-"""Assembler: names -> parts -> a checked Simulation.
+"""Assembler: from the names of a scene to a checked simulation.
 
-This is the edge where names end. Every part is made and every pair of parts is checked here, all
-problems are reported together, and what comes out holds objects only.
+Names end here: what comes out holds objects only. All parts are made and checked against each
+other, and all problems are reported together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import ceil
-from typing import Any, TypeVar
+from typing import TypeVar
 
-import attrs
 import numpy as np
 import pluggy
 
-from solidsph.assembly.visibility import hidden_pairs
+from solidsph.assembly.binding import bind
+from solidsph.assembly.body import make_body
+from solidsph.assembly.initial_state import initial_state, reference_observation
+from solidsph.assembly.step_size import step_size
 from solidsph.engines.history import HistoryFields, modified
-from solidsph.errors import BuildError, SceneError
-from solidsph.interfaces.body import Body
 from solidsph.interfaces.discrete_model import DiscreteModel
-from solidsph.interfaces.effect import Effect
-from solidsph.interfaces.formulation import Configuration, Formulation
-from solidsph.interfaces.gradient import Gradient
 from solidsph.interfaces.history import HistoryMaterial
-from solidsph.interfaces.integrator import Integrator
-from solidsph.interfaces.kernel import Kernel
-from solidsph.interfaces.material import Material
-from solidsph.interfaces.shape import Shape
-from solidsph.interfaces.smoothing_kernel import smoothing_kernel
-from solidsph.interfaces.terms import (
-    Constraint,
-    Load,
-    Observation,
-    StressTerm,
-    Term,
-)
-from solidsph.model.fields import VectorField
+from solidsph.interfaces.terms import Constraint, Load, StressTerm, Term
 from solidsph.model.particles import Particles, State
-from solidsph.model.regions import select
-from solidsph.registry import registry
-from solidsph.registry.origin import described
 from solidsph.results.output_fields import name_clashes
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.dynamics import Dynamics
-from solidsph.run.stable_step import stable_step
-from solidsph.scene import compatibility, returned_values
+from solidsph.scene.checks.geometry import check_overlaps
+from solidsph.scene.checks.returned import check_integrator, check_material
+from solidsph.scene.checks.terms import (
+    check_constraints,
+    check_history,
+    check_loads,
+    check_stresses,
+)
 from solidsph.scene.placed_parts import PlacedParts
 from solidsph.scene.scene import Scene
-from solidsph.scene.scene_data import MOST_STEPS
 
 S = TypeVar("S", bound=BuiltScene)
 
 
 class Assembler:
-    """One build of one scene."""
+    """Assembly of one scene."""
 
     def __init__(self, scene: Scene, manager: pluggy.PluginManager) -> None:
         self._scene = scene
         self._manager = manager
-        self._words = PlacedParts(scene)
-        self._problems = self._words.problems
+        self._placed = PlacedParts(scene)
+        self._parts = self._placed.parts
+        self._problems = self._placed.problems
 
-    def built(self, kind: type[S]) -> S:
-        """Build it, as an object of class `kind`.
+    def assemble(self, kind: type[S]) -> S:
+        """Assemble the scene as an object of class `kind`.
 
         Raises:
-            BuildError: with every problem found, each with its remedy.
+            BuildError: with all problems, each with its remedy.
         """
-        scene, problems = self._scene, self._problems
-        if scene.silence:
-            from solidsph import advice  # only where its names are asked for
+        if self._scene.silence:
+            from solidsph import advice  # loaded only for its names
 
-            problems.add(advice.unknown_names(scene.silence))
-        words = self._words
-        words.stop_if_any()
-        parts = words.parts
-
-        particles, tag_conditions = problems.settled(words.placed)
-        effects = parts.effects
-        kernel = problems.settled(parts.kernel)
-        cover = problems.settled(parts.cover)
-        formulation = problems.settled(parts.formulation)
-        problems.add(compatibility.apart(parts.shapes, parts.sets))
-        bodies = [
-            problems.attempt(
-                self._body,
-                name,
-                parts.shapes[name],
-                particles,
-                own,
-                parts.materials[name],
-                kernel,
-                cover,
-                formulation,
-            )
-            for name, own in parts.sets.items()
-        ]
-        words.stop_if_any()
-
-        made = [problems.settled(body) for body in bodies]
-        integrator = problems.settled(parts.integrator)
-        problems.add(returned_values.limits(integrator))
-        for body in made:
-            problems.add(returned_values.constants(body.material))
-        words.stop_if_any()
-        model = DiscreteModel(
-            particles=particles,
-            masses=np.concatenate([body.masses for body in made]),
-            bodies=made,
-            end=scene.duration,
-            conditions=tag_conditions,
-        )
-        terms = self._bound(parts.handlers, effects, model)
-        words.stop_if_any()
-        constraints = _in_order([c for c in terms if isinstance(c, Constraint)], particles)
-        stresses = [c for c in terms if isinstance(c, StressTerm)]
-        loads = [c for c in terms if isinstance(c, Load)]
-        step = problems.attempt(self._step_size, integrator, loads, made)
-        problems.add(compatibility.motions(constraints, particles))
-        problems.add(compatibility.loads(loads, particles, formulation))
-        problems.add(compatibility.stresses(stresses, formulation))
-        problems.add(compatibility.history(made, scene, words.labels))
-        initial = problems.attempt(self._initial_state, particles)
-        words.stop_if_any()
-        steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
-        engine = problems.settled(parts.engine)
-        # An equilibrium is found with assembled matrices: there is nothing to compile for.
-        evaluations = steps if scene.statics is None else 1
-        internal = problems.attempt(engine.prepare, made, stresses, evaluations)
-        problems.stop_if_any()
-        internal = problems.attempt(modified, internal, made, terms, stresses)
-        problems.stop_if_any()
-        remembered = [body for body in made if isinstance(body.material, HistoryMaterial)]
-        if remembered:
-            terms.append(HistoryFields(remembered, particles.count))
-        problems.add(name_clashes(_at_rest(problems.settled(initial), model, terms), terms))
-        problems.stop_if_any()
-
-        made_ready = kind(
-            scene=scene,
+            self._problems.add(advice.unknown_names(self._scene.silence))
+        self._placed.stop_if_any()
+        model = self._model()
+        terms = self._terms(model)
+        initial, steps = self._start_and_steps(model, terms)
+        dynamics = self._dynamics(model, terms, steps)
+        histories = [b for b in model.bodies if isinstance(b.material, HistoryMaterial)]
+        if histories:
+            terms.append(HistoryFields(histories, model.particles.count))
+        self._problems.add(name_clashes(reference_observation(initial, model, terms), terms))
+        self._problems.stop_if_any()
+        built = kind(
+            scene=self._scene,
             model=model,
-            dynamics=Dynamics(
-                particles=particles,
-                masses=model.masses,
-                internal=problems.settled(internal),
-                constraints=constraints,
-                loads=loads,
-                step_size=scene.duration / steps,
-            ),
+            dynamics=dynamics,
             terms=tuple(terms),
-            effects=effects,
-            integrator=integrator,
-            engine=engine,
-            initial=problems.settled(initial),
+            effects=self._parts.effects,
+            integrator=self._problems.settled(self._parts.integrator),
+            engine=self._problems.settled(self._parts.engine),
+            initial=initial,
             steps=steps,
-            parts=tuple(words.used),
+            parts=tuple(self._placed.used),
             manager=self._manager,
         )
-        if scene.sleep is not None:
-            from solidsph.run.sleeping.loop import check_sleep  # only where something sleeps
+        self._check_built(built)
+        return built
 
-            problems.attempt(check_sleep, made_ready)
-            problems.stop_if_any()
-        if words.foreign:
-            from solidsph.assembly.first_use import ask  # only where there is somebody to be asked
-
-            problems.attempt(ask, made_ready, words.foreign)
-            problems.stop_if_any()
-        return made_ready
-
-    def _body(
-        self,
-        name: str,
-        shape: Shape,
-        particles: Particles,
-        own: Particles,
-        material: Material,
-        kernel: Kernel,
-        cover: float,
-        formulation: Formulation,
-    ) -> Body:
-        radius = cover * float(own.spacings.max())
-        body = Body(
-            name=name,
-            shape=shape,
-            extent=particles.bodies[name],
-            particles=own,
-            smoothing=smoothing_kernel(kernel, own.dimension, radius),
-            material=material,
-            formulation=formulation,
-            hidden=hidden_pairs(
-                shape,
-                own,
-                radius,
-                moving=formulation.configuration is Configuration.CURRENT,
-            ),
+    def _model(self) -> DiscreteModel:
+        """All bodies in discrete form."""
+        problems, parts = self._problems, self._parts
+        particles, conditions = problems.settled(self._placed.placed)
+        problems.add(check_overlaps(parts.shapes, parts.sets))
+        attempts = [
+            problems.attempt(make_body, name, parts, particles.bodies[name]) for name in parts.sets
+        ]
+        self._placed.stop_if_any()
+        bodies = [problems.settled(body) for body in attempts]
+        problems.add(check_integrator(problems.settled(parts.integrator)))
+        for body in bodies:
+            problems.add(check_material(body.material))
+        self._placed.stop_if_any()
+        return DiscreteModel(
+            particles=particles,
+            masses=np.concatenate([body.masses for body in bodies]),
+            bodies=bodies,
+            end=self._scene.duration,
+            conditions=conditions,
         )
-        gradient = formulation.gradient.of_body(
-            name,
-            own,
-            body.smoothing,
-            body.pairs,
-            moving=formulation.configuration is Configuration.CURRENT,
-        )
-        if gradient is formulation.gradient:
-            return body
-        return attrs.evolve(body, formulation=_with_gradient(formulation, gradient))
 
-    def _bound(
-        self,
-        handlers: Mapping[str, Any],
-        effects: Mapping[str, Effect],
-        model: DiscreteModel,
-    ) -> list[Term]:
+    def _terms(self, model: DiscreteModel) -> list[Term]:
+        """Bound boundaries and effects."""
         terms: list[Term] = []
-        parts = [("boundaries", *one) for one in handlers.items()]
-        parts += [("effects", *one) for one in effects.items()]
-        for kind, label, part in parts:
-            terms += self._problems.attempt(self._bind, kind, part, model, label) or []
+        for kind, several in (
+            ("boundaries", self._parts.handlers),
+            ("effects", self._parts.effects),
+        ):
+            for label, part in several.items():
+                terms += self._problems.attempt(bind, kind, part, model, label) or []
         return terms
 
-    def _bind(self, kind: str, part: Any, model: DiscreteModel, label: str) -> Sequence[Term]:
-        bound = part.bind(model, label)
-        wrong = list(returned_values.conditions(kind, label, part, bound))
-        if wrong:
-            raise BuildError(wrong)
-        found: Sequence[Term] = [bound] if kind == "effects" else bound
-        particles = model.particles
-        for one in found:
-            wrong += returned_values.shapes(one, particles.count, particles.dimension)
-        if not wrong:
-            for load in found:
-                if isinstance(load, Load):
-                    wrong += returned_values.rates(load)
-        if wrong:
-            raise BuildError([f"{described(registry.entry_of(kind, part))}, {w}" for w in wrong])
-        return found
+    def _start_and_steps(self, model: DiscreteModel, terms: Sequence[Term]) -> tuple[State, int]:
+        """Initial state and number of steps, after checks that the terms fit each other."""
+        scene, problems = self._scene, self._problems
+        integrator = problems.settled(self._parts.integrator)
+        formulation = problems.settled(self._parts.formulation)
+        loads = _loads(terms)
+        # A term that could not be bound would only reduce the stable step.
+        step = problems.attempt(step_size, scene, integrator, loads, model.bodies)
+        self._placed.stop_if_any()
+        constraints = _constraints(terms, model.particles)
+        problems.add(check_constraints(constraints, model.particles))
+        problems.add(check_loads(loads, model.particles, formulation))
+        problems.add(check_stresses(_stresses(terms), formulation))
+        problems.add(check_history(model.bodies, scene, self._placed.labels))
+        initial = problems.attempt(initial_state, scene, model.particles)
+        self._placed.stop_if_any()
+        steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
+        return problems.settled(initial), steps
 
-    def _initial_state(self, particles: Particles) -> State:
-        # By shape and not `zeros_like`: pages of zeros that are never written take no memory.
-        displacements = np.zeros(particles.positions.shape)
-        velocities = np.zeros(particles.positions.shape)
-        for entry in self._scene.initial:
-            chosen = select(particles, entry.where)
-            for table, values, what in (
-                (entry.displacement, displacements, "initial: displacement"),
-                (entry.velocity, velocities, "initial: velocity"),
-            ):
-                if table is None:
-                    continue
-                field = VectorField.of(table, what)
-                field.check_dimension(particles.dimension, what)
-                field.check_without("t", "it is the state at t = 0: use numbers, X, Y and Z")
-                X = particles.positions[chosen]
-                for axis in field.components:
-                    values[chosen, axis] = field.values(axis, X, 0.0)
-        return State(
-            time=0.0,
-            step=0,
-            positions=particles.positions + displacements,
-            velocities=velocities,
-            accelerations=np.zeros(velocities.shape),
+    def _dynamics(self, model: DiscreteModel, terms: Sequence[Term], steps: int) -> Dynamics:
+        """Equation of motion, with the internal forces that the engine prepares."""
+        problems, stresses = self._problems, _stresses(terms)
+        engine = problems.settled(self._parts.engine)
+        # Equilibria are found with assembled matrices: there is nothing to compile for.
+        evaluations = steps if self._scene.statics is None else 1
+        internal = problems.attempt(engine.prepare, model.bodies, stresses, evaluations)
+        internal = problems.attempt(
+            modified, problems.settled(internal), model.bodies, terms, stresses
+        )
+        return Dynamics(
+            particles=model.particles,
+            masses=model.masses,
+            internal=problems.settled(internal),
+            constraints=_constraints(terms, model.particles),
+            loads=_loads(terms),
+            step_size=self._scene.duration / steps,
         )
 
-    def _step_size(
-        self, integrator: Integrator, loads: Sequence[Load], bodies: Sequence[Body]
-    ) -> float:
-        """Time step [s] from the confined wave speed and whatever the loads add."""
-        scene = self._scene
-        largest = stable_step(integrator, loads, bodies)
-        if scene.time_step is not None and scene.time_step > largest:
-            raise SceneError(
-                f"time_step = {scene.time_step:.6g} s exceeds the CFL step, {largest:.6g} s by "
-                "confined wave speed and spacing; take a smaller one, or state time_step_factor "
-                "instead"
-            )
-        step = scene.time_step or scene.time_step_factor * largest
-        if not (step > 0.0 and scene.duration / step <= MOST_STEPS):
-            raise SceneError(
-                f"a duration of {scene.duration:.6g} s in steps of {step:.6g} s takes "
-                f"{scene.duration / step if step > 0.0 else float('inf'):.3g} steps, at most "
-                f"{MOST_STEPS:.0e} are allowed; shorten the duration, or check the units of "
-                "modulus, density and spacing"
-            )
-        return step
+    def _check_built(self, built: BuiltScene) -> None:
+        """Check that the scene can sleep if it is to, and promises of third-party parts."""
+        if self._scene.sleep is not None:
+            from solidsph.run.sleeping.loop import check_sleep  # loaded only for [sleep]
+
+            self._problems.attempt(check_sleep, built)
+            self._problems.stop_if_any()
+        if self._placed.foreign:
+            from solidsph.assembly.first_use import check_first_use  # only for third parties
+
+            self._problems.attempt(check_first_use, built, self._placed.foreign)
+            self._problems.stop_if_any()
 
 
-def _at_rest(initial: State, model: DiscreteModel, terms: Sequence[Term]) -> Observation:
-    """The particles where they are in the reference, before anything has happened."""
-    particles, (n, d) = model.particles, initial.positions.shape
-    # Views of one number: they take no memory.
-    none, nothing = np.broadcast_to(0.0, n), np.broadcast_to(0.0, (n, d))
-    remembers = any(isinstance(body.material, HistoryMaterial) for body in model.bodies)
-    labels = [c.label for c in terms if isinstance(c, (Load, Constraint))]
-    return Observation(
-        state=attrs.evolve(
-            initial,
-            positions=particles.positions,
-            velocities=nothing,
-            accelerations=nothing,
-            applied=dict.fromkeys(labels, nothing),
-            work=dict.fromkeys(labels, 0.0),
-        ),
-        particles=particles,
-        masses=model.masses,
-        deformation_gradients=np.broadcast_to(np.eye(d), (n, d, d)),
-        stresses=np.broadcast_to(0.0, (n, d, d)),
-        energy_densities=none,
-        dissipated_densities=none if remembers else None,
-    )
+def _constraints(terms: Sequence[Term], particles: Particles) -> Sequence[Constraint]:
+    """Constraints on particles first, then those on ghosts, which follow particles."""
+    constraints = [term for term in terms if isinstance(term, Constraint)]
+    return tuple(sorted(constraints, key=lambda c: bool(c.held[particles.ghosts].any())))
 
 
-def _in_order(motions: Sequence[Constraint], particles: Particles) -> tuple[Constraint, ...]:
-    """Motions of particles first, then those of ghosts, which follow particles."""
-    return tuple(sorted(motions, key=lambda m: bool(m.held[particles.ghosts].any())))
+def _loads(terms: Sequence[Term]) -> Sequence[Load]:
+    return [term for term in terms if isinstance(term, Load)]
 
 
-def _with_gradient(formulation: Formulation, gradient: Gradient) -> Formulation:
-    """The same formulation with another gradient, which is a field of every attrs class."""
-    changed: Formulation = attrs.evolve(formulation, gradient=gradient)  # type: ignore[misc]
-    return changed
+def _stresses(terms: Sequence[Term]) -> Sequence[StressTerm]:
+    return [term for term in terms if isinstance(term, StressTerm)]

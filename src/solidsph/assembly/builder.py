@@ -1,4 +1,4 @@
-"""Builder: a scene said in words, then built."""
+"""Builder: the specification of a scene, and its assembly."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Generic, TypeVar, final
 
 from solidsph.assembly.assembler import Assembler
 from solidsph.run.built_scene import BuiltScene
-from solidsph.run.hooks import listeners
+from solidsph.run.hooks import load_hook_plugins
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_builder import SceneBuilder
 
@@ -15,19 +15,19 @@ S = TypeVar("S", bound=BuiltScene)
 
 @final
 class Builder(SceneBuilder, Generic[S]):
-    """Collects a scene in words, then builds it. Every method returns the builder."""
+    """Builder of a scene as an object of one class. Every method returns the builder."""
 
     def __init__(self, kind: type[S], scene: Scene | None = None) -> None:
-        """`kind` is the class of what is built."""
+        """Start from an empty or a given scene; `kind` is the class of the result."""
         super().__init__(scene)
         self._kind = kind
 
     def build(self) -> S:
-        """Make every part, check every pair of them, and assemble the simulation.
+        """Make every part, check that the parts fit each other, and assemble the simulation.
 
         Raises:
-            BuildError: with every problem found, each with its remedy.
+            BuildError: with all problems, each with its remedy.
         """
-        manager = listeners()
+        manager = load_hook_plugins()
         manager.hook.solidsph_configure(builder=self)
-        return Assembler(self.scene(), manager).built(self._kind)
+        return Assembler(self.scene(), manager).assemble(self._kind)

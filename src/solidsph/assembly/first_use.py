@@ -1,6 +1,6 @@
-"""First use: cheap properties of parts that are not our own, asked once before a scene runs.
+"""Quick checks of third-party parts when a scene first uses them.
 
-The conformance kits ask all there is to ask, and take seconds; these take milliseconds.
+The conformance kits check everything and take seconds; these checks take milliseconds.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+import attrs
 import numpy as np
 
 from solidsph.conformance.kits import KITS
@@ -18,9 +19,9 @@ from solidsph.model.particles import read_only
 from solidsph.registry.origin import described
 from solidsph.registry.registry import entry_of, singular
 from solidsph.run.built_scene import BuiltScene
-from solidsph.scene import returned_values
+from solidsph.scene.checks.returned import check_advanced
 
-# Of a kit, by the names of its checks: those that need no scene of their own.
+# Names of the checks of each kit that need no scene of their own.
 _QUICK: Mapping[str, Sequence[str]] = {
     "kernels": ("slope", "not_negative", "falling", "smooth_centre"),
     "materials": ("stress", "tangent", "natural_state", "wave_speed", "virgin_state"),
@@ -29,68 +30,89 @@ _QUICK: Mapping[str, Sequence[str]] = {
     "integrators": ("bookkeeping", "imposed_motion"),
 }
 
-# Of a change of energy. Differences over a thousandth of the displacement err by its square, 1e-6,
-# and by as much where a thousandth of the particles comes to touch something within them.
+# Tolerance for changes of energy. Differences over a thousandth of the displacement have an error
+# of its square, 1e-6, and as much again where a thousandth of the particles come into contact.
 _DIFFERENT = 1e-3
 
-_MOVED = 1e-2  # displacements at which energies are compared, in spacings
-_SMALL = 1e-5  # differences, in spacings: far less, so that a force may be of any power of them
+_MOVED = 1e-2  # displacements at which energies are compared [spacings]
+_SMALL = 1e-5  # differences [spacings], far smaller, so that a force may be of any power of them
 
-_OF_STEP = 0.02  # of the highest frequency that the step bears
+_OF_STEP = 0.02  # fraction of the highest frequency that the step resolves
 
-_asked: dict[tuple[str, type, str], tuple[str, ...]] = {}
-"""By kind, class and part: what was found in this process. A class that is defined anew, as one
-does in a notebook, is another class."""
+_checked: dict[tuple[str, type, str], tuple[str, ...]] = {}
+"""Problems found in this process, by kind, class and part. A class that is defined again, as in a
+notebook, is another class."""
 
 
-def ask(simulation: BuiltScene, parts: Sequence[tuple[str, Any]]) -> None:
-    """Warn of every promise that one of `parts`, kind and part, is seen not to keep.
+def check_first_use(simulation: BuiltScene, parts: Sequence[tuple[str, Any]]) -> None:
+    """Warn of every promise that a part does not keep; `parts` are pairs of kind and part.
 
     Raises:
-        BuildError: what a part hands back cannot be used at all.
+        BuildError: a part returned something unusable.
     """
     with np.errstate(all="ignore"):  # as in steps
-        found = _found(simulation, parts)
-    for one in found:
-        warnings.warn(one, PartWarning, stacklevel=2)
+        problems = _problems(simulation, parts)
+    for problem in problems:
+        warnings.warn(problem, PartWarning, stacklevel=2)
 
 
-def _found(simulation: BuiltScene, parts: Sequence[tuple[str, Any]]) -> list[str]:
-    _check_forces(simulation, parts)
-    found: list[str] = []
+def _problems(simulation: BuiltScene, parts: Sequence[tuple[str, Any]]) -> list[str]:
+    # Wrong shapes must not pass by broadcasting.
+    modules = {type(part).__module__ for kind, part in parts if kind in ("effects", "boundaries")}
+    wrong = _force_problems(simulation, modules)
+    if wrong:
+        raise BuildError(wrong)
+    problems: list[str] = []
     for kind, part in parts:
         key = kind, type(part), repr(part)
-        if key not in _asked:
-            _asked[key] = tuple(_quick(kind, part))
-        found += _asked[key]
+        if key not in _checked:
+            _checked[key] = tuple(_kit_problems(kind, part))
+        problems += _checked[key]
     foreign = [part for kind, part in parts if kind == "effects"]
     for label, effect in simulation.effects.items():
-        if any(effect is one for one in foreign):
-            found += _of_effect(simulation, label, effect)
-    return found
+        if any(effect is part for part in foreign):
+            problems += _effect_problems(simulation, label, effect)
+    return problems
 
 
-def _quick(kind: str, part: Any) -> Iterator[str]:
+def _force_problems(simulation: BuiltScene, modules: set[str]) -> list[str]:
+    """Problems of the forces of loads whose classes are of `modules`."""
+    # Read-only, so that a load that writes to its arguments fails here and not in the motion.
+    state, d = read_only(simulation.initial), simulation.particles.dimension
+    problems = []
+    for load in simulation.dynamics.loads:
+        if type(load).__module__ in modules and isinstance(load, Load):
+            x, v, h = state.positions, state.velocities, simulation.step_size
+            first = load.advance(0.0, 0.0, x, v, state.memory)
+            problem = check_advanced(load, first, d)
+            if not problem:
+                second = load.advance(h, h, x, v, {**state.memory, **first[1]})
+                problem = check_advanced(load, second, d)
+            problems.append(problem)
+    return [problem for problem in problems if problem]
+
+
+def _kit_problems(kind: str, part: Any) -> Iterator[str]:
     if kind not in _QUICK:
         return
-    results = [one(part) for one in KITS[kind] if one.__name__ in _QUICK[kind]]
-    failed = [one for one in results if not one.passed]
+    results = [check(part) for check in KITS[kind] if check.__name__ in _QUICK[kind]]
+    failed = [result for result in results if not result.passed]
     if failed:
-        measured = "; ".join(f"{one.name}: {one.measured}" for one in failed)
-        yield _told(kind, part, measured, "; ".join(one.required for one in failed))
+        measured = "; ".join(f"{result.name}: {result.measured}" for result in failed)
+        yield _message(kind, part, measured, "; ".join(result.required for result in failed))
 
 
-def _told(kind: str, part: Any, measured: str, required: str) -> str:
+def _message(kind: str, part: Any, measured: str, required: str) -> str:
     who = described(entry_of(kind, part))
     return (
         f"{who} does not keep a promise of its interface: {measured}. Required: {required}. The "
-        f"result is in doubt; correct the {singular(kind)} (solidsph check tests all of it)"
+        f"results may be wrong; correct the {singular(kind)} (solidsph check tests it fully)"
     )
 
 
-def _of_effect(simulation: BuiltScene, label: str, effect: Any) -> Iterator[str]:
-    """Its energy, and the rates that it declares, along one random motion of this scene."""
-    condition = simulation.load_of(label)
+def _effect_problems(simulation: BuiltScene, label: str, effect: Any) -> Iterator[str]:
+    """Check the energy and the declared rates of an effect along a random motion of the scene."""
+    load = simulation.load_of(label)
     particles, masses = simulation.particles, simulation.dynamics.masses
     rng = np.random.default_rng(0)
     state = simulation.initial
@@ -98,106 +120,70 @@ def _of_effect(simulation: BuiltScene, label: str, effect: Any) -> Iterator[str]
     moved, du = (
         np.where(real, rng.normal(size=X.shape), 0.0) * particles.spacings.min() for _ in "ud"
     )
-    still, memory = np.zeros_like(X), state.memory
+    rest, memory = np.zeros_like(X), state.memory
 
     def force(u: Any, v: Any, time: float = 0.0) -> Any:
         out = np.zeros_like(X)
-        out[condition.particles] = condition.advance(time, 0.0, X + u, v, memory)[0]
+        out[load.particles] = load.advance(time, 0.0, X + u, v, memory)[0]
         return out
 
     wrong: list[str] = []
-    if isinstance(condition, EnergyTerm):
+    if isinstance(load, EnergyTerm):
         end = simulation.steps * simulation.step_size
         for time in (0.0, end):
-            wrong += _of_energy(simulation, condition, effect, force, time, _MOVED * moved, du)
+            wrong += _energy_problems(simulation, load, effect, force, time, _MOVED * moved, du)
             if wrong:
                 break
     h = _SMALL
     norm = float(np.sum(masses[:, None] * du**2))
-    for name, declared, change in (
-        (
-            "stiffness_rate",
-            condition.stiffness_rate**2,
-            (force(-h * du, still) - force(h * du, still)) / (2.0 * h),
-        ),
-        (
-            "damping_rate",
-            condition.damping_rate,
-            (force(still, -h * du) - force(still, h * du)) / (2.0 * h),
-        ),
+    stiffness = (force(-h * du, rest) - force(h * du, rest)) / (2.0 * h)
+    damping = (force(rest, -h * du) - force(rest, h * du)) / (2.0 * h)
+    for name, declared, power, change in (
+        ("stiffness_rate", load.stiffness_rate**2, 0.5, stiffness),
+        ("damping_rate", load.damping_rate, 1.0, damping),
     ):
-        # A mean over frequencies squared, or rates: the largest is no smaller.
-        found = float(np.sum(du * change)) / norm
-        power = 0.5 if name == "stiffness_rate" else 1.0
-        # What is small beside the fastest motion of the step makes no difference to it.
-        unnoticed = (_OF_STEP * 2.0 / simulation.step_size) ** (1.0 / power)
-        if found > 1.01 * declared + unnoticed:
+        # A mean over squared frequencies, or rates: the largest is no smaller.
+        mean = float(np.sum(du * change)) / norm
+        # A rate far below the fastest motion of the step does not matter.
+        negligible = (_OF_STEP * 2.0 / simulation.step_size) ** (1.0 / power)
+        if mean > 1.01 * declared + negligible:
             wrong.append(
-                f"{name} is {declared**power:.4g} 1/s, and a motion has {found**power:.4g} 1/s at "
-                "least by the effect alone"
+                f"{name} is {declared**power:.4g} 1/s, but the effect alone gives a motion at "
+                f"least {mean**power:.4g} 1/s"
             )
     if wrong:
-        required = "what it stores is minus its work, and no motion is faster than it declares"
-        yield _told("effects", effect, f"label {label!r}: {'; '.join(wrong)}", required)
+        required = "the stored energy is minus the work, and no motion is faster than declared"
+        yield _message("effects", effect, f"label {label!r}: {'; '.join(wrong)}", required)
 
 
-def _of_energy(
+def _energy_problems(
     simulation: BuiltScene,
-    condition: Any,
+    load: Any,
     effect: Any,
     force: Callable[[Any, Any, float], Any],
     time: float,
     u: Any,
     du: Any,
 ) -> Iterator[str]:
-    import attrs
-
     X, d = simulation.initial.positions, _SMALL * du
 
     def energies(u: Any) -> Any:
         state = attrs.evolve(simulation.initial, time=time, positions=X + u)
-        return condition.energies(simulation.dynamics.observe(state))
-
-    def stored(u: Any) -> float:
-        return float(np.sum(energies(u)))
+        return load.energies(simulation.dynamics.observe(state))
 
     if np.shape(energies(u)) != (len(X),):
         raise BuildError(
             [
-                f"{described(entry_of('effects', effect))}, label {condition.label!r}: `energies` "
+                f"{described(entry_of('effects', effect))}, label {load.label!r}: `energies` "
                 f"have the shape {np.shape(energies(u))}; {(len(X),)} is expected"
             ]
         )
     f = force(u, np.zeros_like(X), time)
-    change, work = stored(u + d) - stored(u - d), 2.0 * float(np.vdot(f, d))
+    change = float(np.sum(energies(u + d))) - float(np.sum(energies(u - d)))
+    work = 2.0 * float(np.vdot(f, d))
     scale = 2.0 * float(np.abs(f * d).sum())
     if abs(change + work) > _DIFFERENT * scale:
         yield (
-            f"what it stores changes by {change:.4g} J along a motion in which its force does "
+            f"the stored energy changes by {change:.4g} J along a motion in which the force does "
             f"{work:.4g} J of work"
         )
-
-
-def _check_forces(simulation: BuiltScene, parts: Sequence[tuple[str, Any]]) -> None:
-    """That forces of foreign parts have their shape: others may fit by broadcasting."""
-    modules = {type(part).__module__ for kind, part in parts if kind in ("effects", "boundaries")}
-    wrong = force_problems(simulation, modules)
-    if wrong:
-        raise BuildError(wrong)
-
-
-def force_problems(simulation: BuiltScene, modules: set[str]) -> list[str]:
-    """What is wrong with the forces of conditions whose classes are of `modules`."""
-    # One that writes to what it is given is told so here, before it changes a motion.
-    state, d = read_only(simulation.initial), simulation.particles.dimension
-    found = []
-    for load in simulation.dynamics.loads:
-        if type(load).__module__ in modules and isinstance(load, Load):
-            x, v, h = state.positions, state.velocities, simulation.step_size
-            f, kept = load.advance(0.0, 0.0, x, v, state.memory)
-            wrong = returned_values.force(load, f, d) or returned_values.kept(load, kept)
-            if not wrong:
-                f, kept = load.advance(h, h, x, v, {**state.memory, **kept})
-                wrong = returned_values.force(load, f, d) or returned_values.kept(load, kept)
-            found.append(wrong)
-    return [one for one in found if one]

@@ -1,11 +1,11 @@
-"""Which near particles see each other: the straight line between them stays inside the body.
+"""Visibility of neighbours: the straight line between two neighbours stays inside the body.
 
-The visibility criterion of Belytschko, Lu and Gu (1994), Int. J. Numer. Meth. Engng 37, 229-256:
-a neighbour across a gap, a slot or a notch is none.
+Criterion of Belytschko, Lu and Gu (1994), Int. J. Numer. Meth. Engng 37, 229-256: particles across
+a gap, a slot or a notch are no neighbours.
 
-Lines are followed by the shape's signed distance. A point at depth D clears the line for D on both
-sides, and what is not cleared is halved and asked again, so no line escapes that leaves the body by
-more than two tolerances. Where the ends are deep enough nothing is asked at all.
+Lines are checked by the signed distance of the shape. A point at depth D clears the line over a
+length D on both sides; the rest is bisected. Every line that leaves the body by more than two
+tolerances is found. Lines between sufficiently deep points need no check.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.neighbours import Hidden, neighbour_pairs
 from solidsph.model.particles import Particles
 
-# In spacings. A particle stands for a piece of the body about one spacing wide, wherever in it the
-# discretisation puts it: lines start and end this deep inside. So a line along a surface does not
-# scratch it, and one past a smooth hole is free unless the hole is as small as the support.
+# Depth at which lines start and end [spacings]. A particle stands for a piece of the body about one
+# spacing wide, wherever in it the discretisation puts it. So a line along a surface stays inside,
+# and so does one past a smooth hole, unless the hole is as small as the support.
 _DEPTH = 0.5
 
-# In spacings: what a line may leave the body by, for shapes that touch up to rounding. Gaps wider
-# than four of these are found wherever they lie.
+# Distance by which a line may leave the body [spacings], for shapes that touch up to rounding. Gaps
+# wider than four of these are always found.
 _TOLERANCE = 0.01
 
-# Of the spacing: differences of the signed distance give the way into the body.
+# Step of differences of the signed distance, for the direction into the body [spacings].
 _STEP = 1e-3
 
-# Attempts to bring a particle to its depth; each one halves the way where the body is thin.
+# Attempts to move a line's end to its depth; each halves the way where the body is thin.
 _ATTEMPTS = 8
 
 _ROWS_AT_ONCE = 1024
@@ -43,39 +43,40 @@ _LINES_AT_ONCE = 1 << 15
 def hidden_pairs(
     shape: Shape, particles: Particles, radius: float, *, moving: bool = False
 ) -> Hidden | None:
-    """Pairs of `particles` in `shape` closer than `radius` [m] that do not see each other.
+    """Pairs of particles within a support that cannot see each other; None if there are none.
 
-    Ghosts lie outside on purpose and see everyone. None where nobody is hidden.
+    Ghosts lie outside the body and see all particles.
 
     Args:
-        shape: the body's.
+        shape: shape of the body.
         particles: its particles.
-        radius: of the support [m].
-        moving: whether neighbours are found anew as particles move: pieces of the body that hang
-            together by no chain of neighbours then stay apart wherever they go.
+        radius: support radius [m].
+        moving: whether neighbours are searched again as particles move. Pieces of the body that
+            no chain of neighbours connects then never become neighbours.
     """
     if shape.convex:
         return None
     X, n = particles.positions, particles.count
     real = np.flatnonzero(~particles.ghosts)
     spacing = float(particles.spacings.min())
-    points, depths = _drawn_in(shape, X[real], spacing)
-    found = [
+    points, depths = _line_ends(shape, X[real], spacing)
+    pairs = [
         real[ends[:, _leave(shape, points, depths, ends, _TOLERANCE * spacing)]]
         for ends in _near_surface(X[real], depths, radius, spacing)
     ]
-    p, q = np.concatenate(found, axis=1) if found else np.empty((2, 0), dtype=np.intp)
+    p, q = np.concatenate(pairs, axis=1) if pairs else np.empty((2, 0), dtype=np.intp)
     hidden = Hidden(np.sort(np.concatenate([p * n + q, q * n + p])), n)
     if moving:
-        pairs = neighbour_pairs(X, radius, hidden)
-        count, pieces = connected_components(pairs.matrix(np.ones(pairs.count)), directed=False)
+        visible = neighbour_pairs(X, radius, hidden)
+        graph = visible.matrix(np.ones(visible.count))
+        count, pieces = connected_components(graph, directed=False)
         if count > 1:
             return Hidden(hidden.keys, n, pieces.astype(np.intp))
     return hidden if len(hidden.keys) else None
 
 
-def _drawn_in(shape: Shape, X: Array, spacing: float) -> tuple[Array, Array]:
-    """Where lines from particles at X (n, d) begin, (n, d), and how deep that is, (n,) [m]."""
+def _line_ends(shape: Shape, X: Array, spacing: float) -> tuple[Array, Array]:
+    """Ends of lines from particles at X (n, d), (n, d), and their depths, (n,) [m]."""
     points, depths = X.copy(), -shape.signed_distance(X)
     wanted, share = _DEPTH * spacing, np.ones(len(X))
     for _ in range(_ATTEMPTS):
@@ -86,7 +87,7 @@ def _drawn_in(shape: Shape, X: Array, spacing: float) -> tuple[Array, Array]:
         way = share[near] * (wanted - depths[near])
         moved = points[near] + way[:, None] * inwards
         reached = -shape.signed_distance(moved)
-        # On the way into a corner a step gains least: 1 / sqrt(3) of its length in space.
+        # A step towards a corner gains least: 1 / sqrt(3) of its length in 3D.
         gains = reached >= depths[near] + 0.5 * way
         points[near[gains]], depths[near[gains]] = moved[gains], reached[gains]
         share[near[~gains]] *= 0.5
@@ -94,7 +95,7 @@ def _drawn_in(shape: Shape, X: Array, spacing: float) -> tuple[Array, Array]:
 
 
 def _inwards(shape: Shape, points: Array, step: float) -> Array:
-    """Unit vectors along which the depth grows, (m, d); zero where it does not."""
+    """Unit vectors of increasing depth, (m, d); zero where there is none."""
     slopes = np.empty_like(points)
     for axis, along in enumerate(step * np.eye(points.shape[1])):
         slopes[:, axis] = shape.signed_distance(points - along) - shape.signed_distance(
@@ -106,15 +107,15 @@ def _inwards(shape: Shape, points: Array, step: float) -> Array:
 
 
 def _near_surface(X: Array, depths: Array, radius: float, spacing: float) -> Iterator[Indices]:
-    """Pairs of near particles whose depths do not clear the line between them, (2, k) each."""
-    # Drawn in, two particles may be up to a spacing further apart than they are.
+    """Arrays (2, k) of neighbour pairs whose depths do not clear the line between them."""
+    # The ends of a line may be up to a spacing further apart than its particles.
     longest = radius + 2.0 * _DEPTH * spacing
     shallow = np.flatnonzero(depths < longest)
     shallow = shallow[np.argsort(depths[shallow], kind="stable")]
     if not shallow.size:
         return
     tree = cKDTree(X[shallow])
-    starts = int(np.searchsorted(depths[shallow], 0.5 * longest))  # of a pair the shallower one
+    starts = int(np.searchsorted(depths[shallow], 0.5 * longest))  # the shallower of two ends
     for first in range(0, starts, _ROWS_AT_ONCE):
         rows = shallow[first : min(first + _ROWS_AT_ONCE, starts)]
         near = cKDTree(X[rows]).sparse_distance_matrix(tree, radius, output_type="ndarray")
@@ -125,7 +126,7 @@ def _near_surface(X: Array, depths: Array, radius: float, spacing: float) -> Ite
 
 
 def _leave(shape: Shape, points: Array, depths: Array, ends: Indices, tolerance: float) -> Mask:
-    """Whether each line between `points` of the `ends` (2, k) leaves the body, (k,)."""
+    """Whether the line between the points `ends` (2, k) leaves the body, (k,)."""
     return np.concatenate(
         [
             _lines_leave(shape, points[ends[:, some]], depths[ends[:, some]], tolerance)
@@ -138,7 +139,7 @@ def _leave(shape: Shape, points: Array, depths: Array, ends: Indices, tolerance:
 
 
 def _lines_leave(shape: Shape, ends: Array, depths: Array, tolerance: float) -> Mask:
-    """The same of lines between two points, (2, k, d), at depths (2, k)."""
+    """`_leave` for pairs of points (2, k, d) at depths (2, k)."""
     start, along = ends[0], ends[1] - ends[0]
     lengths = np.linalg.norm(along, axis=1)
     along /= np.where(lengths > 0.0, lengths, 1.0)[:, None]

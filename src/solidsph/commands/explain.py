@@ -24,11 +24,11 @@ from solidsph.commands.prediction import (
 from solidsph.commands.target import parameters, resolve
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.cluster import Cluster
-from solidsph.costs.estimated import estimated
-from solidsph.costs.foreseen import foreseen
-from solidsph.costs.model import Prediction, predicted
+from solidsph.costs.effect_shares import Share, effect_shares
+from solidsph.costs.estimate import estimate_work
+from solidsph.costs.model import Prediction, predict
+from solidsph.costs.prediction import predict_run
 from solidsph.costs.process import machine_memory
-from solidsph.costs.shares import Share, shares
 from solidsph.errors import SceneError
 from solidsph.interfaces.plan import Compilation
 from solidsph.registry import registry
@@ -136,7 +136,7 @@ def _explained(
     scene: Scene, machine: Calibration, cluster: Cluster, compiled: frozenset[Compilation]
 ) -> tuple[Prediction, Facts]:
     try:
-        prediction = predicted(estimated(scene), machine, compiled=compiled)
+        prediction = predict(estimate_work(scene), machine, compiled=compiled)
     except Exception:  # a wrong part, which the build reports, or one that cannot be estimated
         prediction = None
     if prediction is not None and prediction.memory > machine_memory():
@@ -144,8 +144,8 @@ def _explained(
         facts["on a cluster"] = cluster_rows(prediction, machine, cluster)
     else:
         simulation, build = build_timed(scene)
-        prediction = foreseen(simulation, machine, built=build, compiled=compiled)
-        facts = _built(simulation, shares(simulation, machine))
+        prediction = predict_run(simulation, machine, built=build, compiled=compiled)
+        facts = _built(simulation, effect_shares(simulation, machine))
     return prediction, {
         **facts,
         "work": work_rows(prediction.work),

@@ -12,11 +12,11 @@ import click
 
 from solidsph.costs import calibration
 from solidsph.costs.calibration import Calibration
-from solidsph.costs.cluster import Cluster, priced
+from solidsph.costs.cluster import Cluster, estimate_on_cluster
 from solidsph.costs.coefficients import REFERENCE
-from solidsph.costs.foreseen import foreseen
 from solidsph.costs.model import Built, Prediction
-from solidsph.costs.process import company, machine_memory, memory_now, peak_memory
+from solidsph.costs.prediction import predict_run
+from solidsph.costs.process import excess_load, machine_memory, memory_now, peak_memory
 from solidsph.costs.work import Work
 from solidsph.interfaces.plan import Compilation
 from solidsph.run.outcome import FINISHED
@@ -63,7 +63,7 @@ def this_machine() -> Calibration:
         return REFERENCE
 
 
-def predict_run(
+def try_prediction(
     simulation: Simulation, build: Built | None, compiled: Collection[Compilation] = ()
 ) -> Prediction | None:
     """Time and memory of a run; None if they cannot be predicted, which must not end the run.
@@ -71,11 +71,11 @@ def predict_run(
     The machine is calibrated only for runs that are long enough.
     """
     try:
-        estimate = foreseen(simulation, REFERENCE, built=build, compiled=compiled)
-        known = calibration.kept()
+        estimate = predict_run(simulation, REFERENCE, built=build, compiled=compiled)
+        known = calibration.cached_calibration()
         if known is None and estimate.run_seconds < _SHORT:
             return estimate
-        return foreseen(simulation, known or this_machine(), built=build, compiled=compiled)
+        return predict_run(simulation, known or this_machine(), built=build, compiled=compiled)
     except Exception:
         return None
 
@@ -125,7 +125,7 @@ def prediction_rows(prediction: Prediction) -> list[Row]:
         "steps": "work above times the measured speed of this machine",
         "outputs": "observing, and writing the record",
     }
-    limit, busy = f"limited by: {prediction.limit}", company()
+    limit, busy = f"limited by: {prediction.limit}", excess_load()
     if busy >= 0.5:
         limit += f"; {busy:.1f} other programs want a core: it takes longer"
     return rows(
@@ -148,7 +148,7 @@ def prediction_rows(prediction: Prediction) -> list[Row]:
 
 def cluster_rows(prediction: Prediction, machine: Calibration, cluster: Cluster) -> list[Row]:
     """Estimate for a scene larger than this machine, on an assumed cluster."""
-    price = priced(prediction, machine, cluster)
+    price = estimate_on_cluster(prediction, machine, cluster)
     a = attrs.asdict(cluster)
     return rows(
         ("memory [GiB]", prediction.memory / 2**30, "MORE THAN THIS MACHINE HAS"),

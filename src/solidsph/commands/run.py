@@ -32,7 +32,7 @@ from solidsph.commands.options import (
 )
 from solidsph.commands.receipt_tables import case_receipts, case_receipts_text, receipts_text
 from solidsph.commands.target import name_of, resolve
-from solidsph.costs.fits import check_fits
+from solidsph.costs.memory_check import check_memory
 from solidsph.costs.model import Prediction
 from solidsph.costs.process import peak_memory
 from solidsph.errors import SceneError, UnsoundError
@@ -82,7 +82,7 @@ class _Options(ProgressOutput):
     def check_memory(self, scene: Scene) -> None:
         """Refuse a scene that needs more memory than is free, unless that is wanted."""
         if not self.beyond_memory:
-            check_fits(scene)
+            check_memory(scene)
 
     def check_record(self, path: Path) -> None:
         """Refuse to replace a record that must stay; print which one is replaced."""
@@ -145,7 +145,7 @@ def _run_scene(target: str, scene: Scene, path: Path, options: _Options) -> None
     known["warnings"] += [warning.line for warning in advice]
     if not options.as_json:
         _warn(advice)
-    predicted = predictions.predict_run(simulation, build)
+    predicted = predictions.try_prediction(simulation, build)
     if options.progress and (announcement := predictions.announcement(predicted)):
         say(announcement)
     unsound: UnsoundError | None = None
@@ -242,7 +242,7 @@ def _run_case(target: str, case: Case, folder: Path, options: _Options) -> None:
 
         def begin(name: str, simulation: Simulation) -> Sequence[object]:
             compiled = {c for p in predicted.values() if p for c in p.work.compilations}
-            predicted[name] = predictions.predict_run(simulation, None, compiled)
+            predicted[name] = predictions.try_prediction(simulation, None, compiled)
             advice = advise(simulation)
             if advice:
                 known["warnings"][name] = [warning.line for warning in advice]

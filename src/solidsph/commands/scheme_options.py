@@ -12,7 +12,7 @@ from solidsph.commands.target import resolve
 from solidsph.errors import SceneError
 from solidsph.registry import registry
 from solidsph.registry.construct import describe
-from solidsph.scene.default_cover import own_cover
+from solidsph.scene.default_cover import kernel_cover
 from solidsph.scene.scene import Scene
 from solidsph.studies.scheme import Scheme
 
@@ -61,7 +61,7 @@ class SchemeOptions:
         changes: dict[str, Any] = {}
         if self.kernel is not None:
             changes["kernel"] = example_part("kernels", self.kernel)
-            changes["cover"] = own_cover(changes["kernel"])
+            changes["cover"] = kernel_cover(changes["kernel"])
         if self.cover is not None:
             changes["cover"] = self.cover
         if self.material is not None:

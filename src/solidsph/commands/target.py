@@ -12,7 +12,7 @@ from solidsph.errors import SceneError
 from solidsph.registry import registry
 from solidsph.registry.construct import construct
 from solidsph.scene.scene import Scene
-from solidsph.scene.toml_reader import MOST_BYTES, near
+from solidsph.scene.toml_reader import MOST_BYTES, similar_names
 from solidsph.studies.case import Case
 from solidsph.system.encoding import decoded
 
@@ -36,7 +36,7 @@ def resolve(target: str, settings: Sequence[str]) -> Scene | Case:
         return _from_standard_input() if target == STANDARD_INPUT else Scene.read(path)
     if target not in cases:
         what = "no file" if "/" in target or "." in target else "unknown case"
-        hint = near(target, *cases) or "; give a scene file, or a case: solidsph cases"
+        hint = similar_names(target, *cases) or "; give a scene file, or a case: solidsph cases"
         raise SceneError(f"{what} {target!r}{hint}")
     case: Case = construct("cases", {"type": target, **parameters(settings)})
     return case

@@ -1,1 +1,1 @@
-"""What a run costs, in time and memory, said before it and held against the truth after it."""
+"""Predicted time and memory of a run, and the measurements that the predictions rest on."""

@@ -1,7 +1,7 @@
-"""Calibration: what this machine does in a second, measured in about one second.
+"""Calibration: speed of this machine at small tasks, measured in about one second.
 
-In a process of its own, so that the memory of whoever asks stays what it is, and imports and the
-first compilation are really first.
+The measurement runs in a separate process, so that it does not change the memory of the caller,
+and so that imports and the first compilation are cold.
 """
 
 from __future__ import annotations
@@ -21,41 +21,40 @@ from typing import Any
 
 import attrs
 
-# A cached calibration is used for so long [s]: a machine's neighbours and its cooling change.
+# Lifetime of a cached calibration [s]: the load and the cooling of a machine change.
 _STALE = 86400.0
 
-# What no calibration may take [s]; it takes about one.
+# Timeout of a calibration [s]; it takes about one.
 _LONGEST = 20.0
 
-
 CACHE = "SOLIDSPH_CACHE"
-"""Environment variable: the folder of the cache, in place of the user's own."""
+"""Environment variable: folder of the cache, instead of the user's cache folder."""
 
 
 @attrs.frozen
 class Calibration:
-    """Times of small tasks on one machine, each the best of several."""
+    """Times of small tasks on one machine, each the best of several repeats."""
 
-    sparse: float  # of an entry in a product of a sparse matrix with vectors that caches hold [s]
-    calls: float  # of a call of a small array function [s]
-    compiling: float  # of a small function, once the compiler is there [s]
-    copying: float  # of a byte beyond the caches, read and written, by one thread [s]
-    copying_shared: float  # of the same by as many threads as there are cores [s]
-    threads: int  # as many
-    filing: float  # of a byte appended to a file of the record's kind [s]
-    appending: float  # of a small step appended to it, flushed [s]
+    sparse: float  # per entry of a sparse matrix product within the cache [s]
+    calls: float  # per call of a small array function [s]
+    compiling: float  # per small function, after the first [s]
+    copying: float  # per byte copied beyond the caches, by one thread [s]
+    copying_shared: float  # per byte copied by all threads together [s]
+    threads: int
+    filing: float  # per byte appended to a file like the record [s]
+    appending: float  # per small step appended to it and flushed [s]
     bare: int  # memory of the process after the imports of a run [bytes]
 
     def to_json(self) -> str:
-        """Text from which an equal one is read."""
+        """JSON text, read by `from_json`."""
         return json.dumps(attrs.asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> Calibration:
-        """From text.
+        """Read the text of `to_json`.
 
         Raises:
-            ValueError: it is not that of a calibration.
+            ValueError: the text is no calibration of this version.
         """
         table = json.loads(text)
         fields = {field.name: field.type for field in attrs.fields(cls)}
@@ -63,25 +62,25 @@ class Calibration:
             raise ValueError("not a calibration of this version")
         for name, value in table.items():
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not value > 0:
-                raise ValueError(f"calibration: {name} = {value!r} is no positive number")
+                raise ValueError(f"calibration: {name} = {value!r} is not a positive number")
         return cls(**table)
 
 
 @cache
 def this_machine() -> Calibration:
-    """The calibration of this machine: of this process, of a file of the last day, or anew."""
-    found = kept()
-    if found is None:
-        found = calibrated()
-        _keep(cache_file(), found)
-    return found
+    """Calibration of this machine: from this process, from the cache file, or measured."""
+    calibration = cached_calibration()
+    if calibration is None:
+        calibration = measure_calibration()
+        _write(cache_file(), calibration)
+    return calibration
 
 
-def kept() -> Calibration | None:
-    """What the cache file holds; nothing if it is old, broken or not there."""
+def cached_calibration() -> Calibration | None:
+    """Calibration in the cache file; None if it is old, broken or missing."""
     path = cache_file()
     try:
-        # Files may be served by a machine whose clock is ahead of this one's.
+        # The clock of a file server may be ahead of this one.
         if abs(clock.time() - path.stat().st_mtime) > _STALE:
             return None
         return Calibration.from_json(path.read_text(encoding="utf-8"))
@@ -89,22 +88,19 @@ def kept() -> Calibration | None:
         return None
 
 
-def calibrated() -> Calibration:
-    """Measured now, in a process of its own."""
-    command = [sys.executable, "-m", "solidsph.costs.yardsticks"]
+def measure_calibration() -> Calibration:
+    """Measure in a separate process."""
+    command = [sys.executable, "-m", "solidsph.costs.microbenchmarks"]
+    # Warnings that the caller turned into errors must not end the measurement.
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONWARNINGS"}
     done = subprocess.run(
-        command, capture_output=True, text=True, check=True, timeout=_LONGEST, env=_environment()
+        command, capture_output=True, text=True, check=True, timeout=_LONGEST, env=environment
     )
     return Calibration.from_json(done.stdout)
 
 
-def _environment() -> dict[str, str]:
-    # What the caller has set for its own threads and plugins is not for this.
-    return {name: value for name, value in os.environ.items() if name != "PYTHONWARNINGS"}
-
-
 def cache_file() -> Path:
-    """Where the calibration of this machine and this version is kept."""
+    """Path of the cache file of this machine and this version."""
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     folder = Path(os.environ.get(CACHE) or Path(home) / "solidsph")
     machine = f"{platform.node()}-{platform.machine()}-{os.cpu_count()}"
@@ -112,12 +108,12 @@ def cache_file() -> Path:
     return folder / f"calibration-{version('solidsph')}-{safe}.json"
 
 
-def _keep(path: Path, found: Calibration) -> None:
-    """In one piece or not at all; a machine without a place for it does without."""
+def _write(path: Path, calibration: Calibration) -> None:
+    """Write the cache file atomically; do nothing where that is impossible."""
     draft = path.with_name(f"{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        draft.write_text(found.to_json(), encoding="utf-8")
+        draft.write_text(calibration.to_json(), encoding="utf-8")
         draft.replace(path)
     except OSError:
         with suppress(OSError):
@@ -127,13 +123,13 @@ def _keep(path: Path, found: Calibration) -> None:
 def best(
     task: Callable[[], Any], repeats: int, ticks: Callable[[], float] = clock.process_time
 ) -> float:
-    """Shortest time of several [s]: what the machine can do where nobody disturbs it.
+    """Shortest time of several repeats [s], least affected by other programs.
 
-    By the clock of the processor, unless several threads share the task.
+    The default clock is that of the processor; a task of several threads needs a wall clock.
     """
     times = []
     for _ in range(repeats):
-        begun = ticks()
+        start = ticks()
         task()
-        times.append(ticks() - begun)
+        times.append(ticks() - start)
     return min(times)

@@ -1,7 +1,6 @@
-"""Coefficients of the cost model, in units of a calibration; those of memory in bytes.
+"""Coefficients of the cost model, in units of a calibration, or in bytes.
 
-Printed by `python benchmarks/fit_costs.py`, which says how they are measured; nothing here is
-edited by hand.
+Printed by `python benchmarks/fit_costs.py`, which describes the measurement; do not edit by hand.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from collections.abc import Mapping
 
 from solidsph.costs.calibration import Calibration
 
-# Of the machine that they were measured on.
+# Calibration of the machine on which they were measured.
 REFERENCE = Calibration(
     sparse=2.309e-09,
     calls=2.672e-07,

@@ -1,4 +1,4 @@
-"""The cost model: from a run's work and a machine's calibration to seconds and bytes."""
+"""Cost model: time and memory of a run from its work and the calibration of a machine."""
 
 from __future__ import annotations
 
@@ -10,56 +10,56 @@ import attrs
 from solidsph.costs import terms
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.coefficients import COEFFICIENTS
-from solidsph.costs.terms import CostTerm, Yard
+from solidsph.costs.terms import CostTerm
 from solidsph.costs.work import Loop, Work
 from solidsph.interfaces.plan import Compilation, Way
 
-# Not in the fit yet, which will bring them when it is next made: what a step takes more with a
-# constant force, or one by a particle's own motion, over the particles that it acts on.
-_APART = {
+# Additional cost of a step per particle on which a constant or pointwise force acts; not part of
+# the fit yet.
+_UNFITTED = {
     "compiled step loaded particle 1D": 1.1,
     "compiled step loaded particle 2D": 1.5,
     "compiled step loaded particle 3D": 2.5,
 }
 
-# Ways that form their weights at every evaluation: what is not known is not taken to be so dear.
+# Ways that form their weights at every evaluation, too expensive to stand for an unknown way.
 _ANEW = (Way.PRODUCTS_ANEW, Way.FORMULAS, Way.WEIGHTS)
 
 
 @attrs.frozen
 class Built:
-    """What the build of a scene took, seen from outside."""
+    """Measured cost of a build."""
 
     seconds: float
-    peak: int  # of the process until then [bytes]
-    left: int  # in use when it was done [bytes]
+    peak: int  # largest memory of the process until its end [bytes]
+    left: int  # in use at its end [bytes]
 
 
 @attrs.frozen
 class Prediction:
-    """What a run is expected to take."""
+    """Predicted time and memory of a run."""
 
     work: Work
-    build: float  # [s]; measured, if the scene was built to be looked at
+    build: float  # [s]; measured if the scene was built
     compiling: float  # [s]
-    steps: float  # all of them, in time or of Newton's method [s]
-    outputs: float  # observations and their record [s]
+    steps: float  # all time steps, or iterations of Newton's method [s]
+    outputs: float  # observation and record [s]
     memory: int  # peak of the process [bytes]
     measured_build: bool
 
     @property
     def seconds(self) -> float:
-        """From the beginning of the build to the end of the run."""
+        """Time from the beginning of the build to the end of the run [s]."""
         return self.build + self.run_seconds
 
     @property
     def run_seconds(self) -> float:
-        """Of the run, its build not counted."""
+        """Time of the run without its build [s]."""
         return self.compiling + self.steps + self.outputs
 
     @property
     def parts(self) -> Mapping[str, float]:
-        """Seconds by what they are spent on."""
+        """Time by stage [s]."""
         return {
             "build": self.build,
             "compile": self.compiling,
@@ -69,95 +69,87 @@ class Prediction:
 
     @property
     def limit(self) -> str:
-        """What takes most of the time."""
+        """Stage that takes most of the time."""
         return max(self.parts, key=lambda name: self.parts[name])
 
 
-def predicted(
+def predict(
     work: Work,
     machine: Calibration,
     *,
     built: Built | None = None,
     compiled: Collection[Compilation] = (),
-    besides: float = 0.0,
+    extra: float = 0.0,
 ) -> Prediction:
-    """What a run of this work takes on this machine.
+    """Predict the time and memory of a run.
 
     Args:
-        work: counted, or estimated.
-        machine: its calibration.
-        built: what the build took, if there was one; otherwise it is predicted too.
-        compiled: what this process has compiled before.
-        besides: seconds of every evaluation that `work` does not count, since they were timed.
+        work: counted or estimated.
+        machine: calibration of the machine.
+        built: measured cost of the build; predicted if None.
+        compiled: functions that this process has compiled already.
+        extra: measured time per evaluation of what `work` does not count [s].
     """
     new = attrs.evolve(work, compilations=work.compilations - frozenset(compiled))
     return Prediction(
         work=work,
-        build=_seconds(terms.build_terms(new), machine) if built is None else built.seconds,
-        compiling=_seconds(terms.compile_terms(new), machine),
-        steps=_stepping(work, machine) + work.evaluations * besides,
-        outputs=work.outputs * _seconds(terms.output_terms(work), machine)
-        + _seconds(terms.start_terms(work), machine),
+        build=_total(terms.build_terms(new), machine) if built is None else built.seconds,
+        compiling=_total(terms.compile_terms(new), machine),
+        steps=_stepping(work, machine) + work.evaluations * extra,
+        outputs=work.outputs * _total(terms.output_terms(work), machine)
+        + _total(terms.start_terms(work), machine),
         memory=_memory(new, machine, built),
         measured_build=built is not None,
     )
 
 
 def step_seconds(work: Work, machine: Calibration, threads: int | None = None) -> float:
-    """Time of one step, by as many threads as there are cores, or by so many [s]."""
+    """Predicted time of one step [s], on all threads of the machine by default."""
     count = machine.threads if threads is None else threads
-    single = _seconds(terms.step_terms(work), machine)
-    shared = _seconds(terms.shared_terms(work), machine)
-    # No step is faster than memory: what is touched is read, where a copy reads and writes.
+    single = _total(terms.step_terms(work), machine)
+    shared = _total(terms.shared_terms(work), machine)
+    # Memory bandwidth is a lower bound; a copy both reads and writes, hence the factor.
     copying = machine.copying if count == 1 else machine.copying_shared
-    return max(single - shared + shared / terms.together(count), 0.5 * copying * work.touched)
+    return max(single - shared + shared / terms.speedup(count), 0.5 * copying * work.touched)
 
 
 def _stepping(work: Work, machine: Calibration) -> float:
     if work.loop is Loop.NEWTON and work.statics is not None:
-        return work.statics.iterations * _seconds(terms.iteration_terms(work), machine)
+        return work.statics.iterations * _total(terms.iteration_terms(work), machine)
     return work.evaluations * step_seconds(work, machine)
 
 
 def _memory(work: Work, machine: Calibration, built: Built | None) -> int:
-    run = _sum(terms.run_memory(work), machine)
+    run = _total(terms.run_memory(work), machine)
     if built is not None:
         return max(built.peak, built.left + ceil(run))
-    build = _sum(terms.build_memory(work), machine)
-    # Beside the engine's arrays there are the particles and the first state.
+    build = _total(terms.build_memory(work), machine)
+    # Particles and initial state, beside the engine's arrays.
     arrays = 8 * work.particles * (5 * work.dimension + 4)
-    left = _sum(terms.left_memory(work), machine) + work.held + arrays
+    left = _total(terms.left_memory(work), machine) + work.held + arrays
     return machine.bare + ceil(max(build, left + run))
 
 
-def _seconds(some: Iterable[CostTerm], machine: Calibration) -> float:
-    return _sum(some, machine)
-
-
-def _sum(some: Iterable[CostTerm], machine: Calibration) -> float:
-    return sum(coefficient(one.name) * one.count * _unit(one.yard, machine) for one in some)
+def _total(several: Iterable[CostTerm], machine: Calibration) -> float:
+    return sum(coefficient(t.name) * t.count * t.unit.size(machine) for t in several)
 
 
 def coefficient(name: str) -> float:
-    """The coefficient of that name, or of what is most like it among those that were measured.
+    """Coefficient `name`, or the closest one that was measured.
 
-    Sums in single precision are like those in double; of a way that is not known, like the dearest
-    that compiled loops or arrays have in that dimension.
+    Single precision falls back on double precision, and an unknown way on the most expensive one
+    of its kind and dimension.
     """
     if name in COEFFICIENTS:
         return COEFFICIENTS[name]
-    if name in _APART:
-        return _APART[name]
+    if name in _UNFITTED:
+        return _UNFITTED[name]
     words = [word for word in name.split() if not word.startswith("float")]
     if " ".join(words) in COEFFICIENTS:
         return COEFFICIENTS[" ".join(words)]
-    several = [
+    candidates = [
         COEFFICIENTS.get(" ".join([way.name, *words[1:]]), 0.0)
         for way in Way
         if words[0] in Way.__members__ and way not in _ANEW
     ]
-    return max(several, default=0.0)
-
-
-def _unit(yard: Yard, machine: Calibration) -> float:
-    return 1.0 if yard is Yard.BYTES else float(getattr(machine, yard.value))
+    return max(candidates, default=0.0)

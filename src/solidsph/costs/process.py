@@ -1,4 +1,4 @@
-"""What the system tells of this process and this machine."""
+"""Memory and load of this process and this machine, as the operating system reports them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 def peak_memory() -> int:
     """Largest resident size of this process so far [bytes]."""
-    # What `getrusage` tells on Linux may be that of the process that started this one.
+    # On Linux `getrusage` may report the peak of the parent process.
     status = Path("/proc/self/status")
     if status.exists():
         for line in status.read_text().splitlines():
@@ -22,7 +22,7 @@ def peak_memory() -> int:
 
 
 def memory_now() -> int:
-    """Resident size of this process now [bytes]; its largest where the system does not tell."""
+    """Resident size of this process [bytes]; its peak if the system does not report it."""
     status = Path("/proc/self/statm")
     if status.exists():
         return int(status.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
@@ -35,22 +35,22 @@ def machine_memory() -> int:
 
 
 def available_memory() -> int:
-    """Memory that new work can take without swapping [bytes]; all there is where nobody tells."""
-    found = [machine_memory()]
+    """Memory available without swapping [bytes]; all memory if the system does not report it."""
+    limits = [machine_memory()]
     status = Path("/proc/meminfo")
     if status.exists():
         for line in status.read_text().splitlines():
             if line.startswith("MemAvailable"):
-                found.append(1024 * int(line.split()[1]))
+                limits.append(1024 * int(line.split()[1]))
     # A container may have less than its machine.
     limit, used = (Path("/sys/fs/cgroup") / name for name in ("memory.max", "memory.current"))
-    with suppress(OSError, ValueError):  # there is none, or it is "max"
-        found.append(max(0, int(limit.read_text()) - int(used.read_text())))
-    return min(found)
+    with suppress(OSError, ValueError):  # no such file, or "max"
+        limits.append(max(0, int(limit.read_text()) - int(used.read_text())))
+    return min(limits)
 
 
-def company() -> float:
-    """How many other programs want a core, beyond those that there are; 0 if nobody can tell."""
+def excess_load() -> float:
+    """Load average beyond the number of cores; 0 if the system does not report it."""
     if not hasattr(os, "getloadavg"):
         return 0.0
     return max(0.0, os.getloadavg()[0] - (os.cpu_count() or 1))

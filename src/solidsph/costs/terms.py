@@ -1,4 +1,4 @@
-"""Terms: what each count of a run's work is multiplied by, and in which unit of a calibration."""
+"""Terms of the cost model: counts of work, each with its coefficient and its unit."""
 
 from __future__ import annotations
 
@@ -8,184 +8,193 @@ from math import exp
 
 import attrs
 
+from solidsph.costs.calibration import Calibration
 from solidsph.costs.work import Loop, Work
 from solidsph.interfaces.plan import Operations, Piece, Way
 
-# Of the threads that share a sum, what they are together beside one alone.
-_TOGETHER = 0.95
+# Parallel efficiency of threads that share a sum.
+_EFFICIENCY = 0.95
 
-# From so many operations of about a nanosecond the compiled loop shares what it does particle by
-# particle; each is counted as so many.
+# The compiled loop uses threads for a pass over particles from this many operations of about a
+# nanosecond on; a particle counts as so many.
 _WORTH_A_THREAD, _PER_PARTICLE = 200_000, 10
 
-# Outputs of which the library of files remembers what it wrote, before it forgets the first.
-_REMEMBERED = 150.0
+# Outputs whose chunks HDF5 keeps cached.
+_CACHED_OUTPUTS = 150.0
 
-# From this size on the C library asks the system for each array, which clears every page [bytes].
+# The C library requests larger arrays from the system one by one, which clears every page [bytes].
 _LARGE = 128 * 1024
 
 _OF_BUILD = (Piece.ENGINE, Piece.MOVING_ENGINE)
 
 
-class Yard(Enum):
-    """A time of the calibration: which of a machine's abilities a term depends on."""
+class Unit(Enum):
+    """Unit of a term: a time of the calibration, or bytes."""
 
     SPARSE = "sparse"
     CALLS = "calls"
     COMPILING = "compiling"
     FILING = "filing"
     APPENDING = "appending"
-    BYTES = "bytes"  # none: the term is memory
+    BYTES = "bytes"
+
+    def size(self, machine: Calibration) -> float:
+        """One unit on `machine` [s, or bytes]."""
+        return 1.0 if self is Unit.BYTES else float(getattr(machine, self.value))
 
 
 @attrs.frozen
 class CostTerm:
-    """A count, and the name of the coefficient that it is to be multiplied by."""
+    """A count and the name of its coefficient."""
 
     name: str
     count: float
-    yard: Yard
+    unit: Unit
 
 
 def build_terms(work: Work) -> Iterator[CostTerm]:
-    """Of making particles and operators, and compiling what that takes."""
+    """Build: particles, operators, and the compilations that these need."""
     d, kind = work.dimension, _kind(work)
-    yield CostTerm("build", 1.0, Yard.CALLS)
-    yield CostTerm(f"build particle {d}D", work.particles, Yard.SPARSE)
-    yield CostTerm(f"build pair {kind} {d}D", work.pairs, Yard.SPARSE)
+    yield CostTerm("build", 1.0, Unit.CALLS)
+    yield CostTerm(f"build particle {d}D", work.particles, Unit.SPARSE)
+    yield CostTerm(f"build pair {kind} {d}D", work.pairs, Unit.SPARSE)
     for part in work.operations:
         if part.way is Way.HOURGLASS_PRODUCTS or part.way is Way.HOURGLASS_SWEEPS:
-            yield CostTerm(f"build hourglass {d}D", part.pairs, Yard.SPARSE)
+            yield CostTerm(f"build hourglass {d}D", part.pairs, Unit.SPARSE)
         if part.way is Way.PAIR_ARRAYS or part.way is Way.PAIR_LOOPS:
-            yield CostTerm(f"build force {d}D", part.pairs, Yard.SPARSE)
-    yield from _pieces(work, of_build=True)
+            yield CostTerm(f"build force {d}D", part.pairs, Unit.SPARSE)
+    yield from _compilations(work, of_build=True)
 
 
 def compile_terms(work: Work) -> Iterator[CostTerm]:
-    """Of compiling what a run takes beyond its build."""
-    yield from _pieces(work, of_build=False)
+    """Compilations of the run after its build."""
+    yield from _compilations(work, of_build=False)
 
 
 def step_terms(work: Work) -> Iterator[CostTerm]:
-    """Of one evaluation of the forces and the step around it."""
+    """One evaluation of the forces and the step around it."""
     d, n = work.dimension, work.particles
     loop = "compiled step" if work.loop is Loop.COMPILED else "step"
-    yield CostTerm(f"{loop} {d}D", 1.0, Yard.CALLS)
-    yield CostTerm(f"{loop} particle {d}D", n, Yard.SPARSE)
+    yield CostTerm(f"{loop} {d}D", 1.0, Unit.CALLS)
+    yield CostTerm(f"{loop} particle {d}D", n, Unit.SPARSE)
     loads = work.conditions - work.motions
-    if work.loop is Loop.COMPILED:  # where what acts on some particles costs nothing on others
-        own = [part for part in work.operations if part.way is Way.UNKNOWN and not part.pairs]
-        loads -= len(own)
-        count = sum(part.particles for part in own)
-        yield CostTerm(f"{loop} loaded particle {d}D", count, Yard.SPARSE)
+    if work.loop is Loop.COMPILED:  # a load on some particles costs nothing on the others
+        local = [part for part in work.operations if part.way is Way.UNKNOWN and not part.pairs]
+        loads -= len(local)
+        count = sum(part.particles for part in local)
+        yield CostTerm(f"{loop} loaded particle {d}D", count, Unit.SPARSE)
     for kind, count in (("motion", work.motions), ("load", loads)):
-        yield CostTerm(f"{loop} {kind} {d}D", count, Yard.CALLS)
-        yield CostTerm(f"{loop} {kind} particle {d}D", count * n, Yard.SPARSE)
+        yield CostTerm(f"{loop} {kind} {d}D", count, Unit.CALLS)
+        yield CostTerm(f"{loop} {kind} particle {d}D", count * n, Unit.SPARSE)
     for part in work.operations:
         if part.way is Way.UNKNOWN and not part.pairs:
-            continue  # a load on particles, which is among the conditions
+            continue  # a load on particles, counted among the conditions
         if work.loop is Loop.STEPS:
-            yield CostTerm(f"{part.way.name} call", 1.0, Yard.CALLS)
+            yield CostTerm(f"{part.way.name} call", 1.0, Unit.CALLS)
         yield from _sum_terms(part, d)
 
 
 def shared_terms(work: Work) -> Iterator[CostTerm]:
-    """Those terms of a step that threads share."""
+    """Terms of a step that threads share."""
     d = work.dimension
     if work.loop is Loop.COMPILED and _PER_PARTICLE * work.particles >= _WORTH_A_THREAD:
-        yield CostTerm(f"compiled step particle {d}D", work.particles, Yard.SPARSE)
+        yield CostTerm(f"compiled step particle {d}D", work.particles, Unit.SPARSE)
     for part in work.operations:
         if part.threaded:
             yield from _sum_terms(part, d)
 
 
 def output_terms(work: Work) -> Iterator[CostTerm]:
-    """Of one observation and its record."""
+    """One observation and its record."""
     d, n = work.dimension, work.particles
-    yield CostTerm("output", 1.0, Yard.APPENDING)
-    yield CostTerm("output condition", work.conditions, Yard.CALLS)
-    yield CostTerm(f"output particle {_kind(work)} {d}D", n, Yard.SPARSE)
-    yield CostTerm("output byte", work.record_bytes / work.outputs, Yard.FILING)
+    yield CostTerm("output", 1.0, Unit.APPENDING)
+    yield CostTerm("output condition", work.conditions, Unit.CALLS)
+    yield CostTerm(f"output particle {_kind(work)} {d}D", n, Unit.SPARSE)
+    yield CostTerm("output byte", work.record_bytes / work.outputs, Unit.FILING)
     if 8 * n * d * d >= _LARGE:
-        yield CostTerm(f"output large particle {d}D", n, Yard.SPARSE)
+        yield CostTerm(f"output large particle {d}D", n, Unit.SPARSE)
     for part in work.operations:
         if part.way in (Way.HOURGLASS_PRODUCTS, Way.HOURGLASS_SWEEPS):
-            yield CostTerm("output hourglass pair", part.pairs, Yard.SPARSE)
+            yield CostTerm("output hourglass pair", part.pairs, Unit.SPARSE)
 
 
 def start_terms(work: Work) -> Iterator[CostTerm]:
-    """Of what is done once besides: the file, and its reference data."""
-    yield CostTerm("file", 1.0, Yard.APPENDING)
-    yield CostTerm("file particle", work.particles, Yard.SPARSE)
+    """Creation of the file with its reference data."""
+    yield CostTerm("file", 1.0, Unit.APPENDING)
+    yield CostTerm("file particle", work.particles, Unit.SPARSE)
 
 
 def iteration_terms(work: Work) -> Iterator[CostTerm]:
-    """Of an iteration of Newton's method."""
+    """One iteration of Newton's method."""
     statics, d = work.statics, work.dimension
     assert statics is not None
-    yield CostTerm("iteration", 1.0, Yard.CALLS)
-    yield CostTerm(f"tangent pair {d}D", work.pairs, Yard.SPARSE)
-    yield CostTerm(f"tangent entry {d}D", statics.entries, Yard.SPARSE)
-    yield CostTerm(f"factor entry {d}D", statics.fill, Yard.SPARSE)
-    yield CostTerm(f"factor multiplication {d}D", statics.multiplications, Yard.SPARSE)
+    yield CostTerm("iteration", 1.0, Unit.CALLS)
+    yield CostTerm(f"tangent pair {d}D", work.pairs, Unit.SPARSE)
+    yield CostTerm(f"tangent entry {d}D", statics.entries, Unit.SPARSE)
+    yield CostTerm(f"factor entry {d}D", statics.fill, Unit.SPARSE)
+    yield CostTerm(f"factor multiplication {d}D", statics.multiplications, Unit.SPARSE)
 
 
 def build_memory(work: Work) -> Iterator[CostTerm]:
-    """Bytes at the peak of the build, beyond imports."""
+    """Peak memory of the build, imports excluded."""
     d, kind = work.dimension, _kind(work)
-    yield CostTerm("memory of a build", 1.0, Yard.BYTES)
-    yield CostTerm(f"memory particle {kind} {d}D", work.particles, Yard.BYTES)
-    if kind == "compiled":  # pairs are listed some rows at a time: what is kept counts
-        yield CostTerm(f"memory held {d}D", work.held, Yard.BYTES)
+    yield CostTerm("memory of a build", 1.0, Unit.BYTES)
+    yield CostTerm(f"memory particle {kind} {d}D", work.particles, Unit.BYTES)
+    if kind == "compiled":  # pairs are listed in chunks: only the arrays kept count
+        yield CostTerm(f"memory held {d}D", work.held, Unit.BYTES)
     else:
-        yield CostTerm(f"memory pair {kind} {d}D", work.pairs, Yard.BYTES)
-    for one in work.compilations:
-        if one.piece in _OF_BUILD:
-            yield CostTerm(f"memory of {one.piece.name}", 1.0, Yard.BYTES)
+        yield CostTerm(f"memory pair {kind} {d}D", work.pairs, Unit.BYTES)
+    yield from _compiler_memory(work)
 
 
 def left_memory(work: Work) -> Iterator[CostTerm]:
-    """Bytes that a build leaves, beyond imports and the engine's arrays."""
-    yield CostTerm("memory of a build", 1.0, Yard.BYTES)
-    for one in work.compilations:
-        if one.piece in _OF_BUILD:
-            yield CostTerm(f"memory of {one.piece.name}", 1.0, Yard.BYTES)
+    """Memory in use after the build, imports and the engine's arrays excluded."""
+    yield CostTerm("memory of a build", 1.0, Unit.BYTES)
+    yield from _compiler_memory(work)
 
 
 def run_memory(work: Work) -> Iterator[CostTerm]:
-    """Bytes that a run adds to what a build leaves."""
+    """Memory that a run adds to that in use after the build."""
     d = work.dimension
-    yield CostTerm("memory of a run", 1.0, Yard.BYTES)
-    # The file's library keeps what it knows of past outputs, up to a limit of its own.
-    yield CostTerm("memory of a file", 1.0 - exp(-work.outputs / _REMEMBERED), Yard.BYTES)
-    yield CostTerm(f"memory of a run, particle {_kind(work)} {d}D", work.particles, Yard.BYTES)
+    yield CostTerm("memory of a run", 1.0, Unit.BYTES)
+    # HDF5 caches past outputs up to a limit.
+    yield CostTerm("memory of a file", 1.0 - exp(-work.outputs / _CACHED_OUTPUTS), Unit.BYTES)
+    yield CostTerm(f"memory of a run, particle {_kind(work)} {d}D", work.particles, Unit.BYTES)
     for part in work.operations:
         if part.way is Way.PRODUCTS_ANEW or part.way is Way.PAIR_ARRAYS:
-            yield CostTerm(f"memory of a run, pair {part.way.name} {d}D", part.pairs, Yard.BYTES)
-    for one in work.compilations:
-        if one.piece not in _OF_BUILD:
-            yield CostTerm(f"memory of {one.piece.name}{_threads(one.threaded)}", 1.0, Yard.BYTES)
+            yield CostTerm(f"memory of a run, pair {part.way.name} {d}D", part.pairs, Unit.BYTES)
+    for c in work.compilations:
+        if c.piece not in _OF_BUILD:
+            yield CostTerm(f"memory of {c.piece.name}{_threads(c.threaded)}", 1.0, Unit.BYTES)
     if work.statics is not None:
-        yield CostTerm(f"memory of a tangent entry {d}D", work.statics.entries, Yard.BYTES)
-        yield CostTerm(f"memory of a factor entry {d}D", work.statics.fill, Yard.BYTES)
+        yield CostTerm(f"memory of a tangent entry {d}D", work.statics.entries, Unit.BYTES)
+        yield CostTerm(f"memory of a factor entry {d}D", work.statics.fill, Unit.BYTES)
 
 
-def together(threads: int) -> float:
-    """How much faster a sum is by so many threads."""
-    return 1.0 if threads == 1 else _TOGETHER * threads
+def speedup(threads: int) -> float:
+    """Speedup of a sum on this many threads [-]."""
+    return 1.0 if threads == 1 else _EFFICIENCY * threads
 
 
 def _sum_terms(part: Operations, d: int) -> Iterator[CostTerm]:
     precision = f" float{8 * part.precision}" if part.precision != 8 else ""
-    yield CostTerm(f"{part.way.name} {d}D{precision} pair", part.pairs, Yard.SPARSE)
-    if part.way in (Way.STENCILS, Way.ROWS):  # the law, which is in double precision always
-        yield CostTerm(f"{part.way.name} {d}D particle", part.particles, Yard.SPARSE)
+    yield CostTerm(f"{part.way.name} {d}D{precision} pair", part.pairs, Unit.SPARSE)
+    if part.way in (Way.STENCILS, Way.ROWS):  # the material, always in double precision
+        yield CostTerm(f"{part.way.name} {d}D particle", part.particles, Unit.SPARSE)
 
 
-def _pieces(work: Work, *, of_build: bool) -> Iterator[CostTerm]:
-    for one in work.compilations:
-        if (one.piece in _OF_BUILD) == of_build:
-            yield CostTerm(f"compile {one.piece.name}{_threads(one.threaded)}", 1.0, Yard.COMPILING)
+def _compilations(work: Work, *, of_build: bool) -> Iterator[CostTerm]:
+    for part in work.compilations:
+        if (part.piece in _OF_BUILD) == of_build:
+            yield CostTerm(
+                f"compile {part.piece.name}{_threads(part.threaded)}", 1.0, Unit.COMPILING
+            )
+
+
+def _compiler_memory(work: Work) -> Iterator[CostTerm]:
+    for part in work.compilations:
+        if part.piece in _OF_BUILD:
+            yield CostTerm(f"memory of {part.piece.name}", 1.0, Unit.BYTES)
 
 
 def _threads(threaded: bool) -> str:
@@ -193,7 +202,7 @@ def _threads(threaded: bool) -> str:
 
 
 def _kind(work: Work) -> str:
-    """The engine, as its coefficients name it."""
+    """Engine as the names of coefficients have it."""
     ways = {part.way for part in work.operations}
     if ways & {Way.STENCILS, Way.ROWS}:
         return "compiled"

@@ -1,4 +1,4 @@
-"""Work: what a run has to do, in counts that are the same on every machine and in every run."""
+"""Work of a run, in counts that do not depend on the machine."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from solidsph.interfaces.plan import Compilation, Operations
 
 
 class Loop(Enum):
-    """What goes from one evaluation of the forces to the next."""
+    """Loop around the evaluations of the forces."""
 
     STEPS = "steps of arrays"
     COMPILED = "whole steps, compiled"
@@ -20,57 +20,57 @@ class Loop(Enum):
 
 @attrs.frozen
 class StaticWork:
-    """What is particular to an equilibrium; the iterations are a guess before they are done."""
+    """Additional counts of an equilibrium; the number of iterations is an estimate."""
 
     load_steps: int
     iterations: int
     freedoms: int  # unknowns
     entries: int  # of the tangent
-    fill: int  # entries of its factors, by dissection of the body's box
-    multiplications: int  # of the factorisation, by the same
+    fill: int  # entries of its factors, by nested dissection of the body's box
+    multiplications: int  # of the factorisation, likewise
 
 
 @attrs.frozen
 class Work:
-    """A run, counted."""
+    """Counts of one run."""
 
     dimension: int
-    particles: int  # ghosts among them
-    pairs: int  # ordered pairs of neighbours within the support, self pairs included
+    particles: int  # ghosts included
+    pairs: int  # ordered pairs within the support, self pairs included
     loop: Loop
-    steps: int  # in time, or of the load
+    steps: int  # time steps or load steps
     evaluations: int  # of all forces
-    operations: Sequence[Operations]  # of an evaluation: the engine's, then those of loads
+    operations: Sequence[Operations]  # per evaluation: the engine's, then those of loads
     conditions: int  # loads and motions, each with an account
-    outputs: int  # observed states, the first one among them
+    outputs: int  # observed states, the first included
     record_bytes: int  # about
     compilations: frozenset[Compilation] = frozenset()
     statics: StaticWork | None = None
-    counted: bool = True  # from a built scene; if not, estimated without building it
-    cover: float = 0.0  # support radius in spacings [-]
-    motions: int = 0  # conditions that determine motion, which cost a step by arrays more
+    counted: bool = True  # False if estimated without building the scene
+    cover: float = 0.0  # support radius [spacings]
+    motions: int = 0  # conditions that determine motion, which cost more per step of arrays
 
     @property
     def visited(self) -> int:
-        """Pairs that an evaluation visits, those of conditions included."""
+        """Pairs visited per evaluation, those of loads included."""
         return sum(part.pairs for part in self.operations)
 
     @property
     def pair_evaluations(self) -> int:
-        """Pairs visited in all evaluations: the work that no engine can avoid."""
+        """Pairs visited in the whole run: the work that no engine can avoid."""
         return self.evaluations * self.visited
 
     @property
     def touched(self) -> int:
-        """Bytes that an evaluation must move at least."""
+        """Least memory traffic of an evaluation [bytes]."""
         return sum(part.touched for part in self.operations)
 
     @property
     def traffic(self) -> int:
-        """Bytes that all evaluations must move at least."""
+        """Least memory traffic of all evaluations [bytes]."""
         return self.evaluations * self.touched
 
     @property
     def held(self) -> int:
-        """Bytes of the arrays kept between evaluations."""
+        """Memory of the arrays kept between evaluations [bytes]."""
         return sum(part.held for part in self.operations)

@@ -37,6 +37,16 @@ def optional_number(**options: Any) -> Any:
     )
 
 
+def formula(**options: Any) -> Any:
+    """An attrs field that holds a formula or a table of formulas, checked with the whole scene."""
+    return attrs.field(metadata={"formula": True}, **options)
+
+
+def is_formula(field: attrs.Attribute[Any]) -> bool:
+    """Whether a field was declared by `formula`."""
+    return bool(field.metadata.get("formula"))
+
+
 def check_positive(part: str, name: str, value: float, unit: str) -> None:
     """Raise SceneError unless `value` is positive and neither infinite nor absurdly large."""
     if not 1e-100 < value < 1e100:

@@ -12,7 +12,7 @@ from solidsph.interfaces.terms import EnergyTerm, FieldTerm, Observation, Term
 from solidsph.maths.arrays import Array
 from solidsph.results.layout import Field, field_name, static_fields, tag_name
 from solidsph.run.energy import BY_BODY, ledger
-from solidsph.scene import returned_values
+from solidsph.scene.checks import returned
 
 BASIC_FIELDS = {"velocity": "m/s", "cauchy_stress": "Pa", "volume_ratio": "-"}
 """Fields of every record, and their units."""
@@ -28,7 +28,7 @@ def history(observation: Observation, initial: float, terms: Sequence[Term]) -> 
     columns = dict(ledger(observation, initial, terms))
     for term in terms:
         reported = term.report(observation)
-        wrong = returned_values.columns(term.label, reported)
+        wrong = returned.check_report(term.label, reported)
         if wrong:
             raise PluginError(f"{wrong}. This is a fault of the part with that label")
         for name, value in reported.items():

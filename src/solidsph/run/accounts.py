@@ -1,4 +1,4 @@
-"""Accounts: the energies of a run up to an output, and how much of them no account explains."""
+"""Accounts: energy balance of a run up to an output."""
 
 from __future__ import annotations
 
@@ -13,34 +13,34 @@ from solidsph.run.energy import residual, total_energy
 
 @attrs.define
 class Accounts:
-    """What there is of energy; `add` enters one more output."""
+    """Energy balance; `add` updates it at every output."""
 
     start: float = np.nan  # energy of the bodies at the first output [J]
-    residual: float = 0.0  # at the last output: what no account explains [J]
-    paid: float = 0.0  # the most so far of the start and the work of all accounts, by amount [J]
+    residual: float = 0.0  # energy that no account explains at the last output [J]
+    paid: float = 0.0  # largest sum so far of `start` and the absolute work of all accounts [J]
 
     def add(self, observation: Observation) -> None:
-        """Enter one more output."""
+        """Update the balance with one more output."""
         if np.isnan(self.start):
             self.start = total_energy(observation)
         self.residual = residual(observation, self.start)
         work = observation.state.work.values()
-        self.paid = max(self.paid, self.start + sum(abs(one) for one in work))
+        self.paid = max(self.paid, self.start + sum(abs(value) for value in work))
 
-    def kept(self) -> Array:
-        """As one array."""
+    def to_array(self) -> Array:
+        """All values as one array."""
         return np.array(attrs.astuple(self))
 
     @classmethod
-    def taken(cls, kept: Array) -> Accounts:
-        """From such an array.
+    def from_array(cls, values: Array) -> Accounts:
+        """Read the array of `to_array`.
 
         Raises:
-            RecordError: it is none.
+            RecordError: the array has another shape.
         """
-        if kept.shape != (len(attrs.fields(cls)),):
+        if values.shape != (len(attrs.fields(cls)),):
             raise RecordError(
                 "the checkpoint does not hold the energies of its run; delete it and resume again: "
-                "the run is then carried out from its first state"
+                "the run then starts from its initial state"
             )
-        return cls(*kept.tolist())
+        return cls(*values.tolist())

@@ -1,4 +1,4 @@
-"""BuiltScene: a checked scene in discrete form, with everything that a run needs."""
+"""BuiltScene: a checked scene in discrete form."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from solidsph.scene.scene import Scene
 
 @attrs.frozen(eq=False)
 class BuiltScene(ABC):
-    """Everything that a run needs. Running does not change it, so it can be run again."""
+    """Everything that a run needs. A run does not change it, so it can be repeated."""
 
     scene: Scene
     model: DiscreteModel
@@ -42,7 +42,7 @@ class BuiltScene(ABC):
     steps: int
     parts: tuple[Entry, ...]  # every plugin used
     manager: pluggy.PluginManager
-    halvings: int = 0  # of the step that the scene asks for
+    halvings: int = 0  # of the step of the scene
 
     @abstractmethod
     def run(
@@ -52,10 +52,10 @@ class BuiltScene(ABC):
         observers: Sequence[object] = (),
         since: RestartPoint | None = None,
     ) -> Result:
-        """Find the equilibrium if the scene has [statics], follow the motion if not."""
+        """Find the equilibrium if the scene has [statics], else follow the motion."""
 
     def halved(self) -> Self:
-        """The same with half the step."""
+        """A copy with half the step."""
         dynamics = attrs.evolve(self.dynamics, step_size=0.5 * self.step_size)
         halvings = self.halvings + 1
         return attrs.evolve(self, dynamics=dynamics, steps=2 * self.steps, halvings=halvings)
@@ -71,7 +71,7 @@ class BuiltScene(ABC):
         return self.dynamics.step_size
 
     def start(self) -> State:
-        """The state at the first step, with imposed motions, accelerations and accounts."""
+        """Initial state with imposed motions, accelerations and accounts."""
         positions = self.dynamics.place(self.initial.time, self.initial.positions)
         velocities = self.dynamics.carry(self.initial.time, self.initial.velocities)
         state = attrs.evolve(self.initial, positions=positions, velocities=velocities)
@@ -80,60 +80,60 @@ class BuiltScene(ABC):
 
     @property
     def plan(self) -> Plan:
-        """How the engine would carry out the motion, as far as the kinds of the parts tell."""
+        """How the engine would compute the motion, by the kinds of the parts."""
         return self.dynamics.internal.plan(self.dynamics, self.integrator)
 
     def load_of(self, effect: str) -> Load:
-        """The bound load of the effect of this label."""
-        (load,) = (one for one in self.dynamics.loads if one.label == effect)
+        """Bound load of the effect with the label `effect`."""
+        (load,) = (load for load in self.dynamics.loads if load.label == effect)
         return load
 
     def extended(self, steps: int) -> Self:
-        """The same, of so many steps in all: the step and the outputs up to now stay as they are.
+        """A copy that runs `steps` steps in total, with the same step size and earlier outputs.
 
         Raises:
-            SceneError: the scene has more steps than that.
+            SceneError: the scene has more steps.
         """
         if steps < self.steps:
-            raise SceneError(f"{steps} steps in all are fewer than the {self.steps} that there are")
+            raise SceneError(f"{steps} steps in total are fewer than the {self.steps} of the scene")
         return attrs.evolve(self, steps=steps)
 
     def output_steps(self) -> tuple[int, ...]:
-        """Steps after which the state is observed, evenly spread, the last one among them."""
-        # In steps of the scene's own size, so that halving them changes no time.
+        """Steps at which the state is observed: evenly spaced, the last included."""
+        # In steps of the original size, so that halving them changes no time.
         size = 2**self.halvings
-        asked, steps = round(self.scene.duration / self.step_size) // size, self.steps / size
-        count = min(self.scene.outputs, asked)
-        marks = np.linspace(0, asked, count + 1)[1:]
-        if steps > asked:  # extended
-            apart = asked / count
-            further = np.arange(count + 1, ceil(steps / apart)) * apart
+        original, steps = round(self.scene.duration / self.step_size) // size, self.steps / size
+        count = min(self.scene.outputs, original)
+        marks = np.linspace(0, original, count + 1)[1:]
+        if steps > original:  # extended
+            interval = original / count
+            further = np.arange(count + 1, ceil(steps / interval)) * interval
             marks = np.concatenate([marks, further])
         whole = np.append(size * np.rint(marks).astype(np.int64), self.steps)
         return tuple(int(step) for step in np.unique(whole) if step <= self.steps)
 
     def observe(self, state: State) -> Observation:
-        """What there is to see of a state.
+        """Observation of a state.
 
         Raises:
             DivergedError: a volume has vanished or turned inside out.
         """
         observation = self.dynamics.observe(read_only(state))
-        turned = ~(observation.volume_ratios > 0.0) & ~self.particles.ghosts
-        if turned.any():
+        inverted = ~(observation.volume_ratios > 0.0) & ~self.particles.ghosts
+        if inverted.any():
             raise self.diverged(state, "the volume has vanished or turned inside out")
         return observation
 
     def diverged(self, state: State, cause: str) -> DivergedError:
-        """The error of a motion that cannot go on from `state`; listeners hear of it."""
+        """The error of a motion that cannot continue from `state`, after the hook of failures."""
         try:
             with np.errstate(all="ignore"):
                 J = np.linalg.det(self.dynamics.observe(state).deformation_gradients)
-        except (BuildError, ValueError):  # positions may be such that nothing has neighbours
+        except (BuildError, ValueError):  # at such positions nothing may have neighbours
             J = np.full(self.particles.count, np.nan)
         real = np.flatnonzero(~self.particles.ghosts)
         finite = np.isfinite(J[real])
-        # The first particle whose volume ratio is no number, or else the most compressed one.
+        # The first particle whose volume ratio is not finite, or else the most compressed one.
         worst = real[np.argmin(finite)] if not finite.all() else real[np.argmin(J[real])]
         error = DivergedError(
             step=state.step,

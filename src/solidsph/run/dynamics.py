@@ -1,7 +1,6 @@
-"""Dynamics: the equation of motion of a whole scene, assembled from its parts.
+"""Dynamics: equation of motion of a scene.
 
-It knows no part by name: internal forces come from an engine, and what is imposed comes from
-conditions, each called only for what its type can do.
+Internal forces come from an engine; loads and constraints are terms, called by their type.
 """
 
 from __future__ import annotations
@@ -14,10 +13,7 @@ import numpy as np
 
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import NOTHING, EquationOfMotion, Response
-from solidsph.interfaces.terms import (
-    GhostConstraint,
-    Observation,
-)
+from solidsph.interfaces.terms import GhostConstraint, Observation
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.particles import Particles, State, locked
 
@@ -25,17 +21,17 @@ from solidsph.model.particles import Particles, State, locked
 @final
 @attrs.frozen(eq=False)
 class Dynamics(EquationOfMotion):
-    """Right-hand side of the equation of motion."""
+    """Equation of motion of a scene."""
 
     internal: InternalForces
-    held: Sequence[Mask] = attrs.field(init=False)  # freedoms (n, d) that each motion determines
+    held: Sequence[Mask] = attrs.field(init=False)  # (n, d) components that each motion determines
 
-    # What observers see of these, and cannot write to.
+    # Read-only views for observers.
     shown: Particles = attrs.field(init=False, repr=False)
     shown_masses: Array = attrs.field(init=False, repr=False)
 
     @shown.default
-    def _particles_to_look_at(self) -> Particles:
+    def _read_only_particles(self) -> Particles:
         return self.particles.read_only()
 
     @shown_masses.default
@@ -43,11 +39,19 @@ class Dynamics(EquationOfMotion):
         return locked(self.masses)
 
     @held.default
-    def _held_by_each(self) -> Sequence[Mask]:
+    def _held_components(self) -> Sequence[Mask]:
         return [motion.held for motion in self.constraints]
 
+    @property
+    def free(self) -> Mask:
+        """Components (n, d) of real particles that no constraint determines."""
+        free = np.repeat(~self.particles.ghosts[:, None], self.particles.dimension, axis=1)
+        for held in self.held:
+            free &= ~held
+        return free
+
     def place(self, time: float, positions: Array) -> Array:
-        """Positions (n, d) with every imposed motion applied at `time` [s]."""
+        """Positions (n, d) with the imposed motions of `time` [s]."""
         if not self.constraints:
             return positions
         displacements = positions - self.particles.positions
@@ -56,7 +60,7 @@ class Dynamics(EquationOfMotion):
         return self.particles.positions + displacements
 
     def carry(self, time: float, velocities: Array) -> Array:
-        """Velocities (n, d) with every imposed motion applied at `time` [s]."""
+        """Velocities (n, d) with the imposed motions of `time` [s]."""
         if not self.constraints:
             return velocities
         carried = velocities.copy()
@@ -72,19 +76,19 @@ class Dynamics(EquationOfMotion):
         step: float = 0.0,
         memory: Mapping[str, Array] = NOTHING,
     ) -> Response:
-        """Accelerations, and the force that each imposed part exerts on every particle.
+        """Accelerations, and the forces of all terms on every particle.
 
-        Free degrees of freedom follow f = m a. Held ones follow the imposed motion, and what is
-        missing of m a is the reaction; ghosts have no mass, so theirs balances the force on them.
+        Free degrees of freedom obey m a = f. Held ones follow the imposed motion, with the
+        reaction m a - f. Ghosts have no mass, so their reaction balances the force on them.
         """
         displacements = positions - self.particles.positions
-        internal, kept = self.internal.advance(time, step, displacements, memory)
-        remembered = dict(kept)
+        internal, changed = self.internal.advance(time, step, displacements, memory)
+        advanced = dict(changed)
         applied = {c.label: np.zeros_like(positions) for c in (*self.loads, *self.constraints)}
         total = internal.copy()
         for load in self.loads:
-            force, kept = load.advance(time, step, positions, velocities, memory)
-            remembered |= kept
+            force, changed = load.advance(time, step, positions, velocities, memory)
+            advanced |= changed
             applied[load.label][load.particles] += force
             total[load.particles] += force
         for motion in self.constraints:
@@ -98,13 +102,13 @@ class Dynamics(EquationOfMotion):
         for motion in self.constraints:
             motion.impose(time, 2, accelerations, self.step_size)
         if self.constraints:
-            missing = self.masses[:, None] * accelerations - total
+            reactions = self.masses[:, None] * accelerations - total
         for motion, held in zip(self.constraints, self.held, strict=True):
-            applied[motion.label] += np.where(held, missing, 0.0)
-        return Response(accelerations, applied, remembered)
+            applied[motion.label] += np.where(held, reactions, 0.0)
+        return Response(accelerations, applied, advanced)
 
     def observe(self, state: State) -> Observation:
-        """The state with its deformation, stress and energy."""
+        """Observation of a state, with deformation, stress and energy."""
         displacements = state.positions - self.particles.positions
         fields = self.internal.observed(displacements, state.memory)
         return Observation(

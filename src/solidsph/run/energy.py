@@ -1,4 +1,4 @@
-"""The energy ledger: kinetic and strain energy against the work of everything that acts."""
+"""Energy ledger: kinetic, strain and dissipated energy against the work of all terms."""
 
 from __future__ import annotations
 
@@ -10,51 +10,51 @@ from solidsph.interfaces.terms import EnergyTerm, Observation, Term
 
 KINETIC, STRAIN, RESIDUAL = "kinetic energy [J]", "strain energy [J]", "energy residual [J]"
 DISSIPATED = "dissipated energy [J]"
-"""Columns of every record; what is dissipated only where a material dissipates."""
+"""Columns of every record; DISSIPATED only if a material dissipates."""
 
 BY_BODY = ("kinetic", "strain")
-"""Energies that a record of several bodies also tells of each."""
+"""Energies that a record of several bodies lists by body."""
 
 
 def kinetic_energy(observation: Observation) -> float:
-    """Sum of m v^2 / 2 [J, per unit of the missing dimensions]."""
+    """Sum of m v^2 / 2 [J]; in 1D and 2D per unit of the missing dimensions."""
     return 0.5 * float(observation.masses @ observation.squared_speeds)
 
 
 def strain_energy(observation: Observation) -> float:
-    """Sum of V psi over the particles that have a mass [J]."""
+    """Sum of V psi over real particles [J]."""
     if "strain energy" not in observation.made:
         particles = observation.particles
         real = ~particles.ghosts
-        own = float(particles.volumes[real] @ observation.energy_densities[real])
-        observation.made["strain energy"] = own
-    found: float = observation.made["strain energy"]
-    return found
+        energy = float(particles.volumes[real] @ observation.energy_densities[real])
+        observation.made["strain energy"] = energy
+    cached: float = observation.made["strain energy"]
+    return cached
 
 
 def dissipated_energy(observation: Observation) -> float | None:
-    """Sum of V d over the particles [J]; None where no material dissipates."""
+    """Sum of V d over all particles [J]; None if no material dissipates."""
     lost = observation.dissipated_densities
     return None if lost is None else float(observation.particles.volumes @ lost)
 
 
 def total_energy(observation: Observation) -> float:
-    """Of the bodies: kinetic, strain, and what their materials have dissipated so far [J]."""
+    """Kinetic, strain and dissipated energy [J]."""
     lost = dissipated_energy(observation) or 0.0
     return kinetic_energy(observation) + strain_energy(observation) + lost
 
 
 def residual(observation: Observation, initial: float) -> float:
-    """What no account explains of the change since the start, where there was `initial` [J]."""
+    """Change of the total energy since `initial` [J], minus the work of all terms [J]."""
     return total_energy(observation) - initial - sum(observation.state.work.values())
 
 
 def ledger(
     observation: Observation, initial: float, conditions: Sequence[Term] = ()
 ) -> Mapping[str, float]:
-    """Columns "quantity [unit]" of the accounts; `initial` is the energy at the start [J].
+    """Columns "quantity [unit]" of all accounts; `initial` is the initial energy [J].
 
-    Of several bodies also what each has, and what `conditions` store in each.
+    For several bodies the energies of each, those stored by `conditions` included.
     """
     kinetic, strain = kinetic_energy(observation), strain_energy(observation)
     lost = dissipated_energy(observation)

@@ -1,7 +1,6 @@
-"""Moments in the life of a run at which plugins may listen.
+"""Hooks: events of a run that plugins and observers can listen to.
 
-Entry points provide nouns, parts of which one is chosen by name; hooks provide verbs, moments
-that any number of listeners hear. Hooks never choose parts and never run inside a step.
+Hooks never choose parts and never run within a step.
 """
 
 from __future__ import annotations
@@ -9,6 +8,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping
+from importlib.metadata import EntryPoint
 from traceback import walk_tb
 
 import pluggy
@@ -28,47 +28,49 @@ specification = pluggy.HookspecMarker("solidsph")
 implementation = pluggy.HookimplMarker("solidsph")
 
 
-class Moments:
-    """The moments, in the order in which they come."""
+class Hooks:
+    """Specifications of all hooks, in the order of their calls."""
 
     @specification
     def solidsph_configure(self, builder: SceneBuilder) -> None:
-        """Before a scene is built: the builder may still be changed."""
+        """Called before a scene is built, while the builder can still be changed."""
 
     @specification
     def solidsph_setup(self, simulation: BuiltScene) -> None:
-        """Before the first step of a run."""
+        """Called before the first step of a run."""
 
     @specification
     def solidsph_resume(
         self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
     ) -> None:
-        """Before the first step of a run that goes on from an output of an earlier one.
+        """Called before the first step of a run that resumes an earlier one.
 
-        `kept` holds what listeners put there by `solidsph_keep` at that output.
+        `kept` holds the arrays that listeners stored by `solidsph_keep` at the output resumed.
         """
 
     @specification
     def solidsph_step_end(self, simulation: BuiltScene, observation: Observation) -> None:
-        """At every output, the first state included. Read only."""
+        """Called at every output, the initial state included. All arguments are read-only."""
 
     @specification
     def solidsph_keep(self, simulation: BuiltScene, kept: dict[str, Array]) -> None:
-        """After an output of a recorded run: put into `kept`, under names that begin with your
-        own, arrays of numbers that you need to go on from there. State that evolves with the
-        motion belongs into `State.memory` instead."""
+        """Called after each output of a recorded run, to store arrays needed to resume from it.
+
+        Put them into `kept`, under names that begin with the name of the listener. State that
+        evolves with the motion belongs into `State.memory` instead.
+        """
 
     @specification
     def solidsph_failure(self, simulation: BuiltScene, state: State, error: DivergedError) -> None:
-        """When the motion went wrong: `state` is the last one. `error` may be told more."""
+        """Called when the motion diverged after `state`; listeners may add to `error`."""
 
     @specification
     def solidsph_finish(self, simulation: BuiltScene, outcome: str) -> None:
-        """After the last step, or after the run stopped on an error: `outcome` says which."""
+        """Called after the last step or an error, as `outcome` states."""
 
 
-def heard_by(cause: BaseException, manager: pluggy.PluginManager) -> str:
-    """The installed hook plugin whose code raised, as a message names it; nothing if none did."""
+def failed_plugin(cause: BaseException, manager: pluggy.PluginManager) -> str:
+    """Description of the installed hook plugin whose code raised `cause`; empty if none did."""
     points = {point.name: point for point in hook_points()}
     modules = {
         getattr(plugin, "__name__", type(plugin).__module__): points[name]
@@ -78,42 +80,45 @@ def heard_by(cause: BaseException, manager: pluggy.PluginManager) -> str:
     for frame, _ in reversed(list(walk_tb(cause.__traceback__))):
         point = modules.get(frame.f_globals.get("__name__", ""))
         if point is not None:
-            origin = f"{point.dist.name} {point.dist.version}" if point.dist else "unknown"
-            return f"hook plugin {point.name!r} ({point.value}, from {origin})"
+            return f"hook plugin {point.name!r} ({_origin(point)})"
     return ""
 
 
-def listeners() -> pluggy.PluginManager:
-    """A manager with every installed hook plugin registered.
+def load_hook_plugins() -> pluggy.PluginManager:
+    """Manager with all installed hook plugins.
 
-    A plugin that cannot be loaded is left out with a warning that names it.
+    A plugin that cannot be loaded is left out with a warning.
 
     Raises:
-        PluginError: instead of that warning, where SOLIDSPH_STRICT_PLUGINS is 1.
+        PluginError: instead of the warning, if SOLIDSPH_STRICT_PLUGINS is 1.
     """
     manager = pluggy.PluginManager("solidsph")
-    manager.add_hookspecs(Moments)
-    heard: dict[str, str] = {}
+    manager.add_hookspecs(Hooks)
+    loaded: dict[str, str] = {}
     for point in hook_points():
-        distribution = f"{point.dist.name} {point.dist.version}" if point.dist else "unknown"
         plugin = None
         try:
-            if point.name in heard:
-                raise PluginError(f"{heard[point.name]} has that name already")
+            if point.name in loaded:
+                raise PluginError(f"{loaded[point.name]} has that name already")
             plugin = point.load()
             manager.register(plugin, name=point.name)
             manager.check_pending()
         except Exception as cause:
-            # Only this one: of two with one name, the first is heard.
+            # Of two plugins with the same name the first stays registered.
             if plugin is not None and manager.get_plugin(point.name) is plugin:
                 manager.unregister(plugin)
             message = (
-                f"hook plugin {point.name!r} ({point.value}, from {distribution}) is left out: "
+                f"hook plugin {point.name!r} ({_origin(point)}) is left out: "
                 f"{type(cause).__name__}: {cause}; repair or uninstall it"
             )
             if os.environ.get(STRICT) == "1":
                 raise PluginError(message) from cause
             warnings.warn(message, stacklevel=2)
         else:
-            heard[point.name] = f"{point.value}, from {distribution}"
+            loaded[point.name] = _origin(point)
     return manager
+
+
+def _origin(point: EntryPoint) -> str:
+    distribution = f"{point.dist.name} {point.dist.version}" if point.dist else "unknown"
+    return f"{point.value}, from {distribution}"

@@ -1,4 +1,4 @@
-"""Motion: a scene followed from its first state to the end of its duration."""
+"""Motion of a scene from its initial state to the end of its duration."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from solidsph.errors import PluginError, SolidsphError, UnsoundError
 from solidsph.interfaces.time_loop import StepError, TimeLoop
 from solidsph.registry.origin import failing_part
 from solidsph.run.built_scene import BuiltScene
-from solidsph.run.hooks import heard_by
+from solidsph.run.hooks import failed_plugin
 from solidsph.run.outcome import Result
 from solidsph.run.restart_point import RestartPoint
 from solidsph.run.session import session
@@ -17,9 +17,9 @@ from solidsph.run.step_by_step import steps_of
 
 
 def time_loop(simulation: BuiltScene) -> TimeLoop:
-    """What carries out the steps."""
+    """Loop that computes the steps of a scene."""
     if simulation.scene.sleep is not None:
-        from solidsph.run.sleeping.loop import sleeping_loop  # only where something sleeps
+        from solidsph.run.sleeping.loop import sleeping_loop  # loaded only for [sleep]
 
         return sleeping_loop(simulation)
     return steps_of(simulation.dynamics, simulation.integrator)
@@ -32,27 +32,27 @@ def run_motion(
     *,
     judge: Callable[[BuiltScene], None] = lambda simulation: None,
 ) -> Result:
-    """Advance to the end of the duration.
+    """Run a scene to the end of its duration.
 
     Args:
-        simulation: what to run.
-        listeners: objects with methods of `solidsph.run.hooks.Moments`, heard in this run only.
-        since: what is taken over from an earlier run.
-        judge: called at the end of the duration; it raises UnsoundError if the run is wrong.
+        simulation: the scene.
+        listeners: objects with methods of `solidsph.run.hooks.Hooks`, called in this run only.
+        since: restart point in an earlier run.
+        judge: called at the end of the duration; raises UnsoundError if the result is wrong.
 
     Raises:
-        DivergedError: the motion went wrong.
-        UnsoundError: by `judge`, with the result.
+        DivergedError: the motion diverged.
+        UnsoundError: raised by `judge`; it has the result.
         PluginError: a part failed.
     """
-    begun = clock.perf_counter()
+    start = clock.perf_counter()
     hook = simulation.manager.hook
 
     def result() -> Result:
         return Result(
             state=state,
             record=None,
-            seconds=clock.perf_counter() - begun,
+            seconds=clock.perf_counter() - start,
             effort={"steps": state.step, "step size [s]": simulation.step_size, **loop.effort},
             notes=() if since is None else since.notes,
         )
@@ -86,11 +86,10 @@ def run_motion(
     except (SolidsphError, OSError, MemoryError, Warning):
         raise
     except Exception as cause:
-        who = failing_part(cause, simulation.parts) or heard_by(cause, simulation.manager)
+        who = failing_part(cause, simulation.parts) or failed_plugin(cause, simulation.manager)
         if not who:
             raise
         raise PluginError(
-            f"{who} failed in the run: {type(cause).__name__}: {cause}; this is a fault of "
-            "that part"
+            f"{who} failed in the run: {type(cause).__name__}: {cause}; correct that part"
         ) from cause
     return result()

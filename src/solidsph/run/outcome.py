@@ -1,4 +1,4 @@
-"""Outcome: how a run ended, and what it leaves behind."""
+"""Outcome and result of a run."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ import attrs
 from solidsph.model.particles import State
 
 FINISHED, INTERRUPTED = "finished", "interrupted"
-"""Outcomes of a run that got to its end, and of one that somebody stopped."""
+"""Outcomes of a completed run, and of one interrupted by the user."""
 
 UNSOUND = "unsound"
-"""How the outcome begins of a run that got to its end with energies that do not add up."""
+"""First word of the outcome of a completed run whose energies do not balance."""
 
 
 def is_over(outcome: str) -> bool:
-    """Whether a run with this outcome got to its end, sound or not."""
+    """Whether a run with this outcome is complete, sound or not."""
     return outcome == FINISHED or outcome.startswith(UNSOUND)
 
 
 @attrs.frozen(eq=False)
 class Result:
-    """What a run leaves behind."""
+    """Result of a run."""
 
     state: State  # the last one
-    record: Path | None  # the file written, if one was asked for
-    seconds: float  # wall time of the run, compiling and recording included [s]
-    effort: Mapping[str, Any]  # what it took besides: "quantity [unit]" -> a number, or yes or no
-    final: Mapping[str, float] = attrs.field(factory=dict)  # the last row of a record's history
-    notes: Sequence[str] = ()  # what happened to the run, as in the record
+    record: Path | None  # the file written, if any
+    seconds: float  # wall time, compilation and record included [s]
+    effort: Mapping[str, Any]  # further costs: "quantity [unit]" -> number or bool
+    final: Mapping[str, float] = attrs.field(factory=dict)  # last row of the record's history
+    notes: Sequence[str] = ()  # events of the run, as in the record

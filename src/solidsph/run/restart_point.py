@@ -1,4 +1,4 @@
-"""RestartPoint: where an earlier run is gone on from."""
+"""RestartPoint: the output of an earlier run from which a run continues."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from solidsph.model.particles import State
 
 @attrs.frozen(eq=False)
 class RestartPoint:
-    """What a run takes over from an earlier one that was recorded in the same file."""
+    """Output of an earlier run in the same record, from which a run continues."""
 
-    state: State | None = None  # an output to go on from; None: all is carried out again
-    kept: Mapping[str, Array] = attrs.field(factory=dict)  # what listeners had kept at `state`
-    until: float = inf  # the record's outputs up to this time stay [s]
-    notes: Sequence[str] = ()  # what happened to the run, one line each
-    repeats: bool = True  # whether outputs that are in the record must come out the same again
+    state: State | None = None  # None: the run is repeated from its initial state
+    kept: Mapping[str, Array] = attrs.field(
+        factory=dict
+    )  # arrays that listeners stored with `state`
+    until: float = inf  # outputs up to this time stay in the record [s]
+    notes: Sequence[str] = ()  # events of the run, one line each
+    repeats: bool = True  # whether repeated outputs must equal those in the record

@@ -1,4 +1,4 @@
-"""Session: who hears a run, from its setup to its outcome."""
+"""Session: registration of the listeners of a run, from its setup to its outcome."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from solidsph.run.outcome import FINISHED, INTERRUPTED, UNSOUND
 
 @contextmanager
 def session(simulation: BuiltScene, listeners: Sequence[object]) -> Iterator[None]:
-    """Within it, `listeners` hear the hooks of the simulation's manager.
+    """Register `listeners` with the hooks of a simulation for the duration of a run.
 
-    Setup is told on entry. On exit the outcome is told: "finished", or what went wrong.
+    The setup hook is called on entry, the finish hook with the outcome on exit.
 
     Args:
-        simulation: what is run.
-        listeners: objects with methods of `solidsph.run.hooks.Moments`, heard in this session only.
+        simulation: the simulation that runs.
+        listeners: objects with methods of `solidsph.run.hooks.Hooks`.
     """
     manager, hook = simulation.manager, simulation.manager.hook
     outcome = "stopped"
@@ -30,7 +30,7 @@ def session(simulation: BuiltScene, listeners: Sequence[object]) -> Iterator[Non
         yield
         outcome = FINISHED
     except BaseException as cause:
-        outcome = _told(cause)
+        outcome = _outcome(cause)
         raise
     finally:
         try:
@@ -42,19 +42,18 @@ def session(simulation: BuiltScene, listeners: Sequence[object]) -> Iterator[Non
 
 
 @contextmanager
-def alone(simulation: BuiltScene) -> Iterator[None]:
-    """Within it, nobody else runs the simulation: its listeners, and what parts reuse from step to
-    step, serve one run at a time.
+def exclusive(simulation: BuiltScene) -> Iterator[None]:
+    """Exclude other runs of a simulation, whose listeners and buffers serve one run at a time.
 
     Raises:
-        BusyError: the simulation is being run already.
+        BusyError: the simulation is running already.
     """
-    key = id(simulation.dynamics)  # which the same simulation with more steps shares
+    key = id(simulation.dynamics)  # shared with copies that run longer
     with _changing:
         if key in _running:
             raise BusyError(
-                "this simulation is being run already, in another thread or by one of its own "
-                "listeners; build the scene once for each run"
+                "this simulation is running already, in another thread or in one of its own "
+                "listeners; build the scene once per run"
             )
         _running.add(key)
     try:
@@ -64,11 +63,11 @@ def alone(simulation: BuiltScene) -> Iterator[None]:
             _running.discard(key)
 
 
-_running: set[int] = set()  # simulations, by their dynamics
+_running: set[int] = set()  # ids of the dynamics of running simulations
 _changing = Lock()
 
 
-def _told(cause: BaseException) -> str:
+def _outcome(cause: BaseException) -> str:
     if isinstance(cause, KeyboardInterrupt):
         return INTERRUPTED
     kinds = {DivergedError: "diverged", UnsoundError: UNSOUND}

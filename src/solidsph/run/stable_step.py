@@ -1,4 +1,4 @@
-"""The stable time step of a scene: from the wave speed, and what its loads add to it."""
+"""Stable time step of a scene, from the wave speed and the rates of its loads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from solidsph.interfaces.terms import Load
 
 
 def stable_step(integrator: Integrator, loads: Iterable[Load], bodies: Iterable[Body]) -> float:
-    """The CFL step by confined wave speed and spacing, with what the loads add [s]."""
+    """CFL step by confined wave speed and spacing, reduced by the rates of the loads [s]."""
     loads = list(loads)
     squares = lattice_frequency(bodies) ** 2 + sum(load.stiffness_rate**2 for load in loads)
     frequency = sqrt(squares)
@@ -19,7 +19,7 @@ def stable_step(integrator: Integrator, loads: Iterable[Load], bodies: Iterable[
 
 
 def lattice_frequency(bodies: Iterable[Body]) -> float:
-    """The highest of a lattice of point masses and springs, 2 c / spacing [rad/s]."""
+    """Highest frequency of a lattice of masses and springs, 2 c / spacing [rad/s]."""
     wave_time = min(
         float(body.particles.spacings.min()) / body.material.wave_speed for body in bodies
     )

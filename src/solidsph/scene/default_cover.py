@@ -1,9 +1,8 @@
-"""Cover: how many particle spacings the support radius of a kernel is.
+"""Default cover of a kernel, its support radius in particle spacings.
 
-On a lattice the gradient does not see a saw-tooth, in which neighbours in a row move by equal and
-opposite amounts. Only where its amplitude varies is there a force against it, and the wider the
-kernel the weaker that force is. At a cover that suits one kernel another one is blind, so the
-default is derived from the kernel.
+On a lattice the gradient of a saw-tooth, in which neighbours in a row move by equal and opposite
+amounts, is zero. It is resisted only where its amplitude varies, and less so by a wider kernel.
+The default is therefore derived from the kernel.
 """
 
 from __future__ import annotations
@@ -19,56 +18,58 @@ from solidsph.maths.arrays import Array
 from solidsph.registry.construct import construct
 from solidsph.scene.scene_data import SceneData
 
-# The default is the largest tenth at which a bar is held at least so well. The figure is that of
-# 3.5 spacings of the paper's own kernel, less rounding; it makes 2.6 of the cubic spline.
-_HELD = 0.475
+# Least wave number ratio at the default cover. This is the ratio of the paper's kernel at 3.5
+# spacings, rounded down; it gives 2.6 for the cubic spline.
+_LEAST_RATIO = 0.475
 
 BLIND = 0.45
-"""Below this, neighbours in a row that is pulled at rest are off by more than the strain itself
-(tests/scene/test_default_cover.py): the share of `held`."""
+"""Wave number ratio below which neighbours in a bar under tension deviate by more than the strain
+itself (tests/scene/test_default_cover.py)."""
 
 _COVERS = np.arange(12, 61) / 10.0
 
-# Where no cover holds a row, as with a profile that is none, which the build will tell.
+# For kernels without a sufficient cover, such as wrong profiles, which the build reports.
 _USUAL = 3.5
 
 _WAVES = 200
 
 
 def cover_of(scene: SceneData) -> float:
-    """The cover that the scene names, or else its kernel's own [spacings].
+    """Cover of a scene, given or derived from its kernel [spacings].
 
     Raises:
         SceneError, PluginError: the kernel cannot be made, or its profile is not a weight.
     """
-    return own_cover(construct("kernels", scene.kernel)) if scene.cover is None else scene.cover
+    if scene.cover is not None:
+        return scene.cover
+    return kernel_cover(construct("kernels", scene.kernel))
 
 
-def own_cover(kernel: Kernel) -> float:
-    """The largest cover at which the gradient holds neighbours in a row [spacings].
+def kernel_cover(kernel: Kernel) -> float:
+    """Largest cover at which the gradient resists relative motion of neighbours [spacings].
 
     Raises:
         PluginError: the profile is not a weight.
     """
     check_profile(kernel)
-    enough = [cover for cover in _COVERS if held(kernel, 1, cover) >= _HELD]
+    enough = [cover for cover in _COVERS if wave_number_ratio(kernel, 1, cover) >= _LEAST_RATIO]
     return float(max(enough, default=_USUAL))
 
 
-def held(kernel: Kernel, dimension: int, cover: float) -> float:
-    """How well the gradient holds waves along the rows of a lattice, at worst.
+def wave_number_ratio(kernel: Kernel, dimension: int, cover: float) -> float:
+    """Least ratio of the effective to the actual wave number along a row of a lattice [-].
 
-    A wave of k per spacing appears to the gradient as one of kappa(k); its frequency is that of
-    kappa. Next to the saw-tooth, k = pi, kappa is in proportion to pi - k, which is the wave number
-    of its amplitude. The result is the least of kappa over k, or over pi - k if that is less:
-    2 / pi if only the next neighbours act, below 0 if kappa changes its sign in between.
+    For a wave of k per spacing the gradient has the effective wave number kappa(k). Near the
+    saw-tooth, k = pi, kappa is proportional to pi - k, the wave number of its amplitude. The result
+    is the minimum of kappa / min(k, pi - k): 2 / pi if only nearest neighbours act, below 0 if
+    kappa changes its sign.
     """
     places = _places(dimension, int(np.ceil(cover)))
     distances = np.linalg.norm(places, axis=1)
     places, distances = places[distances < cover], distances[distances < cover]
     along = places[:, 0]
-    # Weights along the row of the linearly corrected gradient, whose sum of g x is 1; not finite
-    # where no neighbour has any weight.
+    # Linearly corrected weights g along the row, with a sum of g x of 1; not finite if no neighbour
+    # has a weight.
     with np.errstate(all="ignore"):
         slopes = profile_slope(kernel, distances / cover) / distances
         weights = slopes * along / np.sum(slopes * along**2)
@@ -80,6 +81,6 @@ def held(kernel: Kernel, dimension: int, cover: float) -> float:
 
 @cache
 def _places(dimension: int, reach: int) -> Array:
-    """The other points of a lattice up to so many spacings away along each axis, (m, d)."""
+    """Points of a lattice around the origin up to `reach` spacings along each axis, (m, d)."""
     lattice = np.array(list(product(range(-reach, reach + 1), repeat=dimension)), dtype=float)
     return lattice[np.any(lattice != 0.0, axis=1)]

@@ -1,4 +1,4 @@
-"""Scene: what a user asks for; TOML in and out."""
+"""Scene: the specification of a run, in Python and in TOML."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import final
 import attrs
 
 from solidsph.scene.scene_data import SceneData
-from solidsph.scene.toml_reader import text_of, words
+from solidsph.scene.toml_reader import read_text, read_values
 from solidsph.scene.toml_writer import toml_of
 
 
@@ -19,27 +19,27 @@ class Scene(SceneData):
 
     @classmethod
     def read(cls, path: Path) -> Scene:
-        """From a TOML file.
+        """Read a TOML file.
 
         Raises:
-            SceneError: the file is missing, is not TOML, or says something unknown.
+            SceneError: the file is missing, is not TOML, or has mistakes.
         """
-        return cls.from_toml(text_of(path), str(path))
+        return cls.from_toml(read_text(path), str(path))
 
     @classmethod
     def from_toml(cls, text: str, origin: str = "scene") -> Scene:
-        """From TOML text; `origin` is named in errors.
+        """Read TOML text; errors name `origin`.
 
         Raises:
-            SceneError: it is not TOML, or says something unknown. Then the scene is also looked
-                through for whatever else is wrong with it, and all of it is told together.
+            SceneError: the text is not TOML or has mistakes. The parts and places of the scene are
+                then checked as well, and all mistakes are reported together.
         """
-        return cls(**words(text, origin))
+        return cls(**read_values(text, origin))
 
     def to_toml(self) -> str:
         """TOML text from which an equal scene is read.
 
         Raises:
-            SceneError: the scene holds objects or functions that a file cannot.
+            SceneError: the scene holds objects or functions that cannot be written to a file.
         """
         return toml_of(self)

@@ -1,4 +1,4 @@
-"""SceneBuilder: a scene said in words, one method a word."""
+"""SceneBuilder: a scene specified by method calls."""
 
 from __future__ import annotations
 
@@ -23,25 +23,20 @@ from solidsph.scene.scene_data import (
 
 
 class SceneBuilder(ABC):
-    """Collects a scene in words. Every method returns the builder.
+    """Builder of a scene. Every method returns the builder.
 
-    Where a part is asked for by name, parameters follow as keywords; any part object that keeps
-    its interface may stand in place of the name.
+    The parameters of a part that is given by name follow as keywords. A part object may replace
+    its name.
     """
 
     def __init__(self, scene: Scene | None = None) -> None:
-        self._bodies: dict[str, BodyScene] = dict(scene.bodies) if scene else {}
-        self._boundaries = list(scene.boundaries) if scene else []
-        self._effects = list(scene.effects) if scene else []
-        self._initial = list(scene.initial) if scene else []
-        collections = ("bodies", "boundaries", "effects", "initial")
-        fields = [field.name for field in attrs.fields(Scene) if field.name not in collections]
-        self._values: dict[str, Any] = {n: getattr(scene, n) for n in fields} if scene else {}
+        self._values: dict[str, Any] = {}
+        if scene is not None:
+            self._values = {f.name: getattr(scene, f.name) for f in attrs.fields(Scene)}
 
     def title(self, title: str) -> Self:
-        """A line that says what the scene is."""
-        self._values["title"] = title
-        return self
+        """Describe the scene in one line."""
+        return self._set(title=title)
 
     def body(
         self,
@@ -54,37 +49,31 @@ class SceneBuilder(ABC):
         tags: Mapping[str, Where] | None = None,
     ) -> Self:
         """Add a body; `spacing` in metres, `tags` name sets of its particles."""
-        if name in self._bodies:
-            raise SceneError(f"two bodies are called {name!r}; give each a name of its own")
-        self._bodies[name] = BodyScene(shape, spacing, discretisation, material, dict(tags or {}))
-        return self
+        bodies = self._values.get("bodies", {})
+        if name in bodies:
+            raise SceneError(f"two bodies are called {name!r}; give each its own name")
+        body = BodyScene(shape, spacing, discretisation, material, dict(tags or {}))
+        return self._set(bodies={**bodies, name: body})
 
     def kernel(self, kernel: PartLike, *, cover: float | None = None, **parameters: Any) -> Self:
         """Choose the kernel and its cover, the support radius in particle spacings."""
-        self._values["kernel"] = _part(kernel, parameters)
-        if cover is not None:
-            self._values["cover"] = cover
-        return self
+        return self._set(kernel=_part(kernel, parameters))._set_given(cover=cover)
 
     def material(self, material: PartLike, **parameters: Any) -> Self:
-        """The material of every body that names none of its own."""
-        self._values["material"] = _part(material, parameters)
-        return self
+        """Choose the material of every body that has none of its own."""
+        return self._set(material=_part(material, parameters))
 
     def formulation(self, formulation: PartLike, **parameters: Any) -> Self:
         """Choose the formulation, with its gradient and divergence."""
-        self._values["formulation"] = _part(formulation, parameters)
-        return self
+        return self._set(formulation=_part(formulation, parameters))
 
     def boundary(self, boundary: PartLike, *, label: str | None = None, **parameters: Any) -> Self:
-        """Add a boundary handler; its account is called `label`."""
-        self._boundaries.append(ImposedScene(_part(boundary, parameters), label))
-        return self
+        """Add a boundary handler; `label` names its account."""
+        return self._append("boundaries", ImposedScene(_part(boundary, parameters), label))
 
     def effect(self, effect: PartLike, *, label: str | None = None, **parameters: Any) -> Self:
-        """Add an effect; its account is called `label`."""
-        self._effects.append(ImposedScene(_part(effect, parameters), label))
-        return self
+        """Add an effect; `label` names its account."""
+        return self._append("effects", ImposedScene(_part(effect, parameters), label))
 
     def initial(
         self,
@@ -93,9 +82,8 @@ class SceneBuilder(ABC):
         displacement: Mapping[str, Component] | None = None,
         velocity: Mapping[str, Component] | None = None,
     ) -> Self:
-        """Set displacement [m] and velocity [m/s] at the start; a later call overrides."""
-        self._initial.append(InitialScene(where, displacement, velocity))
-        return self
+        """Set initial displacement [m] and velocity [m/s]; a later call overrides."""
+        return self._append("initial", InitialScene(where, displacement, velocity))
 
     def integrator(
         self,
@@ -106,74 +94,67 @@ class SceneBuilder(ABC):
         **parameters: Any,
     ) -> Self:
         """Choose the integrator, and the step as a factor of the CFL step or in seconds."""
-        self._values["integrator"] = _part(integrator, parameters)
-        if time_step_factor is not None:
-            self._values["time_step_factor"] = time_step_factor
-        if time_step is not None:
-            self._values["time_step"] = time_step
-        return self
+        self._set(integrator=_part(integrator, parameters))
+        return self._set_given(time_step_factor=time_step_factor, time_step=time_step)
 
     def statics(
         self, *, load_steps: int = 1, tolerance: float = 1e-9, max_iterations: int = 25
     ) -> Self:
         """Find the equilibrium under the loads at the end of the duration, instead of a motion."""
-        self._values["statics"] = StaticsScene(load_steps, tolerance, max_iterations)
-        return self
+        return self._set(statics=StaticsScene(load_steps, tolerance, max_iterations))
 
     def sleep(self, *, tolerance: float = 1e-9, slabs: int = 160) -> Self:
-        """Let regions sleep that nothing has reached, or that have come to rest."""
-        self._values["sleep"] = SleepScene(tolerance, slabs)
-        return self
+        """Do not step regions that no wave has reached, or that have come to rest."""
+        return self._set(sleep=SleepScene(tolerance, slabs))
 
     def duration(self, duration: float) -> Self:
-        """How long to simulate [s]."""
-        self._values["duration"] = duration
-        return self
+        """Set the simulated time [s]."""
+        return self._set(duration=duration)
 
     def outputs(self, count: int) -> Self:
-        """How many states to record after the first."""
-        self._values["outputs"] = count
-        return self
+        """Set the number of recorded states after the first."""
+        return self._set(outputs=count)
 
     def engine(self, engine: PartLike, **parameters: Any) -> Self:
-        """Which engine carries out the sums; "auto" chooses."""
-        self._values["engine"] = _part(engine, parameters) if parameters else engine
-        return self
+        """Choose the engine that evaluates the sums over neighbours; "auto" chooses by size."""
+        return self._set(engine=_part(engine, parameters) if parameters else engine)
 
     def energy_tolerance(self, tolerance: float | Literal["off"]) -> Self:
-        """How large the energy residual may be, over the energy in play, for a run to be sound."""
-        self._values["energy_tolerance"] = tolerance
-        return self
+        """Set the largest energy residual of a sound run, as a fraction of the energy in play."""
+        return self._set(energy_tolerance=tolerance)
 
     def silence(self, *names: str) -> Self:
-        """Warnings that are not to be shown, by the names that `solidsph explain` gives them."""
-        self._values["silence"] = (*self._values.get("silence", ()), *names)
-        return self
+        """Suppress warnings by the names that `solidsph explain` lists."""
+        return self._set(silence=(*self._values.get("silence", ()), *names))
 
     def scene(self) -> Scene:
-        """What has been said so far, as data.
+        """The scene as data.
 
         Raises:
-            BuildError: no body or no duration was given.
+            BuildError: the scene has no body or no duration.
         """
         problems = []
-        if not self._bodies:
+        if not self._values.get("bodies"):
             problems.append("there is no body; add one with .body(name, shape=..., spacing=...)")
         if "duration" not in self._values:
             problems.append("there is no duration; add .duration(seconds)")
         if problems:
             raise BuildError(problems)
-        return Scene(
-            bodies=self._bodies,
-            boundaries=tuple(self._boundaries),
-            effects=tuple(self._effects),
-            initial=tuple(self._initial),
-            **self._values,
-        )
+        return Scene(**self._values)
 
     @abstractmethod
     def build(self) -> object:
-        """Make every part, check every pair of them, and assemble the simulation."""
+        """Make every part, check that the parts fit each other, and assemble the simulation."""
+
+    def _set(self, **values: Any) -> Self:
+        self._values |= values
+        return self
+
+    def _set_given(self, **values: Any) -> Self:
+        return self._set(**{name: value for name, value in values.items() if value is not None})
+
+    def _append(self, name: str, entry: object) -> Self:
+        return self._set(**{name: (*self._values.get(name, ()), entry)})
 
 
 def _part(part: PartLike, parameters: Mapping[str, Any]) -> PartLike:

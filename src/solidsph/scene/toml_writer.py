@@ -1,8 +1,8 @@
-"""The TOML text of a scene."""
+"""Writer of scenes as TOML text."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -10,99 +10,85 @@ import tomli_w
 
 from solidsph.errors import SceneError
 from solidsph.registry.construct import describe
-from solidsph.scene.scene_data import DEFAULT_INTEGRATOR, BodyScene, PartLike, SceneData
+from solidsph.scene.scene_data import (
+    DEFAULT_INTEGRATOR,
+    BodyScene,
+    ImposedScene,
+    PartLike,
+    SceneData,
+)
 
 
 def toml_of(scene: SceneData) -> str:
     """TOML text from which an equal scene is read.
 
     Raises:
-        SceneError: the scene holds objects or functions that a file cannot.
+        SceneError: the scene holds objects or functions that cannot be written to a file.
     """
-    return tomli_w.dumps(_table(scene))
-
-
-def _table(scene: SceneData) -> dict[str, Any]:
-    table: dict[str, Any] = {}
-    if scene.title:
-        table["title"] = scene.title
-    table |= {"duration": scene.duration, "outputs": scene.outputs, "engine": _engine(scene.engine)}
-    if scene.energy_tolerance != attrs.fields(SceneData).energy_tolerance.default:
-        table["energy_tolerance"] = scene.energy_tolerance
-    if scene.silence:
-        table["silence"] = list(scene.silence)
-    table["body"] = {name: _body_table(body) for name, body in scene.bodies.items()}
-    table["kernel"] = _part(scene.kernel, "kernels")
-    if scene.cover is not None:
-        table["kernel"] = {**table["kernel"], "cover": scene.cover}
-    if scene.material is not None:
-        table["material"] = _part(scene.material, "materials")
-    table["formulation"] = _part(scene.formulation, "formulations")
-    if scene.statics is None:
-        step = (
-            {"time_step_factor": scene.time_step_factor}
-            if scene.time_step is None
-            else {"time_step": scene.time_step}
-        )
-        integrator = _part(scene.integrator or DEFAULT_INTEGRATOR, "integrators")
-        table["integrator"] = {**integrator, **step}
-    else:
-        table["statics"] = attrs.asdict(scene.statics)
-    if scene.sleep is not None:
-        table["sleep"] = attrs.asdict(scene.sleep)
-    for key, kind, entries in (
-        ("boundary", "boundaries", scene.boundaries),
-        ("effect", "effects", scene.effects),
-    ):
-        rows = [
-            {**_part(one.part, kind), **({"label": one.label} if one.label else {})}
-            for one in entries
-        ]
-        if rows:
-            table[key] = rows
-    if scene.initial:
-        table["initial"] = [
-            {k: _writable(v, f"initial.{k}") for k, v in attrs.asdict(one).items() if v is not None}
-            for one in scene.initial
-        ]
-    return table
-
-
-def _body_table(body: BodyScene) -> dict[str, Any]:
-    table: dict[str, Any] = {
-        "shape": _part(body.shape, "shapes"),
-        "spacing": body.spacing,
-        "discretisation": _part(body.discretisation, "discretisations"),
+    tolerance, engine = scene.energy_tolerance, scene.engine
+    usual = attrs.fields(SceneData).energy_tolerance.default
+    table = {
+        "title": scene.title or None,
+        "duration": scene.duration,
+        "outputs": scene.outputs,
+        "engine": engine if isinstance(engine, str) else _part("engines", engine),
+        "energy_tolerance": None if tolerance == usual else tolerance,
+        "silence": scene.silence or None,
+        "body": {name: _body(body) for name, body in scene.bodies.items()},
+        "kernel": {**_part("kernels", scene.kernel), "cover": scene.cover},
+        "material": _optional("materials", scene.material),
+        "formulation": _part("formulations", scene.formulation),
+        "integrator": _integrator(scene) if scene.statics is None else None,
+        "statics": scene.statics and attrs.asdict(scene.statics),
+        "sleep": scene.sleep and attrs.asdict(scene.sleep),
+        "boundary": _imposed("boundaries", scene.boundaries),
+        "effect": _imposed("effects", scene.effects),
+        "initial": [attrs.asdict(entry) for entry in scene.initial] or None,
     }
-    if body.material is not None:
-        table["material"] = _part(body.material, "materials")
-    if body.tags:
-        table["tags"] = {tag: _writable(where, f"tags.{tag}") for tag, where in body.tags.items()}
-    return table
+    return tomli_w.dumps({key: _plain(v, key) for key, v in table.items() if v is not None})
 
 
-def _engine(engine: PartLike) -> object:
-    return engine if isinstance(engine, str) else _part(engine, "engines")
+def _body(body: BodyScene) -> dict[str, Any]:
+    return {
+        "shape": _part("shapes", body.shape),
+        "spacing": body.spacing,
+        "discretisation": _part("discretisations", body.discretisation),
+        "material": _optional("materials", body.material),
+        "tags": body.tags or None,
+    }
 
 
-def _part(part: PartLike, kind: str) -> dict[str, Any]:
+def _integrator(scene: SceneData) -> dict[str, Any]:
+    name = "time_step_factor" if scene.time_step is None else "time_step"
+    integrator = _part("integrators", scene.integrator or DEFAULT_INTEGRATOR)
+    return {**integrator, name: getattr(scene, name)}
+
+
+def _imposed(kind: str, entries: Sequence[ImposedScene]) -> list[Mapping[str, Any]] | None:
+    return [{**_part(kind, e.part), "label": e.label or None} for e in entries] or None
+
+
+def _optional(kind: str, part: PartLike | None) -> Mapping[str, Any] | None:
+    return None if part is None else _part(kind, part)
+
+
+def _part(kind: str, part: PartLike) -> Mapping[str, Any]:
     if isinstance(part, str):
         return {"type": part}
-    if isinstance(part, Mapping):
-        written: dict[str, Any] = _writable(part, kind)
-        return written
-    return describe(kind, part)
+    return part if isinstance(part, Mapping) else describe(kind, part)
 
 
-def _writable(value: Any, what: str) -> Any:
+def _plain(value: Any, path: str) -> Any:
+    """`value`, found at `path` of the file, as TOML types; None is left out of tables."""
     if isinstance(value, Mapping):
-        return {k: _writable(v, f"{what}.{k}") for k, v in value.items() if v is not None}
+        return {k: _plain(v, f"{path}.{k}") for k, v in value.items() if v is not None}
     if isinstance(value, (list, tuple)):
-        return [_writable(v, what) for v in value]
+        return [_plain(v, path) for v in value]
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, (bool, int, float, str)):
         return value
     raise SceneError(
-        f"{what} = {value!r} cannot be written to a file; state it as a number, a name or a formula"
+        f"{path} = {value!r} cannot be written to a file; replace it by a number, a name or a "
+        "formula"
     )

@@ -1,4 +1,4 @@
-"""Equilibria, natural frequencies and the stable step, from the operators that runs use."""
+"""Equilibria, natural frequencies and stable steps of the discrete system that runs use."""
 
 from solidsph.statics.critical_step import StableStep, critical_step, highest_frequency
 from solidsph.statics.equilibrium import EquilibriumResult, LoadStep, equilibrium

@@ -1,4 +1,4 @@
-"""The stable step: the highest frequency of the forces as they are, by Arnoldi's iteration."""
+"""Critical time step from the highest frequency of the forces, by Arnoldi iteration."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 from solidsph.run.built_scene import BuiltScene
 
-# Differences over this part of a spacing: the error of the second order formula is its square.
+# Differences over this fraction of a spacing; the error of central differences is its square.
 _RELATIVE_STEP = 1e-3
 
-# Of the eigenvalue, which is the square of the frequency.
+# Relative, of the eigenvalue, the square of the frequency.
 _TOLERANCE = 1e-3
 
-# Up to this size a dense matrix is as cheap.
+# Up to this number of unknowns a dense matrix is as cheap.
 _SMALL = 40
 
 
@@ -26,32 +26,30 @@ class StableStep:
 
     highest_frequency: float  # [rad/s]
     step: float  # largest stable step [s]
-    in_use: float  # the step that the scene runs with [s]
+    in_use: float  # step of the scene [s]
 
     @property
     def margin(self) -> float:
-        """Largest stable step over that in use; below 1 the run blows up."""
+        """Largest stable step over the step of the scene; below 1 the run diverges."""
         return self.step / self.in_use
 
 
 def highest_frequency(simulation: BuiltScene, state: State | None = None) -> float:
     """Largest angular frequency of small deviations from `state` [rad/s], to 0.1 %.
 
-    Matrix-free: products with the linearised forces are differences of `Dynamics.respond` at
-    rest, so every active effect and any engine counts, in either Lagrangian form.
+    Matrix-free: the linearised forces are differences of `Dynamics.respond` at rest, with all
+    effects, for any engine and formulation.
 
     Args:
         simulation: any built scene.
-        state: where to linearise; the start of the scene by default.
+        state: linearisation point; the initial state by default.
     """
     dynamics = simulation.dynamics
     around = simulation.initial if state is None else state
     positions = dynamics.place(around.time, around.positions)
     rest = np.zeros_like(positions)
     spacing = float(dynamics.particles.spacings.min())
-    free = np.repeat(~dynamics.particles.ghosts[:, None], positions.shape[1], axis=1)
-    for motion in dynamics.constraints:
-        free &= ~motion.held
+    free = dynamics.free
     count = int(free.sum())
     if count == 0:
         return 0.0
@@ -87,10 +85,9 @@ def highest_frequency(simulation: BuiltScene, state: State | None = None) -> flo
 
 
 def critical_step(simulation: BuiltScene, state: State | None = None) -> StableStep:
-    """The largest stable step from the spectrum, beside the one in use.
+    """Largest stable step from the spectrum, compared with the step of the scene.
 
-    Damping counts by the rates that effects declare, as in the step chosen from wave speed and
-    spacing, for which this is the true margin.
+    Damping enters by the rates that effects declare, as in the CFL step.
     """
     frequency = highest_frequency(simulation, state)
     rate = sum(load.damping_rate for load in simulation.dynamics.loads)

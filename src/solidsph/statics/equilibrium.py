@@ -1,4 +1,4 @@
-"""Equilibrium of a scene at rest, by Newton's method on the sparse tangent."""
+"""Static equilibrium of a scene by Newton's method with a sparse tangent."""
 
 from __future__ import annotations
 
@@ -12,65 +12,63 @@ from solidsph.errors import ConvergenceError, PortableError, SceneError
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 from solidsph.run.built_scene import BuiltScene
-from solidsph.statics.factors import Factors, SingularError, factorised
+from solidsph.statics.factors import Factors, SingularError, factorise
 from solidsph.statics.freedoms import Freedoms, freedoms
 from solidsph.statics.load_path import Forces, LoadPath
 from solidsph.statics.tangent import Tangent, is_symmetric
 
-# A step shorter than this part of Newton's makes too little way to be worth its cost.
+# Shorter fractions of a Newton step are not worth their cost.
 _SHORTEST_STEP = 2.0**-8
 
-# Load steps this much shorter than the first asked for show that the path ends.
+# Load steps shorter than this fraction of the initial one mean that the path ends.
 _SHORTEST_LOAD_STEP = 2.0**-10
 
-# Solved in so few iterations, the next load step may be twice as long.
+# After a load step of at most this many iterations, the next one is twice as long.
 _QUICK = 4
 
-# Rounding of a sum over neighbours, in units of a diagonal entry of K times the displacement.
+# Rounding error of a sum over neighbours, relative to the diagonal of K times the displacement.
 _ROUNDING = 4.0 * np.finfo(np.float64).eps
 
-# Where rounding leaves more of what is applied, an equilibrium is of no use.
+# Largest imbalance by rounding, relative to all applied forces, that is accepted.
 _MOST_ROUNDED = 1e-4
 
 _NOTHING_HOLDS = (
-    "either nothing holds the body, or its gradients leave a pattern of motion without energy; "
-    "clamp it in every direction, or add hourglass control"
+    "either the body is not fully clamped, or its gradients have a zero-energy mode; clamp it in "
+    "every direction, or add hourglass control"
 )
 _TOO_LITTLE = (
-    "what is applied deforms the body by less than positions can hold in double precision: apply "
-    "more, and scale the result down"
+    "the loads deform the body by less than the rounding error of positions: apply larger loads, "
+    "and scale the result down"
 )
 _PATH_ENDS = (
-    "the load may exceed what the body can carry (a limit point): impose a displacement in its "
-    "place, or follow it in time with damping; if not, take more load_steps, or add hourglass "
-    "control if neighbouring particles move against each other"
+    "the load may exceed the capacity of the body (a limit point): impose a displacement "
+    "instead, or run a damped motion; otherwise use more load_steps, or add hourglass control if "
+    "neighbouring particles move against each other"
 )
 
 
 @attrs.frozen
 class LoadStep:
-    """One equilibrium on the path."""
+    """One equilibrium on the load path."""
 
     load_factor: float
-    residuals: tuple[float, ...]  # imbalance over loads before every iteration, and at the end [-]
+    residuals: tuple[float, ...]  # relative imbalance before each iteration and at the end [-]
 
 
 @attrs.frozen(eq=False)
 class EquilibriumResult:
-    """The scene at rest under its loads at the end of its duration."""
+    """Equilibrium of a scene under the loads at the end of its duration."""
 
     state: State  # velocities are zero; `applied` and `work` hold loads and reactions
     steps: tuple[LoadStep, ...]
-    iterations: int  # factorisations in all, those of failed load steps included
-    residual: float  # norm of the imbalance over that of all that is applied [-]
-    stable: (
-        bool | None
-    )  # whether the last tangent was positive definite; None if it is not symmetric
+    iterations: int  # factorisations, those of failed load steps included
+    residual: float  # norm of the imbalance over that of all applied forces [-]
+    stable: bool | None  # last tangent positive definite; None if it is not symmetric
     seconds: float  # wall time [s]
 
 
 class _LoadStepError(PortableError):
-    """A load step that must be tried again, shorter."""
+    """A load step that must be repeated with a smaller increment."""
 
     def __init__(self, cause: str, remedy: str, displacements: Array) -> None:
         self.cause = cause
@@ -87,31 +85,29 @@ def equilibrium(
     max_iterations: int = 25,
     observer: Callable[[State], None] = lambda state: None,
 ) -> EquilibriumResult:
-    """Displacements at which all forces on free particles balance.
+    """Find the displacements at which all forces on free particles balance.
 
-    The path begins at the reference configuration with nothing imposed; initial displacements
-    and velocities of the scene play no part. Along it, formulas in t are followed over the
-    duration, and constants are brought on in proportion (`LoadPath`). A load step that fails is
-    halved, and doubled again after quick success, so `load_steps` is but the first guess.
+    The load path (`LoadPath`) begins at the reference configuration without loads; the initial
+    state of the scene plays no part. Formulas of t are followed over the duration, constants grow
+    in proportion. A load step that fails is halved, and doubled after quick convergence.
 
-    Where a slender body swings through an angle, Newton's step stretches it, and plain iteration
-    spends itself on forces far above the load that come and go. So stresses are treated as if
-    they were unknowns too: the tangent takes the stress that turns with the body as the last step
-    predicted it (Magisano, Leonetti & Garcea 2017). It converges quadratically to the same
-    equilibrium, in a quarter of the iterations for a beam bent by a fifth of its length.
+    Newton steps stretch a slender body that rotates, and plain iteration spends many steps on
+    spurious membrane forces. Stresses are therefore treated like unknowns: the geometric stiffness
+    uses the stress that the last step predicted (Magisano, Leonetti & Garcea 2017). Convergence
+    stays quadratic, in a quarter of the iterations for a beam bent by a fifth of its length.
 
-    Newton's steps are halved while they turn a volume over or fail Deuflhard's natural
-    monotonicity test: with the same tangent, the next correction must be smaller.
+    Newton steps are halved while they invert a volume or fail Deuflhard's natural monotonicity
+    test: with the same tangent, the next correction must be smaller.
 
     Args:
         simulation: a built scene in the total Lagrangian form.
-        load_steps: equal steps to begin with.
+        load_steps: initial number of equal load steps.
         tolerance: imbalance over the norm of loads and reactions [-].
-        max_iterations: of Newton's method in a load step.
-        observer: told the state without loads, and then that of every load step.
+        max_iterations: of Newton's method per load step.
+        observer: called with the unloaded state, and with the state of every load step.
 
     Raises:
-        ConvergenceError: no equilibrium was found at some load factor: where, and what to do.
+        ConvergenceError: no equilibrium was found; the error has the load factor and a remedy.
         SceneError: an argument is out of range.
         SolidsphError: the formulation or a motion has no constant linear operator.
     """
@@ -120,7 +116,7 @@ def equilibrium(
             raise SceneError(f"equilibrium: {name} must be at least 1, got {value}")
     if not 0.0 < tolerance < 1.0:
         raise SceneError(f"equilibrium: tolerance must lie between 0 and 1, got {tolerance}")
-    begun = clock.perf_counter()
+    start = clock.perf_counter()
     newton = _Newton.of(simulation, tolerance, max_iterations)
     state = newton.state(None, np.zeros_like(simulation.particles.positions), 0.0)
     observer(state)
@@ -128,10 +124,10 @@ def equilibrium(
     steps: list[LoadStep] = []
     factor, step = 0.0, 1.0 / load_steps
     while factor < 1.0:
-        # Rounding must not leave a last step of no length.
+        # Rounding must not leave a tiny last step.
         target = 1.0 if factor + step > 1.0 - 1e-9 else factor + step
         try:
-            displacements, residuals = newton.balanced(displacements, target)
+            displacements, residuals = newton.solve(displacements, target)
         except _LoadStepError as failure:
             step *= 0.5
             hopeless = newton.singular_at_rest or step < _SHORTEST_LOAD_STEP / load_steps
@@ -150,22 +146,22 @@ def equilibrium(
         iterations=newton.iterations,
         residual=steps[-1].residuals[-1],
         stable=newton.stable(),
-        seconds=clock.perf_counter() - begun,
+        seconds=clock.perf_counter() - start,
     )
 
 
 @attrs.frozen(eq=False)
 class _Correction:
-    """Newton's correction at one place."""
+    """Newton's correction at one configuration."""
 
     factors: Factors
-    pull: Array  # (k,) force on the free displacements from those still missing of the imposed
-    values: Array  # (k,) change of the free displacements [m]
+    pull: Array  # (k,) force on free displacements by the missing part of the imposed ones
+    values: Array  # (k,) change of free displacements [m]
 
 
 @attrs.define(eq=False)
 class _Newton:
-    """Newton's method on one scene."""
+    """Newton's method for one scene."""
 
     path: LoadPath
     tangent: Tangent
@@ -176,27 +172,26 @@ class _Newton:
     iterations: int = 0
     last: Factors | None = None
     singular_at_rest: bool = False
-    rounding: float = 0.0  # imbalance that is rounding of displacements alone [N]
-    coarsest: float = 0.0  # that rounding of positions may leave, too [N]
+    rounding: float = 0.0  # imbalance by rounding of displacements [N]
+    coarsest: float = 0.0  # imbalance by rounding of positions [N]
 
     @classmethod
     def of(cls, simulation: BuiltScene, tolerance: float, max_iterations: int) -> _Newton:
-        own = freedoms(simulation.dynamics)
+        free = freedoms(simulation.dynamics)
         return cls(
             path=LoadPath.of(simulation),
             tangent=Tangent.of(simulation),
-            freedoms=own,
-            symmetric=own.adjoint and is_symmetric(simulation),
+            freedoms=free,
+            symmetric=free.adjoint and is_symmetric(simulation),
             tolerance=tolerance,
             max_iterations=max_iterations,
         )
 
-    def balanced(self, start: Array, factor: float) -> tuple[Array, tuple[float, ...]]:
-        """Displacements (n, d) in equilibrium at `factor`, and the residuals on the way to them.
+    def solve(self, start: Array, factor: float) -> tuple[Array, tuple[float, ...]]:
+        """Displacements (n, d) in equilibrium at `factor`, and the residuals of all iterations.
 
-        Newton's unknowns are all displacements: what is missing of the imposed motion is made
-        up in proportion with each step, and the free displacements go with it at once, so that
-        a large imposed motion does not first crush the particles beside it.
+        Each step applies the same fraction of the missing imposed motion and of the change of the
+        free displacements, so that a large imposed motion does not crush the particles beside it.
         """
         u, ahead = start, None
         missing = self.path.placed(u, factor) - u
@@ -220,8 +215,8 @@ class _Newton:
         if not missing.any() and self._rounded(forces):
             return u, tuple(residuals)
         raise _LoadStepError(
-            f"{self.max_iterations} iterations leave an imbalance of {residuals[-1]:.3g} of what "
-            "is applied",
+            f"{self.max_iterations} iterations leave an imbalance of {residuals[-1]:.3g} of the "
+            "applied forces",
             _PATH_ENDS,
             u,
         )
@@ -229,7 +224,7 @@ class _Newton:
     def _correction(
         self, u: Array, ahead: Array | None, missing: Array, forces: Forces, time: float
     ) -> _Correction:
-        """Newton's change of the free displacements, with `missing` (n, d) imposed too."""
+        """Change of the free displacements if all of `missing` (n, d) is imposed."""
         matrix = self.tangent.matrix(u, ahead, time)
         reduced = self.freedoms.reduced(matrix)
         self.iterations += 1
@@ -238,10 +233,10 @@ class _Newton:
         self.rounding = _ROUNDING * float(np.linalg.norm(diagonal * np.abs(u[free])))
         self.coarsest = _ROUNDING * float(np.linalg.norm(diagonal * np.abs(x[free])))
         try:
-            factors = factorised(reduced, symmetric=self.symmetric)
-        except SingularError as found:
+            factors = factorise(reduced, symmetric=self.symmetric)
+        except SingularError as error:
             self.singular_at_rest = not u.any()
-            raise _LoadStepError(self._free_motion(found), _NOTHING_HOLDS, u) from None
+            raise _LoadStepError(self._free_motion(error), _NOTHING_HOLDS, u) from None
         self.last = factors
         pull = self.freedoms.reduction @ (matrix @ missing.ravel())
         return _Correction(factors, pull, factors.solve(self._imbalance(forces) - pull))
@@ -249,14 +244,14 @@ class _Newton:
     def _advanced(
         self, u: Array, missing: Array, factor: float, newton: _Correction
     ) -> tuple[Array, Array]:
-        """As much of Newton's step as is safe: displacements, and stress predicted ahead."""
+        """Displacements after the largest acceptable fraction of a step, and stress ahead."""
         direction = self.freedoms.expanded(newton.values) + missing
         size = float(np.linalg.norm(newton.values))
         length = 1.0
         while length >= _SHORTEST_STEP:
             trial = u + length * direction
             if length == 1.0:
-                trial = self.path.placed(trial, factor)  # to the last digit
+                trial = self.path.placed(trial, factor)  # removes rounding
             if np.all(self.path.volume_ratios(trial) > 0.0):
                 ahead = self.tangent.ahead(u, length * direction, trial)
                 forces = self.path.forces(trial, factor)
@@ -269,18 +264,18 @@ class _Newton:
                     if next_size <= (1.0 - 0.25 * length) * size or self._converged(forces):
                         return trial, ahead
             length *= 0.5
-        cause = "no part of Newton's step brings the forces nearer to balance"
+        cause = "no fraction of the Newton step reduces the imbalance"
         imbalance = float(np.linalg.norm(self._imbalance(self.path.forces(u, factor))))
         raise _LoadStepError(cause, _TOO_LITTLE if imbalance <= self.coarsest else _PATH_ENDS, u)
 
     def stable(self) -> bool | None:
-        """Whether the last tangent was positive definite; None if nobody can tell."""
+        """Whether the last tangent was positive definite; None if it is not symmetric."""
         return self.last.positive if self.symmetric and self.last is not None else None
 
-    def _free_motion(self, found: SingularError) -> str:
-        if found.freedom is None:
+    def _free_motion(self, error: SingularError) -> str:
+        if error.freedom is None:
             return "the tangent is singular"
-        particle, axis = (int(k) for k in np.argwhere(self.freedoms.free)[found.freedom])
+        particle, axis = (int(k) for k in np.argwhere(self.freedoms.free)[error.freedom])
         return (
             f"the tangent is singular, with free motion of particle {particle} along {'xyz'[axis]}"
         )
@@ -295,10 +290,10 @@ class _Newton:
         return bool(np.linalg.norm(self._imbalance(forces)) <= allowed)
 
     def _rounded(self, forces: Forces) -> bool:
-        """Whether an imbalance that no step reduces is but rounding.
+        """Whether an imbalance that no step reduces is rounding of positions.
 
-        Under a small load positions do not hold all digits of the displacements: those of a metre
-        of steel that is pulled by 1 Pa are 5e-12 m, and positions end at 1e-16 m.
+        Positions do not resolve tiny displacements: a metre of steel pulled by 1 Pa moves by
+        5e-12 m, and positions are rounded to 1e-16 m.
         """
         imbalance = float(np.linalg.norm(self._imbalance(forces)))
         return imbalance <= min(self.coarsest, _MOST_ROUNDED * forces.scale)
@@ -310,7 +305,7 @@ class _Newton:
         return 0.0 if imbalance == 0.0 else float("inf")
 
     def state(self, before: State | None, displacements: Array, factor: float) -> State:
-        """The state at rest, with the work done since `before`."""
+        """State at rest, with the work since `before`."""
         positions = self.path.simulation.particles.positions + displacements
         rest = np.zeros_like(positions)
         applied = self.path.forces(displacements, factor).applied
@@ -334,7 +329,7 @@ class _Newton:
         )
 
     def error(self, failure: _LoadStepError, reached: float, tried: float) -> ConvergenceError:
-        """What to tell of a load step that cannot be made any shorter."""
+        """Error of a load step that cannot be shortened any further."""
         forces = self.path.forces(failure.displacements, tried)
         free_force = np.where(self.freedoms.free, forces.total, 0.0)
         worst = int(np.argmax(np.linalg.norm(free_force, axis=1)))

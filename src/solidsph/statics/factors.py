@@ -1,4 +1,4 @@
-"""Factors of a sparse stiffness, and what they tell about it."""
+"""LU factors of a sparse stiffness matrix."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from scipy.sparse.linalg import SuperLU, splu
 from solidsph.errors import PortableError
 from solidsph.maths.arrays import Array
 
-# An eigenvalue of the matrix scaled to a unit diagonal: below this it is rounding.
+# Smaller eigenvalues of the matrix scaled to a unit diagonal are rounding.
 _SINGULAR = 1e-13
 
 
 class SingularError(PortableError):
-    """The matrix has no inverse to working precision; for callers here, who know what it means."""
+    """The matrix is singular to working precision."""
 
     def __init__(self, freedom: int | None) -> None:
-        self.freedom = freedom  # where the motion without stiffness is largest, if it is known
+        self.freedom = freedom  # where the motion without stiffness is largest, if known
         super().__init__(f"no stiffness in row {freedom}")
 
 
 @attrs.frozen(eq=False)
 class Factors:
-    """LU factors of the matrix scaled to a unit diagonal."""
+    """LU factors of a matrix scaled to a unit diagonal."""
 
     scaling: Array  # (k,)
     lu: SuperLU
@@ -33,22 +33,22 @@ class Factors:
     def positive(self) -> bool:
         """Whether the matrix, which must be symmetric, is positive definite.
 
-        The signs of its pivots are those of its eigenvalues. SuperLU copies its factors to show
-        them, which takes as long as the factorisation: ask once.
+        The pivots have the signs of the eigenvalues. SuperLU copies its factors, which takes as
+        long as the factorisation.
         """
         return bool(np.all(self.lu.U.diagonal() > 0.0))
 
     def solve(self, values: Array) -> Array:
-        """K^-1 times values (k,)."""
+        """Solution of K x = `values` (k,)."""
         solution: Array = self.scaling * self.lu.solve(self.scaling * values)
         return solution
 
 
-def factorised(matrix: csr_array, *, symmetric: bool) -> Factors:
-    """Factors of `matrix` (k, k).
+def factorise(matrix: csr_array, *, symmetric: bool) -> Factors:
+    """Factorise `matrix` (k, k).
 
-    A symmetric one is ordered by minimum degree and pivots on its diagonal: half the time of the
-    general ordering for a beam, a sixth for a square.
+    A symmetric matrix is ordered by minimum degree with pivots on its diagonal: half the time of
+    the general ordering for a beam, a sixth for a square.
 
     Raises:
         SingularError: some motion has no stiffness to working precision.
@@ -75,9 +75,9 @@ def factorised(matrix: csr_array, *, symmetric: bool) -> Factors:
             )
         else:
             lu = splu(scaled, permc_spec="COLAMD")
-    except RuntimeError:  # a pivot that is exactly zero; SuperLU does not say which
+    except RuntimeError:  # a pivot is exactly zero; SuperLU does not report which
         raise SingularError(None) from None
-    # What a random force moves most, it moves along the softest eigenvector.
+    # The response to a random force is largest along the softest eigenvector.
     probe = np.random.default_rng(0).standard_normal(len(scaling))
     softest = lu.solve(probe)
     if not np.linalg.norm(softest) * _SINGULAR < np.linalg.norm(probe):

@@ -1,4 +1,4 @@
-"""Freedoms: which displacements are free, and how all others follow them."""
+"""Freedoms: free displacements, and the linear dependence of all others on them."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from solidsph.statics.linear_part import linear_part
 
 @attrs.frozen(eq=False)
 class Freedoms:
-    """u = E q + c(t) with q the free displacements, and the force on q: f = R f_all.
+    """Expansion u = E q + c(t) of the free displacements q, and reduction R f of forces.
 
-    Components stand particle by particle, that along i of particle p at p d + i.
+    Component i of particle p has the index p d + i.
     """
 
     free: Mask  # (n, d)
     expansion: csr_array  # E, (d n, k)
     reduction: csr_array  # R, (k, d n)
-    adjoint: bool  # whether R is the transpose of E, so that K stays symmetric
+    adjoint: bool  # R is the transpose of E, so that K stays symmetric
 
     @property
     def count(self) -> int:
-        """Number of free degrees of freedom k."""
+        """Number k of free degrees of freedom."""
         return int(self.expansion.shape[1])
 
     def reduced(self, matrix: csr_array) -> csr_array:
@@ -35,20 +35,19 @@ class Freedoms:
 
     def expanded(self, values: Array) -> Array:
         """E q, (n, d), from q (k,)."""
-        everywhere: Array = (self.expansion @ values).reshape(self.free.shape)
-        return everywhere
+        expanded: Array = (self.expansion @ values).reshape(self.free.shape)
+        return expanded
 
 
 def freedoms(dynamics: Dynamics) -> Freedoms:
-    """The freedoms that the motions of a scene leave.
+    """Freedoms that the constraints of a scene leave.
 
     Raises:
-        SolidsphError: a motion follows the free ones in a way that is not linear.
+        SolidsphError: a constraint depends on the free displacements nonlinearly.
     """
-    free = np.repeat(~dynamics.particles.ghosts[:, None], dynamics.particles.dimension, axis=1)
+    free = dynamics.free
     returning = np.zeros_like(free)
     for motion in dynamics.constraints:
-        free &= ~motion.held
         if isinstance(motion, GhostConstraint):
             returning |= motion.held
     selection = csr_array(eye_array(free.size, format="csr")[:, np.flatnonzero(free.ravel())])
@@ -63,7 +62,7 @@ def freedoms(dynamics: Dynamics) -> Freedoms:
 
     labels = [motion.label for motion in dynamics.constraints]
     followed = linear_part(following, int(free.sum()), labels)
-    # Only those that give forces back hand them to whom they follow.
+    # Only constraints that return forces pass them on to the particles they follow.
     kept = csr_array(followed.multiply(returning.reshape(-1, 1)))
     return Freedoms(
         free=free,

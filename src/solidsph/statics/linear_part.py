@@ -1,4 +1,4 @@
-"""The matrix of an affine map that is only known by what it does."""
+"""Sparse matrix of an affine map that can only be evaluated."""
 
 from __future__ import annotations
 
@@ -10,22 +10,21 @@ from scipy.sparse import csr_array
 from solidsph.errors import SolidsphError
 from solidsph.maths.arrays import Array, Indices
 
-# Terms this far below the largest are rounding.
+# Smaller entries, relative to the largest, are rounding.
 _NEGLIGIBLE = 1e-14
 
-# How well the matrix must repeat the map on values that it was not read from.
+# Relative tolerance of the matrix on values other than the probes.
 _AGREEMENT = 1e-9
 
 
 def linear_part(change: Callable[[Array], Array], size: int, labels: Sequence[str]) -> csr_array:
-    """Matrix (m, size) of the affine map `change` from (size,) to (m,), where few columns matter.
+    """Matrix (m, size) of the affine map `change` from (size,) to (m,) with few nonzero columns.
 
-    Ranges of columns are tried with random numbers and halved until each that answers stands
-    alone, so that the cost is some probes for each column that is not zero. A map ignores a
-    column if its result does not change by a bit.
+    Ranges of columns are probed with random numbers and halved, so that the cost is a few probes
+    per nonzero column. A column is zero if the result does not change by a bit.
 
     Raises:
-        SolidsphError: the map is not affine; it belongs to the conditions named by `labels`.
+        SolidsphError: the map, which belongs to the terms `labels`, is not affine.
     """
     random = np.random.default_rng(0)
     values = random.uniform(1.0, 2.0, size) * random.choice([-1.0, 1.0], size)
@@ -38,17 +37,17 @@ def linear_part(change: Callable[[Array], Array], size: int, labels: Sequence[st
         start, stop = ranges.pop()
         probe = np.zeros(size)
         probe[start:stop] = values[start:stop]
-        answer = change(probe) - at_rest
-        answering = np.flatnonzero(answer)
-        if not len(answering):
+        response = change(probe) - at_rest
+        affected = np.flatnonzero(response)
+        if not len(affected):
             continue
         if stop - start > 1:
             middle = (start + stop) // 2
             ranges += [(start, middle), (middle, stop)]
             continue
-        rows.append(answering)
-        columns.append(np.full(len(answering), start, dtype=np.intp))
-        weights.append(answer[answering] / values[start])
+        rows.append(affected)
+        columns.append(np.full(len(affected), start, dtype=np.intp))
+        weights.append(response[affected] / values[start])
     shape = (len(at_rest), size)
     if not rows:
         return csr_array(shape)
@@ -57,10 +56,10 @@ def linear_part(change: Callable[[Array], Array], size: int, labels: Sequence[st
     places = (np.concatenate(rows)[kept], np.concatenate(columns)[kept])
     matrix = csr_array((weight[kept], places), shape=shape)
     other = random.uniform(-1.0, 1.0, size)
-    answer = change(other) - at_rest
-    if np.abs(matrix @ other - answer).max() > _AGREEMENT * np.abs(answer).max():
+    response = change(other) - at_rest
+    if np.abs(matrix @ other - response).max() > _AGREEMENT * np.abs(response).max():
         raise SolidsphError(
-            f"statics needs what follows the free motion to follow it linearly; one of "
-            f"{', '.join(repr(label) for label in labels)} does not: leave it out, or run in time"
+            "statics: constraints must depend linearly on the free displacements, but one of "
+            f"{', '.join(map(repr, labels))} does not; leave it out, or leave out [statics]"
         )
     return matrix

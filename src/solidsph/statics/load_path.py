@@ -1,4 +1,4 @@
-"""The load path: the scene at rest under a growing part of what is imposed on it."""
+"""Load path: a scene at rest under a growing fraction of its loads and imposed motions."""
 
 from __future__ import annotations
 
@@ -15,35 +15,34 @@ from solidsph.run.built_scene import BuiltScene
 
 @attrs.frozen(eq=False)
 class Forces:
-    """Forces on particles at rest."""
+    """Forces on all particles at rest."""
 
-    total: Array  # (n, d) [N], those on ghosts handed to whom they follow
-    applied: Mapping[str, Array]  # by account, reactions among them, (n, d) [N]
+    total: Array  # (n, d) [N], those on ghosts returned to the particles that they follow
+    applied: Mapping[str, Array]  # by account, reactions included, (n, d) [N]
 
     @property
     def scale(self) -> float:
-        """Size of everything applied [N], which the imbalance is measured by."""
+        """Norm of all applied forces and reactions [N], the scale of the imbalance."""
         return float(np.sqrt(sum(np.vdot(force, force) for force in self.applied.values())))
 
 
 @attrs.frozen(eq=False)
 class LoadPath:
-    """A scene at load factors from 0, where nothing is imposed, to 1, where all of it is.
+    """A scene at load factors from 0, without loads and imposed motions, to 1.
 
-    At factor s, imposed motions and loads are those of the time s T, with T the duration, less
-    1 - s times what they are at t = 0. A formula that grows from zero is so followed in time; a
-    constant, which stands at full height from the start, grows in proportion to s.
+    At factor s they are those of the time s T, with T the duration, minus 1 - s times those at
+    t = 0. A formula that grows from zero is thus followed in time; a constant grows with s.
     """
 
     simulation: BuiltScene
     internal: MatrixForces
     offset: Array  # (n, d) motion imposed at t = 0 [m]
     initial_loads: Mapping[str, Array]  # (k, d) of each load at t = 0 [N]
-    held: Mask  # (n, d) components of real particles that a motion determines
+    held: Mask  # (n, d) components of real particles that a constraint determines
 
     @classmethod
     def of(cls, simulation: BuiltScene) -> LoadPath:
-        """The path of a scene, from its reference configuration."""
+        """Load path of a scene from its reference configuration."""
         dynamics, particles = simulation.dynamics, simulation.particles
         rest = np.zeros_like(particles.positions)
         held = np.zeros(rest.shape, dtype=np.bool_)
@@ -62,18 +61,18 @@ class LoadPath:
         )
 
     def time(self, factor: float) -> float:
-        """Time that belongs to a load factor [s]."""
+        """Time of a load factor [s]."""
         return factor * self.simulation.scene.duration
 
     def placed(self, displacements: Array, factor: float) -> Array:
-        """Displacements (n, d) with the motions of this factor imposed."""
+        """Displacements (n, d) with the imposed motions of a load factor."""
         placed = displacements.copy()
         for motion in self.simulation.dynamics.constraints:
             motion.impose(self.time(factor), 0, placed)
         return placed - (1.0 - factor) * self.offset
 
     def forces(self, displacements: Array, factor: float) -> Forces:
-        """Forces at displacements (n, d), with the loads of this factor."""
+        """Forces at displacements (n, d) with the loads of a load factor."""
         dynamics, time = self.simulation.dynamics, self.time(factor)
         positions = dynamics.particles.positions + displacements
         rest = np.zeros_like(positions)
@@ -95,14 +94,14 @@ class LoadPath:
 
     def volume_ratios(self, displacements: Array) -> Array:
         """J of every particle, (n,); 1 for ghosts."""
-        with np.errstate(all="ignore"):  # a displacement that is being tried may be absurd
+        with np.errstate(all="ignore"):  # trial displacements may be absurd
             F = self.internal.fields(displacements).deformation_gradients
             ratios: Array = np.linalg.det(F)
         return ratios
 
 
 def _double_precision(simulation: BuiltScene) -> MatrixForces:
-    """Internal forces whose rounding Newton's method does not see, whichever engine runs."""
+    """Internal forces in double precision, whatever the engine of the scene."""
     internal = simulation.dynamics.internal
     if isinstance(internal, MatrixForces):
         return internal

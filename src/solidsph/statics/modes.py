@@ -1,4 +1,4 @@
-"""Natural frequencies and mode shapes, from the tangent and the lumped masses."""
+"""Natural frequencies and mode shapes from the tangent and the lumped masses."""
 
 from __future__ import annotations
 
@@ -11,69 +11,69 @@ from solidsph.errors import SceneError, SolidsphError
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 from solidsph.run.built_scene import BuiltScene
-from solidsph.statics.factors import SingularError, factorised
+from solidsph.statics.factors import SingularError, factorise
 from solidsph.statics.freedoms import freedoms
 from solidsph.statics.tangent import is_symmetric, tangent
 
-# The shift's frequency, in passages of a wave across the body a second: low beside elastic modes
-# of compact bodies, yet high enough that rigid motions leave the shifted matrix well conditioned.
+# Frequency of the shift over wave speed / size of the body: low beside elastic modes of compact
+# bodies, yet high enough for a well-conditioned matrix if rigid motions are free.
 _SHIFT = 0.1
 
-# Eigenvalues this far below zero, relative to the shift, are rounding and not instability.
+# Eigenvalues down to minus this fraction of the shift are rounding, not instability.
 _ROUNDING = 1e-4
 
 
 @attrs.frozen(eq=False)
 class Modes:
-    """The slowest free vibrations."""
+    """Lowest modes of free vibration."""
 
-    angular_frequencies: Array  # (count,) rising [rad/s]; rigid motions near 0
+    angular_frequencies: Array  # (count,) ascending [rad/s]; rigid motions near 0
     shapes: Array  # (count, n, d) displacements, the largest component of each 1
-    smoothness: Array  # (count,) what the kernel's smoothing leaves of a shape [-]
-    """Near 1 for a motion that the particles resolve, near 0 for one in which neighbours move
-    against each other: a zero-energy mode of the gradient, whose frequency means nothing."""
+    smoothness: Array  # (count,) norm of each shape after smoothing by the kernel over before [-]
+    """Near 1 for resolved modes, near 0 for zero-energy modes of the gradient, in which neighbours
+    move against each other and whose frequency is meaningless."""
 
 
 def frequencies(simulation: BuiltScene, count: int, state: State | None = None) -> Modes:
-    """The `count` smallest natural frequencies about `state`, by shift and invert.
+    """The `count` lowest natural frequencies about `state`, by shift-and-invert.
 
-    Loads count by their stiffness alone, damping not at all.
+    Loads contribute their stiffness; damping is neglected.
 
     Args:
         simulation: a built scene in the total Lagrangian form with an adjoint divergence.
-        count: how many.
-        state: an equilibrium to vibrate about; the reference configuration by default.
+        count: number of modes.
+        state: equilibrium; the reference configuration by default.
 
     Raises:
-        SceneError: there are not so many modes.
+        SceneError: there are fewer modes.
         SolidsphError: the forces have no energy, or the state is unstable.
     """
     particles, model = simulation.particles, simulation.model
-    own = freedoms(simulation.dynamics)
-    if not (own.adjoint and is_symmetric(simulation)):
+    free = freedoms(simulation.dynamics)
+    if not (free.adjoint and is_symmetric(simulation)):
         raise SolidsphError(
-            "natural frequencies need forces that derive from an energy; take divergence = "
-            "'variational' and a motion that returns forces, or use studies.spectrum"
+            "natural frequencies need forces that derive from an energy; use divergence = "
+            "'variational' and constraints that return forces, or studies.spectrum"
         )
-    if not 1 <= count < own.count:
+    if not 1 <= count < free.count:
         raise SceneError(
-            f"frequencies: count must lie between 1 and {own.count - 1}, one less than the free "
+            f"frequencies: count must lie between 1 and {free.count - 1}, one less than the free "
             f"degrees of freedom, got {count}"
         )
     u = np.zeros_like(particles.positions)
     if state is not None:
         u = state.positions - particles.positions
-    K = own.reduced(tangent(simulation, u))
-    mass = np.repeat(model.masses, particles.dimension)[own.free.ravel()]
+    K = free.reduced(tangent(simulation, u))
+    mass = np.repeat(model.masses, particles.dimension)[free.free.ravel()]
     extent = float(np.ptp(particles.positions, axis=0).max())
     speed = min(body.material.wave_speed for body in model.bodies)
     shift = (_SHIFT * speed / extent) ** 2
     try:
-        factors = factorised(csr_array(K + shift * diags_array(mass)), symmetric=True)
+        factors = factorise(csr_array(K + shift * diags_array(mass)), symmetric=True)
     except SingularError:
         raise _unstable() from None
-    # A start that no symmetry of the body is blind to, the same at every call.
-    start = np.random.default_rng(0).standard_normal(own.count)
+    # A reproducible start vector without the symmetries of the body.
+    start = np.random.default_rng(0).standard_normal(free.count)
     squares, vectors = eigsh(
         K,
         k=count,
@@ -85,7 +85,7 @@ def frequencies(simulation: BuiltScene, count: int, state: State | None = None) 
     order = np.argsort(squares)
     if not factors.positive or squares[order[0]] < -_ROUNDING * shift:
         raise _unstable()
-    shapes = np.stack([own.expanded(vectors[:, k]) for k in order])
+    shapes = np.stack([free.expanded(vectors[:, k]) for k in order])
     flat = shapes.reshape(count, -1)
     largest = np.take_along_axis(flat, np.abs(flat).argmax(axis=1)[:, None], axis=1)
     shapes /= largest[:, :, None]
@@ -98,8 +98,8 @@ def frequencies(simulation: BuiltScene, count: int, state: State | None = None) 
 
 def _unstable() -> SolidsphError:
     return SolidsphError(
-        "the state is unstable: the tangent is not positive, so a deviation grows and has no "
-        "frequency; studies.spectrum gives its rate"
+        "the state is unstable: the tangent is not positive definite, so a deviation grows and "
+        "has no frequency; studies.spectrum gives its growth rate"
     )
 
 

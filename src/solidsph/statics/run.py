@@ -1,4 +1,4 @@
-"""The static run: an equilibrium, heard and recorded as a motion is."""
+"""Static run: an equilibrium, observed and recorded like a motion."""
 
 from __future__ import annotations
 
@@ -22,32 +22,32 @@ def run_statics(
     listeners: Sequence[object],
     since: RestartPoint | None = None,
 ) -> Result:
-    """Find the equilibrium; the unloaded body and every load step are outputs.
+    """Find the equilibrium, with outputs of the unloaded state and of every load step.
 
-    The time of an output is its load factor times the duration, its step the number of load
-    steps. Work is the trapezoidal rule over load steps: the energy residual is that of a path
-    followed in so few. An earlier run is taken up from its beginning: what it recorded stays.
+    The time of an output is its load factor times the duration. Work is integrated by the
+    trapezoidal rule over the load steps, so the energy residual depends on their number. A
+    resumed run is repeated from the beginning; its record stays.
 
     Raises:
-        ConvergenceError: none was found; the load steps up to there stay readable.
+        ConvergenceError: no equilibrium was found; earlier load steps stay readable.
     """
-    begun = clock.perf_counter()
+    start = clock.perf_counter()
 
     def observe(state: State) -> None:
         observation = simulation.dynamics.observe(state)
         simulation.manager.hook.solidsph_step_end(simulation=simulation, observation=observation)
 
     with session(simulation, listeners):
-        found = equilibrium(simulation, **attrs.asdict(wanted), observer=observe)
+        result = equilibrium(simulation, **attrs.asdict(wanted), observer=observe)
     return Result(
-        state=found.state,
+        state=result.state,
         record=None,
-        seconds=clock.perf_counter() - begun,
+        seconds=clock.perf_counter() - start,
         effort={
-            "load steps": len(found.steps),
-            "iterations": found.iterations,
-            "residual [-]": found.residual,
-            "stable": found.stable,
+            "load steps": len(result.steps),
+            "iterations": result.iterations,
+            "residual [-]": result.residual,
+            "stable": result.stable,
         },
         notes=() if since is None else since.notes,
     )

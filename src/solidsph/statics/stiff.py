@@ -1,4 +1,4 @@
-"""Stiff: what a load may tell of itself so that Newton's method can follow it."""
+"""Stiff: protocol of loads that depend on the displacement."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from solidsph.maths.arrays import Array
 
 @runtime_checkable
 class Stiff(Protocol):
-    """A Load whose force depends on the displacement.
+    """A Load with a known stiffness.
 
-    A load that does not implement it is taken as constant in displacement: the equilibrium found
-    is still the right one, but more slowly, or not at all if that load matters to stability.
+    Other loads are taken as independent of the displacement. Newton's method then converges to
+    the same equilibrium more slowly, or not at all if the load affects stability.
     """
 
     def stiffness(self, displacements: Array, time: float) -> csr_array | None:
@@ -22,9 +22,8 @@ class Stiff(Protocol):
 
         Args:
             displacements: u = x - X of all particles, (n, d) [m].
-            time: of the load [s].
+            time: time of the load [s].
 
-        Of a force without an energy the symmetric part is enough: Newton's method converges by it.
-
-        Rows and columns stand particle by particle: component i of particle p at p d + i.
+        Component i of particle p has the index p d + i. The symmetric part suffices for the
+        convergence of Newton's method if the force has no energy.
         """

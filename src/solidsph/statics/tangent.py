@@ -1,4 +1,4 @@
-"""The tangent stiffness: minus the derivative of the forces by the displacements, sparse."""
+"""Sparse tangent stiffness: minus the derivative of the forces by the displacements."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from solidsph.statics.stiff import Stiff
 
 @attrs.frozen(eq=False)
 class _BodyTangent:
-    """K of one body, from its constant operators."""
+    """Tangent of one body, from its constant operators."""
 
     body: Body
     constant: Operators
-    stresses: csr_array | None  # (d d n, d d n) of all particles from those of real ones
+    stresses: csr_array | None  # (d d n, d d n) extends stresses of real particles to ghosts
 
     def matrix(self, displacements: Array, ahead: Array) -> csr_array:
         """(d n, d n) [N/m] at displacements (n, d) of the body."""
@@ -36,7 +36,7 @@ class _BodyTangent:
         A += np.einsum("ij,pkl->pikjl", np.eye(d), ahead)
         blocks = [self.constant.gradient[k * n : (k + 1) * n] for k in range(d)]
         g = np.stack([block.data for block in blocks], axis=1)
-        # Change of stress T_ik at p for a displacement of q along j, block by block (p, q).
+        # Change of stress T_ik at p per displacement of q along j, in blocks (p, q).
         starts, columns = blocks[0].indptr, blocks[0].indices
         changes = np.einsum("mikjl,ml->mikj", np.repeat(A, np.diff(starts), axis=0), g)
         of_displacement = bsr_array(
@@ -45,22 +45,24 @@ class _BodyTangent:
         return csr_array(-(self._force(n, d) @ self._extended(of_displacement)))
 
     def forces(self, stresses: Array) -> Array:
-        """Forces (n, d) that stresses (n, d, d) at the real particles exert."""
+        """Forces (n, d) of stresses (n, d, d) at real particles."""
         n, d = stresses.shape[:2]
-        own = np.where(self.body.particles.ghosts[:, None, None], 0.0, stresses)
-        forces: Array = (self._force(n, d) @ self._extended(own.ravel())).reshape(n, d)
+        real = np.where(self.body.particles.ghosts[:, None, None], 0.0, stresses)
+        forces: Array = (self._force(n, d) @ self._extended(real.ravel())).reshape(n, d)
         return forces
 
     def ahead(self, displacements: Array, change: Array, placed: Array) -> Array:
-        """As in `Tangent.ahead`, for the body's own particles."""
+        """`Tangent.ahead` for the particles of the body."""
         n, d = displacements.shape
         ghosts = self.body.particles.ghosts
-        if not self.body.material.objective:  # its forces are linear: nothing turns with it
+        if not self.body.material.objective:  # linear forces have no geometric stiffness
             return np.zeros((n, d, d))
-        material, one = self.body.material, np.eye(d)
-        before = np.where(ghosts[:, None, None], one, self.deformation_gradients(displacements))
-        after = np.where(ghosts[:, None, None], one, self.deformation_gradients(placed))
-        dF = self.deformation_gradients(change) - one
+        material, identity = self.body.material, np.eye(d)
+        before = np.where(
+            ghosts[:, None, None], identity, self.deformation_gradients(displacements)
+        )
+        after = np.where(ghosts[:, None, None], identity, self.deformation_gradients(placed))
+        dF = self.deformation_gradients(change) - identity
         dP = particles_first(
             material.tangent(components_first(before), components_first(dF), material.params), n
         )
@@ -71,18 +73,18 @@ class _BodyTangent:
         return lead
 
     def deformation_gradients(self, displacements: Array) -> Array:
-        """F, (n, d, d)."""
+        """Deformation gradients F, (n, d, d)."""
         n, d = displacements.shape
         along = (self.constant.gradient @ displacements).reshape(d, n, d)
         F: Array = np.eye(d) + along.transpose(1, 2, 0)
         return F
 
     def _extended(self, stresses: Any) -> Any:
-        """Stresses of real particles, or their derivative, with those of ghosts that follow."""
+        """Stresses of real particles, or their derivative, extended to ghosts."""
         return stresses if self.stresses is None else self.stresses @ stresses
 
     def _force(self, n: int, d: int) -> bsr_array:
-        """Force along i at p from stress components (j, k) at q, (d n, d d n)."""
+        """Matrix (d n, d d n) from stress components (j, k) at q to forces along i at p."""
         blocks = [self.constant.force[:, k * n : (k + 1) * n] for k in range(d)]
         f = np.stack([block.data for block in blocks], axis=1)
         if self.body.formulation.divergence.uses_ghost_stress:  # nothing acts on ghosts then
@@ -93,7 +95,7 @@ class _BodyTangent:
 
 @attrs.frozen(eq=False)
 class Tangent:
-    """K of a scene; what does not change with the displacements is kept."""
+    """Tangent of a scene; stores the operators that do not depend on the displacements."""
 
     bodies: Sequence[_BodyTangent]
     loads: Sequence[Load]
@@ -103,7 +105,7 @@ class Tangent:
         """Prepare the tangent of a scene.
 
         Raises:
-            SolidsphError: a formulation is not of the reference configuration, or its own.
+            SolidsphError: a formulation is not the total Lagrangian form.
         """
         bodies = simulation.model.bodies
         for body in bodies:
@@ -126,9 +128,8 @@ class Tangent:
     ) -> csr_array:
         """K, (d n, d n) [N/m], at displacements u = x - X (n, d) of all particles.
 
-        Forces on ghosts and their displacements are among its rows and columns. `ahead` (n, d, d)
-        is added to the second Piola-Kirchhoff stress that turns with the body. Loads are those of
-        `time` [s].
+        Rows and columns include ghosts. `ahead` (n, d, d) is added to the second Piola-Kirchhoff
+        stress of the geometric stiffness. Loads are those of `time` [s].
         """
         if ahead is None:
             ahead = np.zeros((*displacements.shape, displacements.shape[1]))
@@ -139,15 +140,15 @@ class Tangent:
         total = parts[0] if len(parts) == 1 else csr_array(block_diag(parts, format="csr"))
         for load in self.loads:
             if isinstance(load, Stiff):
-                own = load.stiffness(displacements, time)
-                total = total if own is None else csr_array(total + own)
+                stiffness = load.stiffness(displacements, time)
+                total = total if stiffness is None else csr_array(total + stiffness)
         return total
 
     def ahead(self, displacements: Array, change: Array, placed: Array) -> Array:
-        """How far the second Piola-Kirchhoff stress predicted by a step is ahead of the real one.
+        """Second Piola-Kirchhoff stress predicted by a step minus the actual one, (n, d, d) [Pa].
 
-        Predicted is S + dS, linear in `change` (n, d) from `displacements` (n, d); real is S at
-        `placed` (n, d). The difference, (n, d, d) [Pa], is of second order in the change.
+        Predicted is S + dS, linear in `change` (n, d) from `displacements` (n, d); actual is S at
+        `placed` (n, d). The difference is of second order in the change.
         """
         return np.concatenate(
             [
@@ -172,12 +173,11 @@ class Tangent:
 def tangent(simulation: BuiltScene, displacements: Array) -> csr_array:
     """K = -df/du, (d n, d n) [N/m], at displacements u = x - X (n, d) [m] of all particles.
 
-    Rows and columns stand particle by particle, component i of particle p at p d + i, ghosts
-    included as they come from the engine: neither their forces nor their motion handed on. It is
-    symmetric where the divergence is the gradient's adjoint.
+    Component i of particle p has the index p d + i. Ghosts are included without their constraints.
+    K is symmetric if the divergence is the adjoint of the gradient.
 
     Raises:
-        SolidsphError: a formulation is not of the reference configuration.
+        SolidsphError: a formulation is not the total Lagrangian form.
     """
     return Tangent.of(simulation).matrix(displacements)
 
@@ -188,7 +188,7 @@ def is_symmetric(simulation: BuiltScene) -> bool:
 
 
 def _moduli(body: Body, F: Array) -> Array:
-    """dT_ik / dF_jl at every particle, (n, d, d, d, d) [Pa]; zero for ghosts, which have none."""
+    """Moduli dT_ik / dF_jl of all particles, (n, d, d, d, d) [Pa]; zero for ghosts."""
     n, d = F.shape[:2]
     moduli = np.empty((n, d, d, d, d))
     ghosts = body.particles.ghosts
@@ -204,7 +204,7 @@ def _moduli(body: Body, F: Array) -> Array:
 
 
 def _second_piola(body: Body, F: Array) -> Array:
-    """S = F^-1 P, (n, d, d) [Pa]."""
+    """Second Piola-Kirchhoff stress S = F^-1 P, (n, d, d) [Pa]."""
     P = body.material.first_piola(components_first(F), body.material.params)
     S = np.linalg.solve(F, particles_first(P, len(F)))
     return np.asarray(S, dtype=np.float64)
@@ -215,32 +215,32 @@ def _check_form(formulation: Formulation, d: int) -> None:
     name = type(formulation).__name__
     if formulation.configuration is not Configuration.REFERENCE:
         raise SolidsphError(
-            f"statics: formulation {name} takes its sums in the current configuration, where the "
-            "operators change with every displacement; take 'total-lagrangian'"
+            f"statics: formulation {name} uses sums in the current configuration, whose operators "
+            "depend on the displacements; use 'total-lagrangian'"
         )
     random = np.random.default_rng(0)
     H, P = random.uniform(-0.1, 0.1, (2, d, d))
     F = np.eye(d) + H
-    own = np.array([formulation.deformation_gradient(H), formulation.flux(F, P)])
-    if not np.allclose(own, [F, P], rtol=1e-14, atol=1e-14):
+    values = np.array([formulation.deformation_gradient(H), formulation.flux(F, P)])
+    if not np.allclose(values, [F, P], rtol=1e-14, atol=1e-14):
         raise SolidsphError(
             f"statics: formulation {name} has a deformation gradient other than I + du/dX, or a "
-            "flux other than P, whose derivative is unknown; take 'total-lagrangian'"
+            "flux other than P, whose derivative is unknown; use 'total-lagrangian'"
         )
 
 
 def _stress_extension(
     body: Body, simulation: BuiltScene, conditions: Sequence[StressTerm]
 ) -> csr_array | None:
-    """How the stress of ghosts follows that of the body's real particles; None if it is unused."""
+    """Matrix that extends stresses of real particles to ghosts; None if it is not needed."""
     if not (conditions and body.formulation.divergence.uses_ghost_stress):
         return None
     d = simulation.particles.dimension
     total = simulation.particles.count
-    own = ~body.particles.ghosts
-    # Components of one particle stand together, as in the rows of the change of stress.
+    real = ~body.particles.ghosts
+    # Components of one particle are adjacent, as in the rows of the change of stress.
     inside = np.zeros((total, d, d), dtype=np.bool_)
-    inside[body.extent][own] = True
+    inside[body.extent][real] = True
 
     def imposed(values: Array) -> Array:
         stress = np.zeros((d, d, total))

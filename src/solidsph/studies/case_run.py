@@ -11,7 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from solidsph.costs.counted import counted
+from solidsph.costs.count import count_work
 from solidsph.costs.process import peak_memory
 from solidsph.errors import ConvergenceError, DivergedError, UnsoundError
 from solidsph.results.record import Record
@@ -114,7 +114,7 @@ def run_scenes(
                 raise
             outcome = _outcome(cause)
         seconds = clock.perf_counter() - begun
-        work = counted(simulation)
+        work = count_work(simulation)
         with Record(path) as record:
             steps = int(record.steps[-1])
         runs.append(

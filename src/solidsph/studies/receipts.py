@@ -19,7 +19,7 @@ from typing import TypeAlias
 import attrs
 import numpy as np
 
-from solidsph.costs.shares import without
+from solidsph.costs.effect_shares import without
 from solidsph.errors import BuildError, ConvergenceError, DivergedError, SceneError, UnsoundError
 from solidsph.interfaces.shape import Shape
 from solidsph.interfaces.time_loop import StepError, TimeLoop

@@ -17,7 +17,7 @@ from solidsph.interfaces.material import Material
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 from solidsph.registry.construct import construct
-from solidsph.scene.default_cover import cover_of, own_cover
+from solidsph.scene.default_cover import cover_of, kernel_cover
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import DEFAULT_INTEGRATOR, PartLike
 from solidsph.simulation import Simulation
@@ -82,7 +82,7 @@ class Scheme:
 
     @cover.default
     def _own_cover(self) -> float:
-        return own_cover(self.kernel)
+        return kernel_cover(self.kernel)
 
     @classmethod
     def of(cls, scene: Scene) -> Scheme:

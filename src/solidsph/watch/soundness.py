@@ -87,7 +87,7 @@ class Soundness:
         self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
     ) -> None:
         if _KEPT in kept:
-            self._accounts = Accounts.taken(np.atleast_1d(kept[_KEPT])[:-1])
+            self._accounts = Accounts.from_array(np.atleast_1d(kept[_KEPT])[:-1])
             self._first_swing = float(kept[_KEPT][-1])
             self._rises = kept.get(_RISES, np.empty(0))
             if self._rises.ndim != 2 or self._rises.shape[1] != 3:
@@ -101,7 +101,7 @@ class Soundness:
 
     @implementation
     def solidsph_keep(self, kept: dict[str, Array]) -> None:
-        kept[_KEPT] = np.append(self._accounts.kept(), self._first_swing)
+        kept[_KEPT] = np.append(self._accounts.to_array(), self._first_swing)
         kept[_RISES] = self._rises
 
     def judge(self, simulation: BuiltScene) -> None:

@@ -76,7 +76,7 @@ class Watchdog:
     @implementation(tryfirst=True)  # an unusable checkpoint is reported before the record changes
     def solidsph_resume(self, observation: Observation, kept: Mapping[str, Array]) -> None:
         if _ACCOUNTS in kept:
-            self._accounts = Accounts.taken(kept[_ACCOUNTS])
+            self._accounts = Accounts.from_array(kept[_ACCOUNTS])
         else:  # the earlier run had no watchdog
             self._accounts.add(observation)
         self.last_sound, self._is_clean = SoundOutput(observation.state, kept), True
@@ -113,7 +113,7 @@ class Watchdog:
 
     @implementation
     def solidsph_keep(self, kept: dict[str, Array]) -> None:
-        kept[_ACCOUNTS] = self._accounts.kept()
+        kept[_ACCOUNTS] = self._accounts.to_array()
 
     @implementation
     def solidsph_failure(self, simulation: BuiltScene, state: State, error: DivergedError) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solidsph.costs.counted import counted
+from solidsph.costs.count import count_work
 from solidsph.engines.compiled.loop import CompiledLoop
 from solidsph.interfaces.plan import Way
 from solidsph.run.step_by_step import StepByStep
@@ -38,7 +38,7 @@ def test_whole_steps_are_compiled_with_it(springs: None) -> None:
 
 def test_its_pairs_are_counted(springs: None) -> None:
     simulation = moving().engine("compiled").build()
-    own = counted(simulation).operations[-1]
+    own = count_work(simulation).operations[-1]
     assert own.way is Way.PAIR_LOOPS
     assert own.pairs == simulation.dynamics.internal.pair_count - simulation.particles.count
 

@@ -208,7 +208,7 @@ def test_histories_survive_a_restart_bit_for_bit(
 
 
 def test_statics_of_what_remembers_is_refused() -> None:
-    with pytest.raises(BuildError, match="remembers what has been"):
+    with pytest.raises(BuildError, match="depends on the history"):
         Simulation.builder(
             attrs.evolve(block(2, VISCOELASTIC).scene(), initial=())
         ).statics().build()

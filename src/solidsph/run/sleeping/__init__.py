@@ -1,4 +1,4 @@
-"""Regions that nothing has reached yet, or that have come to rest, cost nothing."""
+"""Sleeping regions: those that no wave has reached, or that have come to rest, are not stepped."""
 
 from solidsph.run.sleeping.loop import SleepingLoop, sleeping_loop
 

@@ -1,4 +1,4 @@
-"""Frozen: particles that sleep stay where they are."""
+"""Frozen: constraint that holds sleeping particles in place."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array, Indices
 
 ASLEEP = "asleep"
-"""Account of what holds particles that sleep; it does no work, and no report shows it."""
+"""Account of the constraint on sleeping particles, without work and without a report."""
 
 
 @final
 @attrs.frozen(eq=False)
 class Frozen(ScheduledConstraint):
-    """Particles that stay where they are."""
+    """Particles held in place."""
 
     shape: tuple[int, ...]
     entries: tuple[Indices, Indices]
@@ -27,7 +27,7 @@ class Frozen(ScheduledConstraint):
 
     @classmethod
     def of(cls, particles: Indices, displacements: Array) -> Frozen:
-        """These particles, of all whose displacements are given (k, d)."""
+        """Hold `particles` at their rows of `displacements` (k, d)."""
         d = displacements.shape[1]
         entries = np.repeat(particles, d), np.tile(np.arange(d), len(particles))
         return cls(displacements.shape, entries, displacements[entries][None, :])

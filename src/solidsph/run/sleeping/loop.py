@@ -1,4 +1,4 @@
-"""SleepingLoop: steps of those particles alone that move, or will move before the next look."""
+"""SleepingLoop: time loop that steps only regions that move or will soon move."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseI
 from solidsph.interfaces.subset import Subset
 from solidsph.interfaces.terms import Load
 from solidsph.interfaces.time_loop import StepError, TimeLoop
-from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.maths.arrays import Indices, Mask
 from solidsph.model.particles import State
 from solidsph.run.dynamics import Dynamics
 from solidsph.run.sleeping.frozen import ASLEEP, Frozen
@@ -26,51 +26,48 @@ from solidsph.run.step_by_step import steps_of
 if TYPE_CHECKING:
     from solidsph.run.built_scene import BuiltScene
 
-# Part of a slab that the fastest wave may cross before it is looked again who is awake.
+# Fraction of a slab that the fastest wave may cross between two searches for moving slabs.
 _CROSSED = 0.5
 
-# Ahead of a front the discrete motion falls off by some powers of ten in a few spacings: so many
-# more are awake. With 8 a front that a wall pushes without warning is right to 1e-12.
+# Spacings kept awake ahead of a front, where the discrete motion decays by several powers of ten.
+# With 8, the front of a sudden push by a wall is accurate to 1e-12.
 _PRECURSOR = 12.0
 
-# Of a position, in parts of it, times a few for the sums that it goes into.
+# Relative rounding error of a position, with a factor for the sums that it enters.
 _ROUNDING = 4.0 * np.finfo(np.float64).eps
 
 _LARGEST = "sleep: largest speed"
-"""Where the largest speed so far is in `State.memory`, (1,) [m/s]."""
+"""Key of the largest speed so far in `State.memory`, (1,) [m/s]."""
 
 
 def check_sleep(simulation: BuiltScene) -> None:
     """Raise SceneError if a part of the scene cannot sleep."""
     dynamics = simulation.dynamics
     dynamics.internal.check_parts()
-    none = np.empty(0, dtype=np.intp)
-    nobody, free = (
-        Subset.of(none, dynamics.particles.count),
-        np.zeros(dynamics.particles.count, bool),
-    )
-    parts = [(one, one.part(nobody, free)) for one in dynamics.constraints]
-    for term, part in (*parts, *((one, one.part(nobody)) for one in dynamics.loads)):
+    count = dynamics.particles.count
+    empty, awake = Subset.of(np.empty(0, dtype=np.intp), count), np.zeros(count, bool)
+    constraints = [(term, term.part(empty, awake)) for term in dynamics.constraints]
+    for term, part in (*constraints, *((load, load.part(empty)) for load in dynamics.loads)):
         if part is None:
             raise SceneError(
-                f"sleep: {term.label!r} does not say what it depends on particle by particle, so "
-                "that it cannot act on those alone that are awake; leave out it, or [sleep]"
+                f"sleep: {term.label!r} cannot be restricted to awake particles; leave it out, or "
+                "leave out [sleep]"
             )
     if not isinstance(simulation.integrator, PointwiseIntegrator):
         raise SceneError(
-            f"sleep: integrator {type(simulation.integrator).__name__} may need more of a particle "
-            "than its velocity and acceleration; use 'velocity-verlet', or leave [sleep] out"
+            f"sleep: integrator {type(simulation.integrator).__name__} may depend on more than the "
+            "velocity and acceleration of a particle; use 'velocity-verlet', or leave out [sleep]"
         )
 
 
 def sleeping_loop(simulation: BuiltScene) -> SleepingLoop:
-    """The loop of a scene with [sleep]."""
+    """Loop of a scene with [sleep]."""
     wanted = simulation.scene.sleep
     assert wanted is not None
     check_sleep(simulation)
     (body,) = simulation.model.bodies
     slabs = Slabs.across(simulation.particles, wanted.slabs)
-    supports = max((one.supports for one in simulation.dynamics.loads), default=Load.supports)
+    supports = max((load.supports for load in simulation.dynamics.loads), default=Load.supports)
     fastest = body.material.wave_speed * simulation.step_size
     steps = max(1, int(_CROSSED * slabs.width / fastest))
     spacing = float(body.particles.spacings.max())
@@ -89,23 +86,28 @@ def sleeping_loop(simulation: BuiltScene) -> SleepingLoop:
 
 @attrs.frozen(eq=False)
 class _Window:
-    """What is awake, made ready to be stepped."""
+    """Awake slabs with the dynamics and the loop that step them."""
 
     awake: Mask  # slabs
-    chosen: Subset  # particles that are awake, or near those
-    moving: Indices  # those of the chosen that are awake
+    chosen: Subset  # awake particles and those near them
+    moving: Indices  # awake particles among the chosen
     dynamics: Dynamics
     loop: TimeLoop
+
+    @property
+    def awake_particles(self) -> Indices:
+        """Awake particles among all."""
+        return self.chosen.particles[self.moving]
 
 
 @final
 @attrs.define(eq=False)
 class SleepingLoop(TimeLoop):
-    """Steps of some slabs of the body; all others stay where they are.
+    """Time loop that steps the awake slabs of the body and holds all others in place.
 
-    A slab sleeps while its particles are slower than a part `tolerance` of the largest speed so
-    far, would not exceed that by their accelerations before the next look, and nothing imposed on
-    them changes. It wakes before a wave, and what runs ahead of it, can have reached it.
+    A slab sleeps while its particles are slower than `tolerance` times the largest speed so far,
+    their accelerations would not take them beyond that before the next search, and no imposed
+    motion or load on them changes. It is woken before a wave or its precursor can reach it.
     """
 
     body: Body
@@ -114,67 +116,67 @@ class SleepingLoop(TimeLoop):
     slabs: Slabs
     tolerance: float
     steps_at_once: int
-    reach: float  # from what moves to what is still awake [m]
+    reach: float  # distance from moving particles up to which slabs are awake [m]
     highest: float  # angular frequency of the shortest waves [rad/s]
-    halo: float  # [m]
-    awake_steps: int = 0  # of particles, in all
+    halo: float  # distance up to which sleeping neighbours are included [m]
+    awake_steps: int = 0  # particle steps carried out
     all_steps: int = 0
-    _window: _Window | None = None  # the last one: what is awake often stays awake
+    _window: _Window | None = None  # the last one, reused while the same slabs are awake
 
     @property
     def effort(self) -> Mapping[str, Any]:
         return {"awake [-]": self.awake_steps / max(1, self.all_steps)}
 
     def advance(self, state: State, stop: int) -> State:
-        full = _Arrays.of(state)
+        full = _writable(state)
         while full.step < stop:
             count = min(self.steps_at_once, stop - full.step)
             awake = self._awake(full, count)
             window = self._prepared(awake, full)
             self.awake_steps += count * len(window.moving)
             self.all_steps += count * self.dynamics.particles.count
-            full.settle(window.moving, window.chosen)
+            _rest(full, window)
+            part = _part(full, window.chosen.particles)
             try:
-                after = window.loop.advance(full.part(window.chosen), full.step + count)
+                part = window.loop.advance(part, full.step + count)
             except StepError as failed:
-                full.take(window.chosen, window.moving, failed.state)
-                raise StepError(full.state(), failed.cause) from failed
-            full.take(window.chosen, window.moving, after)
-        return full.state()
+                raise StepError(_merge(full, window, failed.state), failed.cause) from failed
+            full = _merge(full, window, part)
+        return full
 
-    def _awake(self, full: _Arrays, count: int) -> Mask:
-        """Slabs that are to be stepped."""
-        speeds = self.slabs.largest(np.einsum("ni,ni->n", full.v, full.v))
-        gains = self.slabs.largest(np.einsum("ni,ni->n", full.a, full.a))
-        full.largest = max(full.largest, float(speeds.max()))
-        limit = self.tolerance * full.largest
-        # A displacement is the difference of two positions: what its rounding makes of the forces
-        # is no motion to come.
-        rounding = _ROUNDING * self.highest**2 * float(np.abs(full.x).max())
+    def _awake(self, full: State, count: int) -> Mask:
+        """Slabs to be stepped."""
+        speeds = self.slabs.largest(np.einsum("ni,ni->n", full.velocities, full.velocities))
+        gains = self.slabs.largest(np.einsum("ni,ni->n", full.accelerations, full.accelerations))
+        largest = full.memory[_LARGEST]
+        largest[0] = max(largest[0], speeds.max())
+        limit = self.tolerance * float(largest[0])
+        # Rounding of positions gives forces, but no motion.
+        rounding = _ROUNDING * self.highest**2 * float(np.abs(full.positions).max())
         moving = (speeds > limit) | (gains > limit / (count * self.dynamics.step_size) + rounding)
         moving |= self._driven(full.time, count)
         return self.slabs.widened(moving, self.reach)
 
     def _driven(self, time: float, count: int) -> Mask:
-        """Slabs on which something that is imposed changes in the next steps."""
-        found = np.zeros(self.slabs.count, dtype=np.bool_)
+        """Slabs on which an imposed motion or load changes in the next `count` steps."""
+        slabs = np.zeros(self.slabs.count, dtype=np.bool_)
         times = time + self.dynamics.step_size * np.arange(count + 1, dtype=np.float64)
         for motion in self.dynamics.constraints:
             assert isinstance(motion, ScheduledConstraint)
             values = motion.schedule(times, 0)
-            found |= self.slabs.marked(motion.entries[0][np.ptp(values, axis=0) > 0.0])
+            slabs |= self.slabs.marked(motion.entries[0][np.ptp(values, axis=0) > 0.0])
         for load in self.dynamics.loads:
             if isinstance(load, ScheduledLoad):
                 changes = np.ptp(load.schedule(times), axis=0).max(axis=1) > 0.0
-                found |= self.slabs.marked(load.particles[changes])
-        return found
+                slabs |= self.slabs.marked(load.particles[changes])
+        return slabs
 
-    def _prepared(self, awake: Mask, full: _Arrays) -> _Window:
+    def _prepared(self, awake: Mask, full: State) -> _Window:
         if self._window is None or not np.array_equal(awake, self._window.awake):
-            self._window = self._made(awake, full)
+            self._window = self._new_window(awake, full)
         return self._window
 
-    def _made(self, awake: Mask, full: _Arrays) -> _Window:
+    def _new_window(self, awake: Mask, full: State) -> _Window:
         whole, slabs = self.dynamics, self.slabs
         near = slabs.widened(awake, self.halo)
         chosen = Subset.of(np.flatnonzero(near[slabs.of]), whole.particles.count)
@@ -182,101 +184,69 @@ class SleepingLoop(TimeLoop):
         moving = np.flatnonzero(~asleep[chosen.particles])
         internal = whole.internal.part(chosen.particles)
         still = np.flatnonzero(asleep[chosen.particles])
-        u = full.x[chosen.particles] - whole.particles.positions[chosen.particles]
-        constraints = [one.part(chosen, asleep) for one in whole.constraints]
-        loads = [one.part(chosen) for one in whole.loads]
+        u = full.positions[chosen.particles] - whole.particles.positions[chosen.particles]
+        constraints = [term.part(chosen, asleep) for term in whole.constraints]
+        loads = [load.part(chosen) for load in whole.loads]
         dynamics = Dynamics(
             particles=part_of(self.body, chosen.particles).particles,
             masses=whole.masses[chosen.particles],
             internal=internal,
-            constraints=[Frozen.of(still, u), *(one for one in constraints if one is not None)],
-            loads=[one for one in loads if one is not None],
+            constraints=[Frozen.of(still, u), *(term for term in constraints if term is not None)],
+            loads=[load for load in loads if load is not None],
             step_size=whole.step_size,
         )
         loop = steps_of(dynamics, self.integrator)
         return _Window(awake, chosen, moving, dynamics, loop)
 
 
-@attrs.define(eq=False)
-class _Arrays:
-    """A state whose arrays may be written on."""
+def _writable(state: State) -> State:
+    """Copy of a state whose arrays may be changed in place."""
+    memory = {
+        **state.memory,
+        MEAN_VELOCITY: state.memory[MEAN_VELOCITY].copy(),
+        _LARGEST: state.memory.get(_LARGEST, np.zeros(1)).copy(),
+    }
+    return attrs.evolve(
+        state,
+        positions=state.positions.copy(),
+        velocities=state.velocities.copy(),
+        accelerations=state.accelerations.copy(),
+        memory=memory,
+        applied={name: force.copy() for name, force in state.applied.items()},
+    )
 
-    time: float
-    step: int
-    x: Array
-    v: Array
-    a: Array
-    h: Array
-    largest: float
-    memory: Mapping[str, Array]
-    applied: dict[str, Array]
-    work: Mapping[str, float]
 
-    @classmethod
-    def of(cls, state: State) -> _Arrays:
-        return cls(
-            time=state.time,
-            step=state.step,
-            x=state.positions.copy(),
-            v=state.velocities.copy(),
-            a=state.accelerations.copy(),
-            h=state.memory[MEAN_VELOCITY].copy(),
-            largest=float(state.memory.get(_LARGEST, np.zeros(1))[0]),
-            memory=state.memory,
-            applied={name: force.copy() for name, force in state.applied.items()},
-            work=state.work,
-        )
+def _rest(full: State, window: _Window) -> None:
+    """Set sleeping particles of `full` at rest."""
+    asleep = np.ones(len(full.positions), dtype=np.bool_)
+    asleep[window.awake_particles] = False
+    for values in (full.velocities, full.accelerations, full.memory[MEAN_VELOCITY]):
+        values[asleep] = 0.0
 
-    def settle(self, moving: Indices, chosen: Subset) -> None:
-        """Let all that sleeps be at rest."""
-        asleep = np.ones(len(self.x), dtype=np.bool_)
-        asleep[chosen.particles[moving]] = False
-        for one in (self.v, self.a, self.h):
-            one[asleep] = 0.0
 
-    def part(self, chosen: Subset) -> State:
-        """The state of the chosen."""
-        own = chosen.particles
-        applied = {name: force[own] for name, force in self.applied.items()}
-        return State(
-            time=self.time,
-            step=self.step,
-            positions=self.x[own],
-            velocities=self.v[own],
-            accelerations=self.a[own],
-            memory={MEAN_VELOCITY: self.h[own]},
-            applied={**applied, ASLEEP: np.zeros((len(own), self.x.shape[1]))},
-            work={**self.work, ASLEEP: 0.0},
-        )
+def _part(full: State, chosen: Indices) -> State:
+    """State of the chosen particles."""
+    applied = {name: force[chosen] for name, force in full.applied.items()}
+    return attrs.evolve(
+        full,
+        positions=full.positions[chosen],
+        velocities=full.velocities[chosen],
+        accelerations=full.accelerations[chosen],
+        memory={MEAN_VELOCITY: full.memory[MEAN_VELOCITY][chosen]},
+        applied={**applied, ASLEEP: np.zeros((len(chosen), full.positions.shape[1]))},
+        work={**full.work, ASLEEP: 0.0},
+    )
 
-    def take(self, chosen: Subset, moving: Indices, after: State) -> None:
-        """Take back what those that are awake have done."""
-        own = chosen.particles[moving]
-        self.time, self.step = after.time, after.step
-        for mine, theirs in (
-            (self.x, after.positions),
-            (self.v, after.velocities),
-            (self.a, after.accelerations),
-            (self.h, after.memory[MEAN_VELOCITY]),
-            *((self.applied[name], after.applied[name]) for name in self.applied),
-        ):
-            mine[own] = theirs[moving]
-        self.work = {name: value for name, value in after.work.items() if name != ASLEEP}
 
-    def state(self) -> State:
-        """All of it."""
-        memory = {
-            **self.memory,
-            MEAN_VELOCITY: self.h,
-            _LARGEST: np.array([self.largest]),
-        }
-        return State(
-            time=self.time,
-            step=self.step,
-            positions=self.x,
-            velocities=self.v,
-            accelerations=self.a,
-            memory=memory,
-            applied=self.applied,
-            work=self.work,
-        )
+def _merge(full: State, window: _Window, part: State) -> State:
+    """`full` after the awake particles moved to their state in `part`."""
+    for values, changed in (
+        (full.positions, part.positions),
+        (full.velocities, part.velocities),
+        (full.accelerations, part.accelerations),
+        (full.memory[MEAN_VELOCITY], part.memory[MEAN_VELOCITY]),
+        *((full.applied[name], part.applied[name]) for name in full.applied),
+    ):
+        values[window.awake_particles] = changed[window.moving]
+    work = {name: value for name, value in part.work.items() if name != ASLEEP}
+    return attrs.evolve(full, time=part.time, step=part.step, work=work)

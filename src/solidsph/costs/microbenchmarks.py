@@ -1,4 +1,4 @@
-"""The yardsticks of a calibration; run as a program, it prints one (`python -m`)."""
+"""Microbenchmarks of a calibration; as a program (`python -m`), print one."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import time as clock
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-# What a run imports, and nothing but it before the memory is looked at.
+# Only what every run imports, so that `bare` is its memory.
 from solidsph.costs.calibration import Calibration, best
 from solidsph.costs.process import peak_memory
 
-_SIZE = 1 << 22  # bytes copied at once: beyond what a core has to itself
+_SIZE = 1 << 22  # bytes copied at once, beyond the private caches of a core
 
 
 def _sparse() -> float:
     import numpy as np
     from scipy.sparse import csr_array
 
-    # A band such as neighbours make, small enough for the cache of a core.
+    # A band like that of neighbours, small enough for the cache of a core.
     n, width = 1000, 30
     columns = (np.arange(n)[:, None] + np.arange(width)[None, :]) % n
     starts = np.arange(n + 1) * width
@@ -34,17 +34,17 @@ def _calls() -> float:
 
     small = np.ones(8)
 
-    def some() -> None:
+    def calls() -> None:
         for _ in range(200):
             np.negative(small, out=small)
 
-    return best(some, 20) / 200
+    return best(calls, 20) / 200
 
 
 def _copying(threads: int) -> float:
     import numpy as np
 
-    # Rounds through an array four times as large as is copied at once.
+    # Cycle through an array four times as large as one copy.
     source, target = np.ones((4 * threads, _SIZE // 8)), np.empty((4 * threads, _SIZE // 8))
 
     def share(first: int) -> None:
@@ -54,19 +54,19 @@ def _copying(threads: int) -> float:
     if threads == 1:
         return best(lambda: share(0), 4) / (4 * _SIZE)
     with ThreadPoolExecutor(threads) as pool:
-        together = best(lambda: list(pool.map(share, range(threads))), 4, clock.perf_counter)
-        return together / (4 * threads * _SIZE)
+        seconds = best(lambda: list(pool.map(share, range(threads))), 4, clock.perf_counter)
+        return seconds / (4 * threads * _SIZE)
 
 
 def _filing() -> tuple[float, float]:
-    """Of a byte, and of a small step of eight datasets."""
+    """Time per byte, and per small step of eight datasets [s]."""
     import h5py
     import numpy as np
 
     rows = np.ones((1 << 17, 3))
     with (
         tempfile.TemporaryDirectory() as folder,
-        h5py.File(Path(folder) / "yardstick.h5", "w", libver="latest") as file,
+        h5py.File(Path(folder) / "benchmark.h5", "w", libver="latest") as file,
     ):
         data = [
             file.create_dataset(f"{k}", (0, 3), "f8", maxshape=(None, 3), chunks=(4096, 3))
@@ -74,10 +74,10 @@ def _filing() -> tuple[float, float]:
         ]
 
         def append(values: np.ndarray, where: list) -> None:  # type: ignore[type-arg]
-            for one in where:
-                end = one.shape[0]
-                one.resize(end + len(values), axis=0)
-                one[end:] = values
+            for dataset in where:
+                end = dataset.shape[0]
+                dataset.resize(end + len(values), axis=0)
+                dataset[end:] = values
             file.flush()
 
         small = best(lambda: append(rows[:1], data), 10)
@@ -97,12 +97,12 @@ def _compiling() -> float:
         return result
 
     arguments = np.ones(4), np.ones((4, 3))
-    njit(total)(*arguments)  # the first one wakes the compiler
+    njit(total)(*arguments)  # warms the compiler up
     return best(lambda: njit(total)(*arguments), 4)
 
 
 def _threads() -> int:
-    """As many as the compiled loops take."""
+    """Number of threads that compiled loops use."""
     wanted = os.environ.get("NUMBA_NUM_THREADS", "")
     if wanted.isdecimal():
         return max(1, int(wanted))
@@ -111,8 +111,8 @@ def _threads() -> int:
     return os.cpu_count() or 1
 
 
-def measured() -> Calibration:
-    """In this process, which should be fresh."""
+def measure() -> Calibration:
+    """Calibrate this process, which should be fresh."""
     bare = peak_memory()
     compiling = _compiling()
     threads = _threads()
@@ -132,4 +132,4 @@ def measured() -> Calibration:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(measured().to_json())
+    sys.stdout.write(measure().to_json())

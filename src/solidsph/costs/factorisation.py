@@ -1,8 +1,8 @@
-"""Factors of a sparse stiffness, estimated by cutting a box of particles in halves again.
+"""Size of the factors of a sparse stiffness matrix, estimated by nested dissection.
 
-George (1973), Nested dissection of a regular finite element mesh: what is eliminated last is a
-layer across the longest side, as thick as the stiffness reaches; its block is full. The halves on
-both sides are treated in the same way.
+George (1973), Nested dissection of a regular finite element mesh: the unknowns eliminated last form
+a layer across the longest side, as thick as the reach of the stiffness. Its block is full. The two
+halves are dissected in the same way.
 """
 
 from __future__ import annotations
@@ -15,30 +15,30 @@ import attrs
 
 @attrs.frozen
 class Factorisation:
-    """What a factorisation takes."""
+    """Size and cost of a factorisation."""
 
     fill: int  # entries of both factors
     multiplications: int
 
 
-def dissected(cells: Sequence[float], reach: float, components: int) -> Factorisation:
-    """Of a box of so many particles along each side.
+def estimate_factorisation(cells: Sequence[float], reach: float, components: int) -> Factorisation:
+    """Estimate the factorisation for a box of particles.
 
     Args:
         cells: particles along each axis.
-        reach: how many spacings apart two particles may be and act on each other.
-        components: unknowns a particle.
+        reach: largest distance at which two particles interact [spacings].
+        components: unknowns per particle.
     """
     fill = multiplications = 0.0
     sides, parts = sorted(cells), 1.0
     while True:
         longest, across = sides[-1], prod(sides[:-1])
-        if longest <= 2.0 * reach:  # no layer separates it any more
+        if longest <= 2.0 * reach:  # no layer separates the halves
             size = components * longest * across
             fill += parts * size**2
             multiplications += parts * size**3 / 3.0
             return Factorisation(int(fill), int(multiplications))
-        # The layer, beside those of before that it still touches: about as many again.
+        # A layer is still coupled to earlier ones of about the same size.
         size = components * reach * across
         fill += parts * 3.0 * size**2
         multiplications += parts * 7.0 / 3.0 * size**3

@@ -1,0 +1,40 @@
+"""Discrete bodies from the parts of a scene."""
+
+from __future__ import annotations
+
+import attrs
+
+from solidsph.assembly.visibility import hidden_pairs
+from solidsph.interfaces.body import Body
+from solidsph.interfaces.formulation import Configuration
+from solidsph.interfaces.smoothing_kernel import smoothing_kernel
+from solidsph.scene.part_maker import Parts
+
+
+def make_body(name: str, parts: Parts, extent: slice) -> Body:
+    """Body `name` of complete `parts`, with the rows `extent` of all particles."""
+    kernel, cover, formulation = parts.kernel, parts.cover, parts.formulation
+    assert kernel is not None
+    assert cover is not None
+    assert formulation is not None
+    shape, particles = parts.shapes[name], parts.sets[name]
+    radius = cover * float(particles.spacings.max())
+    moving = formulation.configuration is Configuration.CURRENT
+    body = Body(
+        name=name,
+        shape=shape,
+        extent=extent,
+        particles=particles,
+        smoothing=smoothing_kernel(kernel, particles.dimension, radius),
+        material=parts.materials[name],
+        formulation=formulation,
+        hidden=hidden_pairs(shape, particles, radius, moving=moving),
+    )
+    gradient = formulation.gradient.of_body(
+        name, particles, body.smoothing, body.pairs, moving=moving
+    )
+    if gradient is formulation.gradient:
+        return body
+    # Every formulation is an attrs class with a field `gradient`, which the interface cannot state.
+    own = attrs.evolve(formulation, gradient=gradient)  # type: ignore[misc]
+    return attrs.evolve(body, formulation=own)
