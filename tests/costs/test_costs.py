@@ -28,10 +28,10 @@ from solidsph.costs.foreseen import foreseen
 from solidsph.costs.model import Built, coefficient, predicted
 from solidsph.costs.shares import shares, without
 from solidsph.costs.timed import timed
-from solidsph.costs.work import Loop, Piece
+from solidsph.costs.work import CompilationUnit, Loop
 from solidsph.errors import SceneError
 from solidsph.interfaces.effect import Effect
-from solidsph.interfaces.plan import Way
+from solidsph.interfaces.plan import SumMethod
 from solidsph.interfaces.terms import Load
 from solidsph.run.stable_step import largest_step
 from tests.commands.test_cli import solidsph
@@ -79,7 +79,7 @@ def test_a_bar_is_counted_as_by_hand() -> None:
     assert work.outputs == 4
     # Two matrices of a number and an index for each pair, and where each of ten rows begins.
     matrices = 2 * (PAIRS * (8 + 8) + 11 * 8)
-    assert part.way is Way.PRODUCTS
+    assert part.method is SumMethod.PRODUCTS
     assert part.held == work.held == simulation.dynamics.internal.bytes == matrices
     assert work.touched == matrices + 2 * 10 * 8  # displacements and forces
     assert work.traffic == work.touched * work.evaluations
@@ -89,7 +89,7 @@ def test_a_bar_is_counted_as_by_hand() -> None:
 
 def test_moving_neighbours_are_counted_at_the_start() -> None:
     (part,) = counted(bar(formulation="updated-lagrangian").build()).operations
-    assert (part.way, part.pairs) == (Way.PRODUCTS_ANEW, PAIRS)
+    assert (part.method, part.pairs) == (SumMethod.PRODUCTS_ANEW, PAIRS)
     assert part.held == 10 * 8  # the sums of the kernel; all else is formed anew
 
 
@@ -98,14 +98,19 @@ def test_the_compiled_engine_visits_the_same_pairs(engine: str, bytes_each: int)
     simulation = bar(engine).build()
     work = counted(simulation)
     stencils, rows = work.operations
-    assert (stencils.way, rows.way) == (Way.STENCILS, Way.ROWS)
+    assert (stencils.method, rows.method) == (SumMethod.STENCILS, SumMethod.ROWS)
     assert stencils.pairs + rows.pairs == work.pairs == PAIRS
     assert stencils.particles + rows.particles == 10
     assert {part.precision for part in work.operations} == {bytes_each}
     assert work.held == sum(part.bytes for part in simulation.dynamics.internal.parts)
     assert work.loop is Loop.COMPILED
-    pieces = {one.piece for one in work.compilations}
-    assert pieces == {Piece.ENGINE, Piece.FORCES, Piece.FIELDS, Piece.STEPS}
+    pieces = {one.unit for one in work.compilations}
+    assert pieces == {
+        CompilationUnit.ENGINE,
+        CompilationUnit.FORCES,
+        CompilationUnit.FIELDS,
+        CompilationUnit.STEPS,
+    }
 
 
 def test_effects_add_the_pairs_that_they_visit() -> None:
@@ -114,7 +119,7 @@ def test_effects_add_the_pairs_that_they_visit() -> None:
     assert counted(viscous).visited == counted(plain).visited + PAIRS - 10
     held = counted(bar().effect("hourglass-control").build())
     assert held.visited > 3 * PAIRS  # the gradient's twice, and the nearest between
-    assert held.operations[-1].way is Way.HOURGLASS_PRODUCTS
+    assert held.operations[-1].method is SumMethod.HOURGLASS_PRODUCTS
 
 
 def test_counts_are_the_same_every_time(tmp_path: Path) -> None:
@@ -444,7 +449,7 @@ class _Blowing(Load):
 def test_what_is_not_known_is_priced_by_defaults() -> None:
     simulation = bar().effect(Wind()).build()
     work = counted(simulation)
-    assert work.operations[-1].way is Way.UNKNOWN
+    assert work.operations[-1].method is SumMethod.UNKNOWN
     assert work.visited == PAIRS  # it says of no pairs that it visits them
     prediction = told.of_run(simulation, None)
     assert prediction is not None
@@ -513,12 +518,12 @@ def test_only_what_is_of_no_declared_kind_is_timed(monkeypatch: pytest.MonkeyPat
     assert found.seconds == 1.0  # of one evaluation
     assert found.without("heat").seconds == 0.0
     # What is timed is not counted as well.
-    ways = {part.way for part in found.rest(counted(hot), hot).operations}
-    assert Way.UNKNOWN in {part.way for part in counted(hot).operations}
+    ways = {part.method for part in found.rest(counted(hot), hot).operations}
+    assert SumMethod.UNKNOWN in {part.method for part in counted(hot).operations}
     assert not any(
-        p.way is Way.UNKNOWN and p.pairs for p in found.rest(counted(hot), hot).operations
+        p.method is SumMethod.UNKNOWN and p.pairs for p in found.rest(counted(hot), hot).operations
     )
-    assert Way.PRODUCTS in ways
+    assert SumMethod.PRODUCTS in ways
 
 
 def test_what_was_timed_is_in_the_prediction() -> None:

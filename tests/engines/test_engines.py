@@ -13,8 +13,8 @@ import pytest
 
 from solidsph import Simulation
 from solidsph.engines.automatic import AutomaticEngine
-from solidsph.engines.compiled import shares
 from solidsph.engines.compiled.engine import CompiledEngine, CompiledForces
+from solidsph.engines.compiled.reference import partition
 from solidsph.engines.matrix import MatrixEngine, MatrixForces
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import Engine, InternalForces
@@ -228,7 +228,7 @@ def test_compiled_by_several_threads(
     arrangement: dict[str, Any], divergence: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same forces as the reference's, and the same bits at every call."""
-    monkeypatch.setattr(shares, "WORTH_A_THREAD", 1)
+    monkeypatch.setattr(partition, "WORTH_A_THREAD", 1)
     formulation = {"type": "total-lagrangian", "divergence": divergence}
     simulation = block(2, arrangement, lengths=[4.0, 6.0], formulation=formulation).build()
     reference = prepared(MatrixEngine(), simulation)

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from solidsph.costs.dissection import dissected
 from solidsph.costs.work import Loop, StaticWork, Work
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.plan import Way
+from solidsph.interfaces.plan import SumMethod
 from solidsph.interfaces.terms import (
     FieldTerm,
 )
@@ -16,8 +16,8 @@ from solidsph.scene.default_cover import cover_of
 from solidsph.scene.scene_data import StaticsScene
 from solidsph.simulation import Simulation
 
-_COMPILED = (Way.STENCILS, Way.ROWS)
-_MOVING = (Way.FORMULAS, Way.WEIGHTS)
+_COMPILED = (SumMethod.STENCILS, SumMethod.ROWS)
+_MOVING = (SumMethod.FORMULAS, SumMethod.WEIGHTS)
 
 ITERATIONS = 4
 """Of Newton's method in a load step, about: 3 under a small load, 4 where it bends a beam by a

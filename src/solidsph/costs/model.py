@@ -12,7 +12,7 @@ from solidsph.costs.calibration import Calibration
 from solidsph.costs.coefficients import COEFFICIENTS
 from solidsph.costs.terms import CostTerm, Yard
 from solidsph.costs.work import Loop, Work
-from solidsph.interfaces.plan import Compilation, Way
+from solidsph.interfaces.plan import Compilation, SumMethod
 
 # Not in the fit yet, which will bring them when it is next made: what a step takes more with a
 # constant force, or one by a particle's own motion, over the particles that it acts on.
@@ -23,7 +23,7 @@ _APART = {
 }
 
 # Ways that form their weights at every evaluation: what is not known is not taken to be so dear.
-_ANEW = (Way.PRODUCTS_ANEW, Way.FORMULAS, Way.WEIGHTS)
+_ANEW = (SumMethod.PRODUCTS_ANEW, SumMethod.FORMULAS, SumMethod.WEIGHTS)
 
 
 @attrs.frozen
@@ -153,8 +153,8 @@ def coefficient(name: str) -> float:
         return COEFFICIENTS[" ".join(words)]
     several = [
         COEFFICIENTS.get(" ".join([way.name, *words[1:]]), 0.0)
-        for way in Way
-        if words[0] in Way.__members__ and way not in _ANEW
+        for way in SumMethod
+        if words[0] in SumMethod.__members__ and way not in _ANEW
     ]
     return max(several, default=0.0)
 

@@ -9,7 +9,7 @@ from math import exp
 import attrs
 
 from solidsph.costs.work import Loop, Work
-from solidsph.interfaces.plan import Operations, Piece, Way
+from solidsph.interfaces.plan import CompilationUnit, Operations, SumMethod
 
 # Of the threads that share a sum, what they are together beside one alone.
 _TOGETHER = 0.95
@@ -24,7 +24,7 @@ _REMEMBERED = 150.0
 # From this size on the C library asks the system for each array, which clears every page [bytes].
 _LARGE = 128 * 1024
 
-_OF_BUILD = (Piece.ENGINE, Piece.MOVING_ENGINE)
+_OF_BUILD = (CompilationUnit.ENGINE, CompilationUnit.MOVING_ENGINE)
 
 
 class Yard(Enum):
@@ -54,9 +54,9 @@ def build_terms(work: Work) -> Iterator[CostTerm]:
     yield CostTerm(f"build particle {d}D", work.particles, Yard.SPARSE)
     yield CostTerm(f"build pair {kind} {d}D", work.pairs, Yard.SPARSE)
     for part in work.operations:
-        if part.way is Way.HOURGLASS_PRODUCTS or part.way is Way.HOURGLASS_SWEEPS:
+        if part.method is SumMethod.HOURGLASS_PRODUCTS or part.method is SumMethod.HOURGLASS_SWEEPS:
             yield CostTerm(f"build hourglass {d}D", part.pairs, Yard.SPARSE)
-        if part.way is Way.PAIR_ARRAYS or part.way is Way.PAIR_LOOPS:
+        if part.method is SumMethod.PAIR_ARRAYS or part.method is SumMethod.PAIR_LOOPS:
             yield CostTerm(f"build force {d}D", part.pairs, Yard.SPARSE)
     yield from _pieces(work, of_build=True)
 
@@ -74,7 +74,9 @@ def step_terms(work: Work) -> Iterator[CostTerm]:
     yield CostTerm(f"{loop} particle {d}D", n, Yard.SPARSE)
     loads = work.conditions - work.motions
     if work.loop is Loop.COMPILED:  # where what acts on some particles costs nothing on others
-        own = [part for part in work.operations if part.way is Way.UNKNOWN and not part.pairs]
+        own = [
+            part for part in work.operations if part.method is SumMethod.UNKNOWN and not part.pairs
+        ]
         loads -= len(own)
         count = sum(part.particles for part in own)
         yield CostTerm(f"{loop} loaded particle {d}D", count, Yard.SPARSE)
@@ -82,10 +84,10 @@ def step_terms(work: Work) -> Iterator[CostTerm]:
         yield CostTerm(f"{loop} {kind} {d}D", count, Yard.CALLS)
         yield CostTerm(f"{loop} {kind} particle {d}D", count * n, Yard.SPARSE)
     for part in work.operations:
-        if part.way is Way.UNKNOWN and not part.pairs:
+        if part.method is SumMethod.UNKNOWN and not part.pairs:
             continue  # a load on particles, which is among the conditions
         if work.loop is Loop.STEPS:
-            yield CostTerm(f"{part.way.name} call", 1.0, Yard.CALLS)
+            yield CostTerm(f"{part.method.name} call", 1.0, Yard.CALLS)
         yield from _sum_terms(part, d)
 
 
@@ -109,7 +111,7 @@ def output_terms(work: Work) -> Iterator[CostTerm]:
     if 8 * n * d * d >= _LARGE:
         yield CostTerm(f"output large particle {d}D", n, Yard.SPARSE)
     for part in work.operations:
-        if part.way in (Way.HOURGLASS_PRODUCTS, Way.HOURGLASS_SWEEPS):
+        if part.method in (SumMethod.HOURGLASS_PRODUCTS, SumMethod.HOURGLASS_SWEEPS):
             yield CostTerm("output hourglass pair", part.pairs, Yard.SPARSE)
 
 
@@ -140,16 +142,16 @@ def build_memory(work: Work) -> Iterator[CostTerm]:
     else:
         yield CostTerm(f"memory pair {kind} {d}D", work.pairs, Yard.BYTES)
     for one in work.compilations:
-        if one.piece in _OF_BUILD:
-            yield CostTerm(f"memory of {one.piece.name}", 1.0, Yard.BYTES)
+        if one.unit in _OF_BUILD:
+            yield CostTerm(f"memory of {one.unit.name}", 1.0, Yard.BYTES)
 
 
 def left_memory(work: Work) -> Iterator[CostTerm]:
     """Bytes that a build leaves, beyond imports and the engine's arrays."""
     yield CostTerm("memory of a build", 1.0, Yard.BYTES)
     for one in work.compilations:
-        if one.piece in _OF_BUILD:
-            yield CostTerm(f"memory of {one.piece.name}", 1.0, Yard.BYTES)
+        if one.unit in _OF_BUILD:
+            yield CostTerm(f"memory of {one.unit.name}", 1.0, Yard.BYTES)
 
 
 def run_memory(work: Work) -> Iterator[CostTerm]:
@@ -160,11 +162,11 @@ def run_memory(work: Work) -> Iterator[CostTerm]:
     yield CostTerm("memory of a file", 1.0 - exp(-work.outputs / _REMEMBERED), Yard.BYTES)
     yield CostTerm(f"memory of a run, particle {_kind(work)} {d}D", work.particles, Yard.BYTES)
     for part in work.operations:
-        if part.way is Way.PRODUCTS_ANEW or part.way is Way.PAIR_ARRAYS:
-            yield CostTerm(f"memory of a run, pair {part.way.name} {d}D", part.pairs, Yard.BYTES)
+        if part.method is SumMethod.PRODUCTS_ANEW or part.method is SumMethod.PAIR_ARRAYS:
+            yield CostTerm(f"memory of a run, pair {part.method.name} {d}D", part.pairs, Yard.BYTES)
     for one in work.compilations:
-        if one.piece not in _OF_BUILD:
-            yield CostTerm(f"memory of {one.piece.name}{_threads(one.threaded)}", 1.0, Yard.BYTES)
+        if one.unit not in _OF_BUILD:
+            yield CostTerm(f"memory of {one.unit.name}{_threads(one.threaded)}", 1.0, Yard.BYTES)
     if work.statics is not None:
         yield CostTerm(f"memory of a tangent entry {d}D", work.statics.entries, Yard.BYTES)
         yield CostTerm(f"memory of a factor entry {d}D", work.statics.fill, Yard.BYTES)
@@ -177,15 +179,18 @@ def together(threads: int) -> float:
 
 def _sum_terms(part: Operations, d: int) -> Iterator[CostTerm]:
     precision = f" float{8 * part.precision}" if part.precision != 8 else ""
-    yield CostTerm(f"{part.way.name} {d}D{precision} pair", part.pairs, Yard.SPARSE)
-    if part.way in (Way.STENCILS, Way.ROWS):  # the law, which is in double precision always
-        yield CostTerm(f"{part.way.name} {d}D particle", part.particles, Yard.SPARSE)
+    yield CostTerm(f"{part.method.name} {d}D{precision} pair", part.pairs, Yard.SPARSE)
+    if part.method in (
+        SumMethod.STENCILS,
+        SumMethod.ROWS,
+    ):  # the law, which is in double precision always
+        yield CostTerm(f"{part.method.name} {d}D particle", part.particles, Yard.SPARSE)
 
 
 def _pieces(work: Work, *, of_build: bool) -> Iterator[CostTerm]:
     for one in work.compilations:
-        if (one.piece in _OF_BUILD) == of_build:
-            yield CostTerm(f"compile {one.piece.name}{_threads(one.threaded)}", 1.0, Yard.COMPILING)
+        if (one.unit in _OF_BUILD) == of_build:
+            yield CostTerm(f"compile {one.unit.name}{_threads(one.threaded)}", 1.0, Yard.COMPILING)
 
 
 def _threads(threaded: bool) -> str:
@@ -194,9 +199,9 @@ def _threads(threaded: bool) -> str:
 
 def _kind(work: Work) -> str:
     """The engine, as its coefficients name it."""
-    ways = {part.way for part in work.operations}
-    if ways & {Way.STENCILS, Way.ROWS}:
+    ways = {part.method for part in work.operations}
+    if ways & {SumMethod.STENCILS, SumMethod.ROWS}:
         return "compiled"
-    if ways & {Way.FORMULAS, Way.WEIGHTS}:
+    if ways & {SumMethod.FORMULAS, SumMethod.WEIGHTS}:
         return "moving"
-    return "anew" if Way.PRODUCTS_ANEW in ways else "matrix"
+    return "anew" if SumMethod.PRODUCTS_ANEW in ways else "matrix"

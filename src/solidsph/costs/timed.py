@@ -10,10 +10,10 @@ import attrs
 import numpy as np
 
 from solidsph.costs.work import Loop, Work
-from solidsph.interfaces.plan import Way
+from solidsph.interfaces.plan import SumMethod
 from solidsph.simulation import Simulation
 
-_COMPILED = (Way.STENCILS, Way.ROWS)
+_COMPILED = (SumMethod.STENCILS, SumMethod.ROWS)
 
 # Evaluations of which the quickest counts, after one that may have to find things first.
 _REPEATS = 3
@@ -42,7 +42,9 @@ class Timed:
         kept = () if self.internal is not None else work.operations[:own]
         others = work.operations[own:]
         if self.loads:
-            others = tuple(one for one in others if one.way is not Way.UNKNOWN or not one.pairs)
+            others = tuple(
+                one for one in others if one.method is not SumMethod.UNKNOWN or not one.pairs
+            )
         return attrs.evolve(work, operations=(*kept, *others))
 
 
@@ -60,7 +62,7 @@ def timed(simulation: Simulation, work: Work) -> Timed:
         if not load.is_counted
     }
     internal = dynamics.internal
-    by_arrays = not any(part.way in _COMPILED for part in internal.operations)
+    by_arrays = not any(part.method in _COMPILED for part in internal.operations)
     own = internal.advances_histories and by_arrays
     return Timed(
         loads,

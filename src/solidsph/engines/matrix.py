@@ -15,7 +15,7 @@ from scipy.sparse import csr_array, diags_array, hstack, vstack
 from solidsph.interfaces.body import Body, part_of
 from solidsph.interfaces.engine import Engine, InternalForces, StressFields
 from solidsph.interfaces.formulation import Configuration
-from solidsph.interfaces.plan import BodySize, Operations, Plan, Way, array_bytes, vectors
+from solidsph.interfaces.plan import BodySize, Operations, Plan, SumMethod, array_bytes, vectors
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Indices, Mask, Tensor
 from solidsph.maths.tensors import identity, particles_first
@@ -91,7 +91,7 @@ class _FixedBody:
         n, d = self.body.particles.positions.shape
         held = self.constant.bytes
         pairs = self.constant.gradient.nnz // d
-        return Operations(Way.PRODUCTS, pairs, n, held + vectors(n, d), held)
+        return Operations(SumMethod.PRODUCTS, pairs, n, held + vectors(n, d), held)
 
 
 @final
@@ -120,7 +120,7 @@ class _FollowedBody:
         pairs = self.pair_count * (8 * d + 3 * 8)
         held = self.reference_sums.nbytes
         touched = held + 2 * (matrices + pairs) + vectors(n, d)
-        return Operations(Way.PRODUCTS_ANEW, self.pair_count, n, touched, held)
+        return Operations(SumMethod.PRODUCTS_ANEW, self.pair_count, n, touched, held)
 
 
 def kernel_sums(body: Body, pairs: Pairs) -> Array:
@@ -285,5 +285,5 @@ def _expected(size: BodySize) -> Operations:
     # Numbers and indices of two matrices, and where their rows begin.
     matrices = 2 * m * d * (8 + 8) + 8 * n * (d + 1)
     if size.moving:
-        return Operations(Way.PRODUCTS_ANEW, m, n, 2 * matrices, 8 * n)
-    return Operations(Way.PRODUCTS, m, n, matrices + vectors(n, d), matrices)
+        return Operations(SumMethod.PRODUCTS_ANEW, m, n, 2 * matrices, 8 * n)
+    return Operations(SumMethod.PRODUCTS, m, n, matrices + vectors(n, d), matrices)

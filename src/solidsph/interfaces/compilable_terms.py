@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_array, kron
 
 from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassProducts
-from solidsph.interfaces.plan import Operations, Way, array_bytes
+from solidsph.interfaces.plan import Operations, SumMethod, array_bytes
 from solidsph.interfaces.subset import Subset
 from solidsph.interfaces.terms import (
     Constraint,
@@ -242,7 +242,7 @@ class PairLoad(Load):
         return len(self.pairs.columns)
 
     def operations(self, dimension: int, *, compiled: bool) -> Sequence[Operations]:
-        way = Way.PAIR_LOOPS if compiled else Way.PAIR_ARRAYS
+        way = SumMethod.PAIR_LOOPS if compiled else SumMethod.PAIR_ARRAYS
         n, kept = len(self.pairs.starts) - 1, self.pairs.bytes
         return (Operations(way, self.pair_count, n, kept + 3 * 8 * n * dimension, kept),)
 

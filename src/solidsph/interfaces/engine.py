@@ -14,7 +14,14 @@ from solidsph.interfaces.body import Body
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.law import Law
-from solidsph.interfaces.plan import BodySize, Compilation, Operations, Piece, Plan, Way
+from solidsph.interfaces.plan import (
+    BodySize,
+    Compilation,
+    CompilationUnit,
+    Operations,
+    Plan,
+    SumMethod,
+)
 from solidsph.interfaces.terms import StressTerm
 from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.maths.arrays import Array, Indices
@@ -110,7 +117,7 @@ class InternalForces(ABC):
         An engine that does not say is taken for one that keeps nothing but its pairs' indices.
         """
         own = 8 * self.pair_count
-        return (Operations(Way.UNKNOWN, self.pair_count, 0, own, own),)
+        return (Operations(SumMethod.UNKNOWN, self.pair_count, 0, own, own),)
 
     @property
     def compilations(self) -> frozenset[Compilation]:
@@ -135,9 +142,11 @@ class InternalForces(ABC):
         d = equation.particles.dimension
         operations = [o for load in equation.loads for o in load.operations(d, compiled=False)]
         sweeps = {
-            Compilation(Piece.SWEEPS, d, any(o.threaded for o in (*self.operations, *operations)))
+            Compilation(
+                CompilationUnit.SWEEPS, d, any(o.threaded for o in (*self.operations, *operations))
+            )
             for o in operations
-            if o.way is Way.HOURGLASS_SWEEPS
+            if o.method is SumMethod.HOURGLASS_SWEEPS
         }
         return Plan(False, self.operations, operations, self.compilations | sweeps)
 
@@ -176,4 +185,4 @@ class Engine(ABC):
             evaluations: about how often the forces will be asked for.
         """
         pairs = round(sum(size.pairs for size in sizes))
-        return Plan(False, (Operations(Way.UNKNOWN, pairs, 0, 8 * pairs, 8 * pairs),))
+        return Plan(False, (Operations(SumMethod.UNKNOWN, pairs, 0, 8 * pairs, 8 * pairs),))

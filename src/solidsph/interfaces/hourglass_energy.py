@@ -22,7 +22,7 @@ from scipy.sparse import csr_array, diags_array, eye_array, hstack, vstack
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from solidsph.interfaces.body import Body, part_of
-from solidsph.interfaces.plan import Operations, Way, vectors
+from solidsph.interfaces.plan import Operations, SumMethod, vectors
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.neighbours import Pairs
 
@@ -181,7 +181,7 @@ class HourglassProducts(HourglassOperator):
         n, d = self.pairs.body.particles.positions.shape
         # J stands twice, d times with the gradient's pairs; Z is of jets. The compiled loop makes
         # sweeps of it: H, near pairs, and the stress in return.
-        way = Way.HOURGLASS_SWEEPS if compiled else Way.HOURGLASS_PRODUCTS
+        way = SumMethod.HOURGLASS_SWEEPS if compiled else SumMethod.HOURGLASS_PRODUCTS
         near = len(self.pairs.columns) if compiled else self.pull.nnz // (1 + d)
         pairs = 2 * ((self.jet.nnz - n) // d) + near
         return Operations(way, pairs, n, self.bytes + vectors(n, d), self.bytes)

@@ -41,12 +41,14 @@ class PointwiseIntegrator(Integrator):
 
     @staticmethod
     @abstractmethod
-    def leap(velocity: Scalar, acceleration: Scalar, last: Scalar, step_size: float) -> Scalar:
+    def mean_velocity(
+        velocity: Scalar, acceleration: Scalar, last: Scalar, step_size: float
+    ) -> Scalar:
         """h, from what holds before the step; `last` is the h of the step before [m/s]."""
 
     @staticmethod
     @abstractmethod
-    def arrive(mean_velocity: Scalar, acceleration: Scalar, step_size: float) -> Scalar:
+    def end_velocity(mean_velocity: Scalar, acceleration: Scalar, step_size: float) -> Scalar:
         """Velocity at the end of the step [m/s], from h and the acceleration there.
 
         With the acceleration before the step it is the velocity that forces see.
@@ -66,17 +68,19 @@ class PointwiseIntegrator(Integrator):
         """The state one time step [s] later."""
         time = state.time + step_size
         a = state.accelerations
-        h = self.leap(state.velocities, a, state.memory[MEAN_VELOCITY], step_size)
+        h = self.mean_velocity(state.velocities, a, state.memory[MEAN_VELOCITY], step_size)
         free = state.positions + step_size * h
         positions = dynamics.place(time, free)
         # Only what was imposed: the difference of positions would bring their rounding back.
         h = h + (positions - free) / step_size
-        predicted = dynamics.carry(time, self.arrive(h, a, step_size))
+        predicted = dynamics.carry(time, self.end_velocity(h, a, step_size))
         response = dynamics.respond(time, positions, predicted, step_size, state.memory)
         return state.advanced(
             time=time,
             positions=positions,
-            velocities=dynamics.carry(time, self.arrive(h, response.accelerations, step_size)),
+            velocities=dynamics.carry(
+                time, self.end_velocity(h, response.accelerations, step_size)
+            ),
             accelerations=response.accelerations,
             applied=response.applied,
             memory={**state.memory, **response.memory, MEAN_VELOCITY: h},

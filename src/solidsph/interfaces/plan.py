@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Way(Enum):
+class SumMethod(Enum):
     """How sums over neighbours are carried out; what a pair costs depends on it."""
 
     PRODUCTS = "products of sparse matrices"
@@ -33,7 +33,7 @@ class Way(Enum):
 class Operations:
     """One part of what an evaluation passes over. Nothing in it depends on the machine's speed."""
 
-    way: Way
+    method: SumMethod
     pairs: int  # ordered, that are visited
     particles: int
     touched: int  # bytes that must be moved once at least
@@ -42,7 +42,7 @@ class Operations:
     threaded: bool = False  # whether threads share them
 
 
-class Piece(Enum):
+class CompilationUnit(Enum):
     """What may have to be compiled; each once a process and kind."""
 
     ENGINE = "the engine, laws and the layout of rows"
@@ -63,7 +63,7 @@ class Piece(Enum):
 class Compilation:
     """Something to compile; two that are equal are compiled once."""
 
-    piece: Piece
+    unit: CompilationUnit
     dimension: int
     threaded: bool
     key: object = None  # what tells those of one piece apart

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-from solidsph.interfaces.plan import Operations, Way
+from solidsph.interfaces.plan import Operations, SumMethod
 from solidsph.interfaces.subset import Subset
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.particles import Particles, State
@@ -177,7 +177,7 @@ class Load(Term):
         count = len(self.particles)
         kept = sum(self.arrays.values()) or 8 * count * dimension
         touched = kept + 3 * 8 * count * dimension
-        return (Operations(Way.UNKNOWN, self.pair_count, count, touched, kept),)
+        return (Operations(SumMethod.UNKNOWN, self.pair_count, count, touched, kept),)
 
     def part(self, subset: Subset) -> Load | None:
         """The same load on a subset of the particles; None if it cannot act on some alone."""

@@ -8,22 +8,22 @@ from typing import Any, final
 import attrs
 import numpy as np
 
-from solidsph.engines.compiled.blocks import STRIDE, group
 from solidsph.engines.compiled.compilations import of_forces, of_steps
-from solidsph.engines.compiled.compiled_body import CompiledBody, compiled_body
 from solidsph.engines.compiled.expected import expected_plan
-from solidsph.engines.compiled.history import CompiledLaw
-from solidsph.engines.compiled.loop import are_compilable, compiled_loop
-from solidsph.engines.compiled.moving import MovingBody, moving_body
-from solidsph.engines.compiled.part import part_of_rows
+from solidsph.engines.compiled.history_law import CompiledLaw
+from solidsph.engines.compiled.moving.body import MovingBody, moving_body
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux, no_law
-from solidsph.engines.compiled.shares import (
+from solidsph.engines.compiled.reference.blocks import STRIDE, group
+from solidsph.engines.compiled.reference.body import ReferenceBody, reference_body
+from solidsph.engines.compiled.reference.partition import (
     aligned,
+    partitioned,
     passes,
-    shared,
     spread_pass,
     thread_count,
 )
+from solidsph.engines.compiled.reference.subset_rows import part_of_rows
+from solidsph.engines.compiled.time_loop.loop import are_compilable, compiled_loop
 from solidsph.engines.matrix import MatrixEngine
 from solidsph.interfaces.body import Body, part_of
 from solidsph.interfaces.engine import Engine, InternalForces, StressFields
@@ -75,9 +75,9 @@ class CompiledEngine(Engine):
     def expected(self, sizes: Sequence[BodySize], evaluations: int) -> Plan:
         return expected_plan(sizes, 4 if self.precision == "float32" else 8)
 
-    def _part(self, body: Body, law: Any) -> CompiledBody | MovingBody:
+    def _part(self, body: Body, law: Any) -> ReferenceBody | MovingBody:
         if body.formulation.configuration is Configuration.REFERENCE:
-            return compiled_body(body, law, self.precision)
+            return reference_body(body, law, self.precision)
         return moving_body(body, law)
 
 
@@ -100,7 +100,7 @@ class SinglePrecisionEngine(Engine):
 class CompiledForces(InternalForces):
     """Internal forces by compiled sweeps."""
 
-    parts: Sequence[CompiledBody | MovingBody]
+    parts: Sequence[ReferenceBody | MovingBody]
     conditions: Sequence[StressTerm]
 
     @property
@@ -131,8 +131,8 @@ class CompiledForces(InternalForces):
         return Plan(True, self.operations, loads, frozenset(pieces))
 
     @property
-    def _fixed(self) -> Sequence[CompiledBody]:
-        return [part for part in self.parts if isinstance(part, CompiledBody)]
+    def _fixed(self) -> Sequence[ReferenceBody]:
+        return [part for part in self.parts if isinstance(part, ReferenceBody)]
 
     def time_loop(self, equation: EquationOfMotion, integrator: Integrator) -> TimeLoop | None:
         if not self.plan(equation, integrator).compiles_steps:
@@ -187,15 +187,15 @@ class CompiledForces(InternalForces):
         rows = part_of_rows(whole.gradient, chosen, whole.body.particles.count)
         count = rows.run_pairs + rows.row_pairs
         threads = thread_count(count)
-        shares = shared(rows, d, dtype, threads)
+        shares = partitioned(rows, d, dtype, threads)
         own = attrs.evolve(
             whole,
             body=part_of(whole.body, chosen),
             gradient=rows,
             force=rows,
             factors=whole.factors[chosen],
-            gradient_shares=shares,
-            force_shares=shares,
+            gradient_partition=shares,
+            force_partition=shares,
             u=aligned((len(chosen) + group(d, dtype)) * STRIDE[d], dtype),
             passes=passes(d, dtype, whole.law, threads > 1),
             gradients=passes(d, dtype, no_law, threads > 1),
@@ -205,9 +205,9 @@ class CompiledForces(InternalForces):
         return CompiledForces((own,), ())
 
     @property
-    def _whole(self) -> CompiledBody | None:
+    def _whole(self) -> ReferenceBody | None:
         """The only body, if its forces may be formed in parts."""
-        if self.conditions or len(self.parts) > 1 or not isinstance(self.parts[0], CompiledBody):
+        if self.conditions or len(self.parts) > 1 or not isinstance(self.parts[0], ReferenceBody):
             return None
         only = self.parts[0]
         return only if only.fused and not only.body.particles.ghosts.any() else None

@@ -10,21 +10,27 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.blocks import STRIDE, group
-from solidsph.engines.compiled.chunks import weighted_chunks
-from solidsph.engines.compiled.part import part_of_rows
 from solidsph.engines.compiled.pointwise import no_law
-from solidsph.engines.compiled.rows import Rows, compressed
-from solidsph.engines.compiled.shares import aligned, passes, shared, spread_pass, thread_count
+from solidsph.engines.compiled.reference.blocks import STRIDE, group
+from solidsph.engines.compiled.reference.chunks import weighted_chunks
+from solidsph.engines.compiled.reference.partition import (
+    aligned,
+    partitioned,
+    passes,
+    spread_pass,
+    thread_count,
+)
+from solidsph.engines.compiled.reference.rows import Rows, compressed
+from solidsph.engines.compiled.reference.subset_rows import part_of_rows
 from solidsph.engines.compiled.threads import check_alive
 from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassPairs
-from solidsph.interfaces.plan import Operations, Way, vectors
+from solidsph.interfaces.plan import Operations, SumMethod, vectors
 from solidsph.maths.arrays import Array, Indices
 
 _DTYPE = "float64"
 
 
-class Sweeps(NamedTuple):
+class HourglassArrays(NamedTuple):
     """Arrays of the sweeps of one body."""
 
     extent: tuple[int, int]  # its first particle among all, and the one after the last
@@ -51,7 +57,7 @@ class HourglassSweeps(HourglassOperator):
     """
 
     pairs: HourglassPairs
-    arrays: Sweeps
+    arrays: HourglassArrays
     sweep: Any  # compiled (arrays, displacements (n, d), forces (n, d))
 
     @classmethod
@@ -73,8 +79,8 @@ class HourglassSweeps(HourglassOperator):
         n, d = body.particles.positions.shape
         # Beside the near pairs there are those of the gradient, twice.
         threads = thread_count(3 * len(pairs.columns))
-        shares = shared(rows, d, _DTYPE, threads)
-        arrays = Sweeps(
+        shares = partitioned(rows, d, _DTYPE, threads)
+        arrays = HourglassArrays(
             extent=(body.extent.start, body.extent.stop),
             table=shares.table,
             rows=rows,
@@ -103,7 +109,9 @@ class HourglassSweeps(HourglassOperator):
         pairs = 2 * (rows.run_pairs + rows.row_pairs) + len(self.arrays.columns)
         threaded = len(self.arrays.table) > 1
         touched = self.bytes + vectors(n, d)
-        return Operations(Way.HOURGLASS_SWEEPS, pairs, n, touched, self.bytes, threaded=threaded)
+        return Operations(
+            SumMethod.HOURGLASS_SWEEPS, pairs, n, touched, self.bytes, threaded=threaded
+        )
 
     def forces(self, displacements: Array) -> Array:
         if len(self.arrays.table) > 1:

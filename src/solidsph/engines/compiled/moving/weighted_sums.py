@@ -8,7 +8,7 @@ from typing import Any, final
 import attrs
 from numba import njit
 
-from solidsph.engines.compiled.neighbourhoods import Neighbourhoods
+from solidsph.engines.compiled.moving.neighbourhoods import Neighbourhoods
 from solidsph.engines.compiled.vectors import MATRIX, ROW, with_outer, with_product
 from solidsph.interfaces.formulation import Formulation
 from solidsph.maths.arrays import Array

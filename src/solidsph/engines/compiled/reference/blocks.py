@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from solidsph.engines.compiled.lanes import register_bytes, words
-from solidsph.engines.compiled.rows import BAND, RUN
+from solidsph.engines.compiled.reference.lanes import lane_operations, register_bytes
+from solidsph.engines.compiled.reference.rows import BAND, RUN
 
 STRIDE = {1: 1, 2: 2, 3: 4}  # numbers kept for a particle, by dimension
 
@@ -52,8 +52,10 @@ def block_loops(dimension: int, dtype: str) -> BlockLoops:
     margin = BAND + G
     plane = (margin + RUN + margin) * D
     # Of several particles, and of one.
-    load, store, zeros, weight, outer, inner, _, put, get = words(dtype, W, d)
-    load_1, store_1, zeros_1, weight_1, outer_1, inner_1, total_1, put_1, get_1 = words(dtype, D, d)
+    load, store, zeros, weight, outer, inner, _, put, get = lane_operations(dtype, W, d)
+    load_1, store_1, zeros_1, weight_1, outer_1, inner_1, total_1, put_1, get_1 = lane_operations(
+        dtype, D, d
+    )
 
     @njit
     def gather_run(rows, first, count, stencil, u, scratch):

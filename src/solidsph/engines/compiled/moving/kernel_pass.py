@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 from numba import njit, types
 
-from solidsph.engines.compiled.cells import Near
+from solidsph.engines.compiled.moving.search import Near
 from solidsph.engines.compiled.pointwise import (
     NotCompilableError,
     compiled_function,

@@ -11,15 +11,15 @@ import attrs
 import numpy as np
 from numba import njit
 
-from solidsph.engines.compiled.cells import NeighbourSearch
-from solidsph.engines.compiled.kernels import KernelPass, kernel_pass
-from solidsph.engines.compiled.neighbourhoods import Neighbourhoods, fill, kernel_sums
+from solidsph.engines.compiled.moving.kernel_pass import KernelPass, kernel_pass
+from solidsph.engines.compiled.moving.neighbourhoods import Neighbourhoods, fill, kernel_sums
+from solidsph.engines.compiled.moving.pointwise_sums import PointwiseSums
+from solidsph.engines.compiled.moving.search import NeighbourSearch
+from solidsph.engines.compiled.moving.weighted_sums import WeightedSums
 from solidsph.engines.compiled.pointwise import NotCompilableError
-from solidsph.engines.compiled.pointwise_sums import PointwiseSums
 from solidsph.engines.compiled.vectors import MATRIX
-from solidsph.engines.compiled.weighted_sums import WeightedSums
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.plan import Operations, Way, vectors
+from solidsph.interfaces.plan import Operations, SumMethod, vectors
 from solidsph.maths.arrays import Array
 
 
@@ -80,7 +80,7 @@ class MovingBody:
     def operations(self) -> Sequence[Operations]:
         """What an evaluation passes over, with the neighbours of the start."""
         n, d = self.body.particles.positions.shape
-        way = Way.FORMULAS if isinstance(self.sums, PointwiseSums) else Way.WEIGHTS
+        way = SumMethod.FORMULAS if isinstance(self.sums, PointwiseSums) else SumMethod.WEIGHTS
         return (Operations(way, self.pair_count, n, self.bytes + vectors(n, d), self.bytes),)
 
     def forces(self, displacements: Array, out: Array) -> None:

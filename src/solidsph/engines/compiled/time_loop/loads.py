@@ -11,13 +11,13 @@ from numba import njit, prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.chain import chain
-from solidsph.engines.compiled.hourglass_sweeps import HourglassSweeps, Sweeps, body_sweep
+from solidsph.engines.compiled.hourglass_sweeps import HourglassArrays, HourglassSweeps, body_sweep
 from solidsph.engines.compiled.pointwise import (
     NotCompilableError,
     compiled_function,
     numbers_type,
 )
+from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.vectors import ROW, moved
 from solidsph.interfaces.compilable_terms import (
     HourglassLoad,
@@ -26,7 +26,7 @@ from solidsph.interfaces.compilable_terms import (
     ScheduledLoad,
 )
 from solidsph.interfaces.hourglass_energy import HourglassOperator
-from solidsph.interfaces.plan import Piece
+from solidsph.interfaces.plan import CompilationUnit
 from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array, Indices
 
@@ -40,20 +40,20 @@ class LoadData(NamedTuple):
     own: Any
 
 
-class Scheduled(NamedTuple):
+class ScheduledForces(NamedTuple):
     """Forces known ahead."""
 
     table: Array  # (t, k, d) for the steps to come, or (1, k, d) for all of them [N]
 
 
-class Pointwise(NamedTuple):
+class PointwiseData(NamedTuple):
     """Forces by a formula."""
 
     reference: Array  # (n, d) X [m]
     values: Array  # (k, m)
 
 
-class Paired(NamedTuple):
+class PairData(NamedTuple):
     """Forces by a formula of pairs."""
 
     reference: Array  # (n, d) X [m]
@@ -65,86 +65,88 @@ class Paired(NamedTuple):
 class HourglassData(NamedTuple):
     """Hourglass forces."""
 
-    bodies: tuple[Sweeps, ...]
-    now: Scheduled  # those of the step in hand
+    bodies: tuple[HourglassArrays, ...]
+    now: ScheduledForces  # those of the step in hand
 
 
-class LoadPass(NamedTuple):
+class CompiledLoad(NamedTuple):
     """A load made ready for the loop."""
 
     apply: Any  # compiled (load, step, u, v, path, total): total += force, work += that along path
     own: Callable[[Array], Any]  # times (t,) at which the steps to come end -> what its kind needs
 
 
-class Pass(NamedTuple):
+class LoadKind(NamedTuple):
     """How loads of one kind become part of the loop."""
 
     kind: Any  # a class of loads
-    prepare: Callable[[Any, Array, bool], LoadPass]  # (load, X (n, d), threaded)
-    piece: Piece
+    prepare: Callable[[Any, Array, bool], CompiledLoad]  # (load, X (n, d), threaded)
+    piece: CompilationUnit
     formula: bool = True  # whether each class of the kind compiles anew
 
 
-def pass_of(load: Load) -> Pass:
+def kind_of(load: Load) -> LoadKind:
     """The pass of a load's kind.
 
     Raises:
         NotCompilableError: the loop knows no such kind.
     """
-    for known in PASSES:
+    for known in LOAD_KINDS:
         if isinstance(load, known.kind):
             return known
     raise NotCompilableError(f"load {load.label!r} is not of a kind that the loop knows")
 
 
-def load_pass(load: Load, reference: Array, threaded: bool) -> LoadPass:
+def compiled_load(load: Load, reference: Array, threaded: bool) -> CompiledLoad:
     """A load on particles whose X is `reference` (n, d) [m], made ready.
 
     Raises:
         NotCompilableError: the loop knows no such kind, or its formula does not compile.
     """
-    return pass_of(load).prepare(load, reference, threaded)
+    return kind_of(load).prepare(load, reference, threaded)
 
 
-def _prepare_scheduled(load: ScheduledLoad, reference: Array, threaded: bool) -> LoadPass:
+def _prepare_scheduled(load: ScheduledLoad, reference: Array, threaded: bool) -> CompiledLoad:
     d = reference.shape[1]
-    return LoadPass(
+    return CompiledLoad(
         _accounted(_scheduled(d), d, threaded),
-        lambda times: Scheduled(np.ascontiguousarray(load.schedule(times))),
+        lambda times: ScheduledForces(np.ascontiguousarray(load.schedule(times))),
     )
 
 
-def _prepare_hourglass(load: HourglassLoad, reference: Array, threaded: bool) -> LoadPass:
+def _prepare_hourglass(load: HourglassLoad, reference: Array, threaded: bool) -> CompiledLoad:
     d = reference.shape[1]
     sweeps = [_sweeps(operator) for operator in load.operators]
     own = HourglassData(
-        tuple(one.arrays for one in sweeps), Scheduled(np.zeros((1, *reference.shape)))
+        tuple(one.arrays for one in sweeps), ScheduledForces(np.zeros((1, *reference.shape)))
     )
-    each = chain(tuple(body_sweep(one.sweep) for one in sweeps))
-    return LoadPass(_hourglass(each, _accounted(_scheduled(d), d, threaded)), lambda times: own)
+    each = call_each(tuple(body_sweep(one.sweep) for one in sweeps))
+    return CompiledLoad(_hourglass(each, _accounted(_scheduled(d), d, threaded)), lambda times: own)
 
 
-def _prepare_pairs(load: PairLoad, reference: Array, threaded: bool) -> LoadPass:
+def _prepare_pairs(load: PairLoad, reference: Array, threaded: bool) -> CompiledLoad:
     d, table = reference.shape[1], load.pairs
     count, vector = table.values.shape[1], numbers_type(d)
     pull = compiled_function(load.pull, vector, vector, numbers_type(count))
-    paired = Paired(reference, table.starts, table.columns, table.values)
-    return LoadPass(_accounted(_paired(pull, d, count), d, threaded), lambda times: paired)
+    paired = PairData(reference, table.starts, table.columns, table.values)
+    return CompiledLoad(_accounted(_paired(pull, d, count), d, threaded), lambda times: paired)
 
 
-def _prepare_pointwise(load: PointwiseLoad, reference: Array, threaded: bool) -> LoadPass:
+def _prepare_pointwise(load: PointwiseLoad, reference: Array, threaded: bool) -> CompiledLoad:
     d, values = reference.shape[1], np.ascontiguousarray(load.values)
     count, vector = values.shape[1], numbers_type(d)
     force = compiled_function(load.force, vector, vector, numbers_type(count))
-    pointwise = Pointwise(reference, values)
-    return LoadPass(_accounted(_pointwise(force, d, count), d, threaded), lambda times: pointwise)
+    pointwise = PointwiseData(reference, values)
+    return CompiledLoad(
+        _accounted(_pointwise(force, d, count), d, threaded), lambda times: pointwise
+    )
 
 
-PASSES = (
-    Pass(ScheduledLoad, _prepare_scheduled, Piece.LOAD, formula=False),
-    Pass(HourglassLoad, _prepare_hourglass, Piece.HOURGLASS_LOAD),
-    Pass(PairLoad, _prepare_pairs, Piece.PAIR_LOAD),
-    Pass(PointwiseLoad, _prepare_pointwise, Piece.LOAD),
+LOAD_KINDS = (
+    LoadKind(ScheduledLoad, _prepare_scheduled, CompilationUnit.LOAD, formula=False),
+    LoadKind(HourglassLoad, _prepare_hourglass, CompilationUnit.HOURGLASS_LOAD),
+    LoadKind(PairLoad, _prepare_pairs, CompilationUnit.PAIR_LOAD),
+    LoadKind(PointwiseLoad, _prepare_pointwise, CompilationUnit.LOAD),
 )
 """Kinds of load that the loop knows."""
 

@@ -10,15 +10,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.chain import chain
 from solidsph.engines.compiled.pointwise import NotCompilableError
-from solidsph.engines.compiled.rows import Rows
+from solidsph.engines.compiled.reference.rows import Rows
+from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.interfaces.compilable_terms import LinearExtension
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Indices
 
 if TYPE_CHECKING:
-    from solidsph.engines.compiled.compiled_body import CompiledBody
+    from solidsph.engines.compiled.reference.body import ReferenceBody
 
 
 class Fused(NamedTuple):
@@ -65,7 +65,7 @@ class Internal(NamedTuple):
     data: Any
 
 
-def internal_forces(parts: Sequence[CompiledBody], conditions: Sequence[StressTerm]) -> Internal:
+def internal_forces(parts: Sequence[ReferenceBody], conditions: Sequence[StressTerm]) -> Internal:
     """The internal forces of prepared bodies under these conditions.
 
     Raises:
@@ -73,7 +73,7 @@ def internal_forces(parts: Sequence[CompiledBody], conditions: Sequence[StressTe
     """
     if all(part.fused for part in parts) and not conditions:
         functions = tuple(_fused(part.passes.forces) for part in parts)
-        return Internal(chain(functions), tuple(_fused_data(part) for part in parts))
+        return Internal(call_each(functions), tuple(_fused_data(part) for part in parts))
     if len(parts) > 1:
         raise NotCompilableError("conditions on the stress of several bodies")
     (part,) = parts
@@ -81,7 +81,7 @@ def internal_forces(parts: Sequence[CompiledBody], conditions: Sequence[StressTe
         if not isinstance(condition, LinearExtension):
             raise NotCompilableError(f"condition {condition.label!r} is not of a declared kind")
     d = part.body.particles.dimension
-    imposed = chain(tuple(_stress_following(d) for _ in conditions))
+    imposed = call_each(tuple(_stress_following(d) for _ in conditions))
     acts = part.body.formulation.divergence.uses_ghost_stress
     forces = _staged(part.passes.stress, imposed, part.spread_pass, acts)
     followed = tuple(_followed(c) for c in conditions if isinstance(c, LinearExtension))
@@ -107,8 +107,8 @@ def _fused(forces: Any) -> Any:
     return fused
 
 
-def _fused_data(part: CompiledBody) -> Fused:
-    extent, shares = part.body.extent, part.gradient_shares
+def _fused_data(part: ReferenceBody) -> Fused:
+    extent, shares = part.body.extent, part.gradient_partition
     return Fused(
         extent=(extent.start, extent.stop),
         table=shares.table,
@@ -141,17 +141,17 @@ def _staged(stress_pass: Any, imposed: Any, spread: Any, ghosts_act: bool) -> An
     return forces
 
 
-def _staged_data(part: CompiledBody) -> Staged:
+def _staged_data(part: ReferenceBody) -> Staged:
     d = part.body.particles.dimension
     return Staged(
-        table=part.gradient_shares.table,
+        table=part.gradient_partition.table,
         rows=part.gradient,
         u=part.u,
         params=part.body.material.params,
-        force_table=part.force_shares.table,
+        force_table=part.force_partition.table,
         force_rows=part.force,
         factors=part.factors,
-        buffers=part.force_shares.buffers,
+        buffers=part.force_partition.buffers,
         stress=np.zeros((d, d, part.body.particles.count)),
         ghosts=np.flatnonzero(part.body.particles.ghosts),
     )

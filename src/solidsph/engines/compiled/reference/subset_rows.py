@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solidsph.engines.compiled.rows import ROWS, Rows, bands, starts_of
+from solidsph.engines.compiled.reference.rows import ROWS, Rows, bands, starts_of
 from solidsph.maths.arrays import Array, Indices
 
 

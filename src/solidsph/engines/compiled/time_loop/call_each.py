@@ -9,10 +9,10 @@ from numba import njit
 
 
 @cache
-def chain(functions: tuple[Any, ...]) -> Any:
+def call_each(functions: tuple[Any, ...]) -> Any:
     """Compiled (parts, *arguments): calls the k-th function with the k-th part and the arguments.
 
-    Parts may be of different types, so the chain is unrolled when it compiles, and what is not
+    Parts may be of different types, so the call_each is unrolled when it compiles, and what is not
     there leaves no code.
     """
     if not functions:
@@ -23,7 +23,7 @@ def chain(functions: tuple[Any, ...]) -> Any:
 
         return nothing
 
-    first, rest = functions[0], chain(functions[1:])
+    first, rest = functions[0], call_each(functions[1:])
 
     @njit
     def each(parts, *arguments):

@@ -15,7 +15,7 @@ from solidsph.interfaces.terms import Constraint
 from solidsph.maths.arrays import Array, Indices
 
 
-class Scheduled(NamedTuple):
+class ScheduledMotion(NamedTuple):
     """A motion known ahead: values for the steps to come, or one row for all of them."""
 
     particles: Indices  # (m,)
@@ -27,7 +27,7 @@ class Scheduled(NamedTuple):
     work: Array  # (1,) done so far [J]
 
 
-class Following(NamedTuple):
+class FollowingGhosts(NamedTuple):
     """Ghosts that follow others."""
 
     ghosts: Indices  # (k,)
@@ -38,7 +38,7 @@ class Following(NamedTuple):
     work: Array  # (1,) stays 0: what ghosts take from the others' motion they give back
 
 
-class MotionWords(NamedTuple):
+class ConstraintCalls(NamedTuple):
     """What the loop asks of a motion, compiled."""
 
     move: Any  # (motion, step, dt, u, h, path, v): before the forces, displacement and velocity
@@ -47,7 +47,7 @@ class MotionWords(NamedTuple):
     react: Any
 
 
-def motion_words(motion: Constraint, dimension: int) -> MotionWords:
+def constraint_calls(motion: Constraint, dimension: int) -> ConstraintCalls:
     """The words of a motion's kind.
 
     Raises:
@@ -61,9 +61,9 @@ def motion_words(motion: Constraint, dimension: int) -> MotionWords:
     raise NotCompilableError(f"motion {motion.label!r} is not of a declared kind")
 
 
-def motion_data(
+def constraint_data(
     motion: Constraint, times: Array, before: Array, step: float
-) -> Scheduled | Following:
+) -> ScheduledMotion | FollowingGhosts:
     """What the loop holds of a motion over steps that end at `times` (t,) [s].
 
     `before` (m,) is its reaction at the start [N], `step` the time step [s].
@@ -72,11 +72,13 @@ def motion_data(
         case ScheduledConstraint():
             particles, axes = motion.entries
             u, v, a = (np.ascontiguousarray(motion.schedule(times, k, step)) for k in range(3))
-            return Scheduled(particles, axes, u, v, a, before, np.zeros(1))
+            return ScheduledMotion(particles, axes, u, v, a, before, np.zeros(1))
         case LinearExtension():
             A = motion.displacement
-            return Following(motion.ghosts, motion.signs, A.indptr, A.indices, A.data, np.zeros(1))
-    raise AssertionError("motion_words has refused it")
+            return FollowingGhosts(
+                motion.ghosts, motion.signs, A.indptr, A.indices, A.data, np.zeros(1)
+            )
+    raise AssertionError("constraint_calls has refused it")
 
 
 @njit
@@ -87,7 +89,7 @@ def _now(table: Array, step: int) -> Array:
 
 
 @cache
-def _scheduled() -> MotionWords:
+def _scheduled() -> ConstraintCalls:
     @njit
     def move(motion, step, dt, u, h, path, v):
         displacements, velocities = _now(motion.displacements, step), _now(motion.velocities, step)
@@ -116,11 +118,11 @@ def _scheduled() -> MotionWords:
             motion.before[m] = reaction
         motion.work[0] += work
 
-    return MotionWords(move, hand_on, react)
+    return ConstraintCalls(move, hand_on, react)
 
 
 @cache
-def _following(dimension: int) -> MotionWords:
+def _following(dimension: int) -> ConstraintCalls:
     @njit
     def followed(motion, k, i, values):
         total = 0.0
@@ -157,4 +159,4 @@ def _following(dimension: int) -> MotionWords:
                 a[p, i] = followed(motion, k, i, a)
                 v[p, i] = followed(motion, k, i, v)
 
-    return MotionWords(move, hand_on, react)
+    return ConstraintCalls(move, hand_on, react)

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.growing import Growing
+from solidsph.engines.compiled.reference.growing import Growing
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.neighbours import Pairs
 
@@ -111,14 +111,14 @@ class _Compressor:
         heads = _run_heads(starts, columns - rows, weights, _SAME)
         begin = np.flatnonzero(heads == np.arange(len(heads)))
         length = np.diff([*begin, len(heads)])
-        shared = length >= self._shortest_run
-        for a, n in zip(begin[shared], length[shared], strict=True):
+        partitioned = length >= self._shortest_run
+        for a, n in zip(begin[partitioned], length[partitioned], strict=True):
             own = slice(starts[a], starts[a + 1])
             stencil = self._stencil(columns[own] - (first + a), weights[own])
             parts = -(-n // RUN)
             edges = a + np.arange(parts + 1) * n // parts
             self._add_blocks(first + edges[:-1], np.diff(edges), np.full(parts, stencil))
-        single = np.repeat(~shared, length)
+        single = np.repeat(~partitioned, length)
         self._add_rows(first, single)
         kept = np.repeat(single, counts)
         before = len(self._offsets.so_far())

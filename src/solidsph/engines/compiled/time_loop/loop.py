@@ -10,18 +10,23 @@ import attrs
 import numpy as np
 from numba import njit, prange, types
 
-from solidsph.engines.compiled.chain import chain
-from solidsph.engines.compiled.internal import Internal, internal_forces
-from solidsph.engines.compiled.loads import PASSES, LoadData, LoadPass, load_pass
-from solidsph.engines.compiled.motions import (
-    Following,
-    MotionWords,
-    Scheduled,
-    motion_data,
-    motion_words,
-)
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function
-from solidsph.engines.compiled.shares import thread_count
+from solidsph.engines.compiled.reference.partition import thread_count
+from solidsph.engines.compiled.time_loop.call_each import call_each
+from solidsph.engines.compiled.time_loop.constraints import (
+    ConstraintCalls,
+    FollowingGhosts,
+    ScheduledMotion,
+    constraint_calls,
+    constraint_data,
+)
+from solidsph.engines.compiled.time_loop.internal_forces import Internal, internal_forces
+from solidsph.engines.compiled.time_loop.loads import (
+    LOAD_KINDS,
+    CompiledLoad,
+    LoadData,
+    compiled_load,
+)
 from solidsph.interfaces.compilable_terms import (
     LinearExtension,
     ScheduledConstraint,
@@ -36,7 +41,7 @@ from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 
 if TYPE_CHECKING:
-    from solidsph.engines.compiled.compiled_body import CompiledBody
+    from solidsph.engines.compiled.reference.body import ReferenceBody
 
 # Operations for every particle in a step, beside those for pairs.
 _PER_PARTICLE = 10
@@ -60,14 +65,14 @@ class _Moving(NamedTuple):
 
 
 def are_compilable(
-    bodies: Sequence[CompiledBody],
+    bodies: Sequence[ReferenceBody],
     conditions: Sequence[StressTerm],
     equation: EquationOfMotion,
     integrator: Integrator,
 ) -> bool:
     """Whether everything in a step is of a kind that this loop knows; then only a formula that
     does not compile can be in its way."""
-    kinds = tuple(one.kind for one in PASSES)
+    kinds = tuple(one.kind for one in LOAD_KINDS)
     labels = [c.label for c in (*equation.loads, *equation.constraints)]
     fused = not conditions and all(body.fused for body in bodies)
     alone = len(bodies) == 1 and all(isinstance(one, LinearExtension) for one in conditions)
@@ -83,7 +88,7 @@ def are_compilable(
 
 
 def compiled_loop(
-    bodies: Sequence[CompiledBody],
+    bodies: Sequence[ReferenceBody],
     conditions: Sequence[StressTerm],
     sums: InternalForces,
     equation: EquationOfMotion,
@@ -102,19 +107,19 @@ def compiled_loop(
     d = particles.dimension
     threads = thread_count(_PER_PARTICLE * particles.count)  # of what is done particle by particle
     for body in bodies:
-        body.gradient_shares.check()
+        body.gradient_partition.check()
     internal = internal_forces(bodies, conditions)
-    loads = [load_pass(load, particles.positions, threads > 1) for load in equation.loads]
-    words = [motion_words(motion, d) for motion in equation.constraints]
-    by_word = [tuple(one[k] for one in words) for k in range(len(MotionWords._fields))]
+    loads = [compiled_load(load, particles.positions, threads > 1) for load in equation.loads]
+    words = [constraint_calls(motion, d) for motion in equation.constraints]
+    by_word = [tuple(one[k] for one in words) for k in range(len(ConstraintCalls._fields))]
     steps = _steps(
         d,
         threads > 1,
-        compiled_function(integrator.leap, *[types.float64] * 4),
-        compiled_function(integrator.arrive, *[types.float64] * 3),
+        compiled_function(integrator.mean_velocity, *[types.float64] * 4),
+        compiled_function(integrator.end_velocity, *[types.float64] * 3),
         internal.forces,
-        chain(tuple(one.apply for one in loads)),
-        MotionWords(*(chain(functions) for functions in by_word)),
+        call_each(tuple(one.apply for one in loads)),
+        ConstraintCalls(*(call_each(functions) for functions in by_word)),
     )
     return CompiledLoop(sums, equation, internal, loads, steps, threads)
 
@@ -127,7 +132,7 @@ class CompiledLoop(TimeLoop):
     sums: InternalForces
     equation: EquationOfMotion
     internal: Internal
-    loads: Sequence[LoadPass]
+    loads: Sequence[CompiledLoad]
     steps: Any  # compiled
     threads: int
     most_steps: int = attrs.field(init=False)  # for which tables are made at once
@@ -237,14 +242,17 @@ class _Accounts:
             LoadData(load.particles, before, np.zeros(threads), one) for load, before, one in each
         )
 
-    def motions(self, times: Array) -> tuple[Scheduled | Following, ...]:
+    def motions(self, times: Array) -> tuple[ScheduledMotion | FollowingGhosts, ...]:
         """What the loop holds of the motions."""
         pairs = zip(self.equation.constraints, self.reactions, strict=True)
         return tuple(
-            motion_data(motion, times, before, self.equation.step_size) for motion, before in pairs
+            constraint_data(motion, times, before, self.equation.step_size)
+            for motion, before in pairs
         )
 
-    def settle(self, loads: Sequence[LoadData], motions: Sequence[Scheduled | Following]) -> None:
+    def settle(
+        self, loads: Sequence[LoadData], motions: Sequence[ScheduledMotion | FollowingGhosts]
+    ) -> None:
         """Take back what the loop has done with them."""
         conditions = (*self.equation.loads, *self.equation.constraints)
         for condition, part in zip(conditions, (*loads, *motions), strict=True):
@@ -292,11 +300,11 @@ def _handed_on(
 def _steps(
     dimension: int,
     threaded: bool,
-    leap: Any,
-    arrive: Any,
+    mean_velocity: Any,
+    end_velocity: Any,
     internal: Any,
     loads: Any,
-    motion: MotionWords,
+    motion: ConstraintCalls,
 ) -> Any:
     move, hand_on, react = motion
 
@@ -307,11 +315,11 @@ def _steps(
         for t in prange(threads):
             for p in range(t * n // threads, (t + 1) * n // threads):
                 for i in range(dimension):
-                    mean = leap(v[p, i], a[p, i], h[p, i], dt)
+                    mean = mean_velocity(v[p, i], a[p, i], h[p, i], dt)
                     h[p, i] = mean
                     path[p, i] = dt * mean
                     u[p, i] += dt * mean
-                    v[p, i] = arrive(mean, a[p, i], dt)
+                    v[p, i] = end_velocity(mean, a[p, i], dt)
 
     @njit(parallel=threaded)
     def kick(threads, dt, moving, inverse_masses):
@@ -321,7 +329,7 @@ def _steps(
             for p in range(t * n // threads, (t + 1) * n // threads):
                 for i in range(dimension):
                     a[p, i] = total[p, i] * inverse_masses[p]
-                    v[p, i] = arrive(h[p, i], a[p, i], dt)
+                    v[p, i] = end_velocity(h[p, i], a[p, i], dt)
 
     @njit
     def steps(count, dt, threads, moving, masses, inverse_masses, bodies, load_parts, motion_parts):

@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 from numba import njit, types
 
-from solidsph.engines.compiled.neighbourhoods import Neighbourhoods
+from solidsph.engines.compiled.moving.neighbourhoods import Neighbourhoods
 from solidsph.engines.compiled.pointwise import (
     NUMBERS,
     NotCompilableError,

@@ -37,7 +37,7 @@ class _LanesModel(models.PrimitiveModel):
         super().__init__(manager, lanes, ir.VectorType(element, lanes.count))
 
 
-class Words(NamedTuple):
+class LaneOperations(NamedTuple):
     """What compiled loops say about lanes; `at` counts the elements of a flat array."""
 
     load: Any  # (array, at) -> vector
@@ -60,7 +60,7 @@ def register_bytes() -> int:
 
 
 @cache
-def words(dtype: str, count: int, dimension: int) -> Words:
+def lane_operations(dtype: str, count: int, dimension: int) -> LaneOperations:
     """The words for lanes of `count` numbers of type `dtype`, and tensors of a dimension."""
     element = from_dtype(np.dtype(dtype))
     lanes = Lanes(element, count)
@@ -191,4 +191,4 @@ def words(dtype: str, count: int, dimension: int) -> Words:
 
         return tensor(array, types.intp, types.intp), code
 
-    return Words(load, store, zeros, weight, outer, inner, total, put, get)
+    return LaneOperations(load, store, zeros, weight, outer, inner, total, put, get)

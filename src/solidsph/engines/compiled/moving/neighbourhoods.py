@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.cells import Near
+from solidsph.engines.compiled.moving.search import Near
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.neighbours import Pairs
 
@@ -65,7 +65,7 @@ def fill(near: Near, slopes: Array, rows: Neighbourhoods) -> None:
         cursor[p] = rows.starts[p]
         rows.own[p] += rows.starts[p]
         rows.starts[p + 1] = rows.own[p] + 1 + near.starts[p + 1] - near.starts[p]
-    # Rows are visited in rising order, so neighbours before q arrive in rising order too.
+    # Rows are visited in rising order, so neighbours before q end_velocity in rising order too.
     for p in range(n):
         here = rows.own[p]
         rows.columns[here], rows.slopes[here] = p, 0.0

@@ -1,4 +1,4 @@
-"""CompiledBody: one body whose sums are taken in the reference configuration, made ready."""
+"""ReferenceBody: one body whose sums are taken in the reference configuration, made ready."""
 
 from __future__ import annotations
 
@@ -9,32 +9,32 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.blocks import STRIDE, group
-from solidsph.engines.compiled.chunks import weighted_chunks
 from solidsph.engines.compiled.pointwise import no_law
-from solidsph.engines.compiled.rows import (
+from solidsph.engines.compiled.reference.blocks import STRIDE, group
+from solidsph.engines.compiled.reference.chunks import weighted_chunks
+from solidsph.engines.compiled.reference.partition import (
+    Partition,
+    Passes,
+    aligned,
+    partitioned,
+    passes,
+    spread_pass,
+    thread_count,
+)
+from solidsph.engines.compiled.reference.rows import (
     Rows,
     compressed,
     in_chunks,
 )
-from solidsph.engines.compiled.shares import (
-    Passes,
-    Shares,
-    aligned,
-    passes,
-    shared,
-    spread_pass,
-    thread_count,
-)
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.plan import Operations, Way, vectors
+from solidsph.interfaces.plan import Operations, SumMethod, vectors
 from solidsph.maths.arrays import Array
 from solidsph.model.neighbours import Pairs
 
 
 @final
 @attrs.frozen(eq=False)
-class CompiledBody:
+class ReferenceBody:
     """One body made ready: weights, work space, and the passes over them."""
 
     body: Body
@@ -42,8 +42,8 @@ class CompiledBody:
     gradient: Rows
     force: Rows  # those that are scattered with; the gradient's own for the adjoint divergence
     factors: NDArray[Any]  # (n,) what multiplies the stress before it is scattered
-    gradient_shares: Shares
-    force_shares: Shares
+    gradient_partition: Partition
+    force_partition: Partition
     u: NDArray[Any]  # flat
     passes: Passes
     gradients: Passes  # without a law
@@ -59,7 +59,9 @@ class CompiledBody:
     def bytes(self) -> int:
         """Memory of all arrays."""
         rows = {id(one): one.bytes for one in (self.gradient, self.force)}
-        shares = {id(one): one.buffers.nbytes for one in (self.gradient_shares, self.force_shares)}
+        shares = {
+            id(one): one.buffers.nbytes for one in (self.gradient_partition, self.force_partition)
+        }
         own = self.factors.nbytes + self.u.nbytes
         return own + sum(rows.values()) + sum(shares.values())
 
@@ -77,10 +79,12 @@ class CompiledBody:
         # How many buffers there are depends on the threads of the machine; one is touched at least.
         touched = shared_bytes + self.factors.nbytes + 2 * self.u.nbytes + vectors(n, d)
         held = self.bytes - row_bytes
-        precision, threaded = self.u.itemsize, self.gradient_shares.threaded
+        precision, threaded = self.u.itemsize, self.gradient_partition.threaded
         return (
-            Operations(Way.STENCILS, run_pairs, ran, touched, held, precision, threaded),
-            Operations(Way.ROWS, row_pairs, n - ran, row_bytes, row_bytes, precision, threaded),
+            Operations(SumMethod.STENCILS, run_pairs, ran, touched, held, precision, threaded),
+            Operations(
+                SumMethod.ROWS, row_pairs, n - ran, row_bytes, row_bytes, precision, threaded
+            ),
         )
 
     @property
@@ -95,7 +99,7 @@ class CompiledBody:
 
     def forces(self, displacements: Array, out: Array) -> None:
         """Forces (n, d) of a fused body from displacements (n, d)."""
-        shares = self.gradient_shares
+        shares = self.gradient_partition
         shares.check()
         self.passes.forces(
             shares.table,
@@ -118,9 +122,9 @@ class CompiledBody:
         self._stress(self.gradients, displacements, out.transpose(1, 2, 0))
 
     def _stress(self, passes: Passes, displacements: Array, out: Array) -> None:
-        self.gradient_shares.check()
+        self.gradient_partition.check()
         passes.stress(
-            self.gradient_shares.table,
+            self.gradient_partition.table,
             self.gradient,
             displacements,
             self.u,
@@ -134,14 +138,14 @@ class CompiledBody:
         acts = self.body.formulation.divergence.uses_ghost_stress
         if not acts:
             stress[:, :, ghosts] = 0.0
-        shares = self.force_shares
+        shares = self.force_partition
         self.spread_pass(shares.table, self.force, stress, self.factors, shares.buffers, out)
         if acts:
             # Ghosts have acted through their stress; nothing acts on them.
             out[ghosts] = 0.0
 
 
-def compiled_body(body: Body, law: Any, dtype: str) -> CompiledBody:
+def reference_body(body: Body, law: Any, dtype: str) -> ReferenceBody:
     particles, divergence = body.particles, body.formulation.divergence
     n, d = particles.count, particles.dimension
     shortest_run = max(2, group(d, dtype) // 2)
@@ -170,16 +174,18 @@ def compiled_body(body: Body, law: Any, dtype: str) -> CompiledBody:
         force = compressed(in_chunks(pairs, weights), d, dtype, shortest_run)
         factors = np.ones(n)
     threads = thread_count(count)
-    gradient_shares = shared(gradient, d, dtype, threads)
-    force_shares = gradient_shares if divergence.adjoint else shared(force, d, dtype, threads)
-    return CompiledBody(
+    gradient_partition = partitioned(gradient, d, dtype, threads)
+    force_partition = (
+        gradient_partition if divergence.adjoint else partitioned(force, d, dtype, threads)
+    )
+    return ReferenceBody(
         body=body,
         law=law,
         gradient=gradient,
         force=force,
         factors=factors.astype(dtype),
-        gradient_shares=gradient_shares,
-        force_shares=force_shares,
+        gradient_partition=gradient_partition,
+        force_partition=force_partition,
         # Loops over runs read beyond the last particle by up to a group.
         u=aligned((n + group(d, dtype)) * STRIDE[d], dtype),
         passes=passes(d, dtype, law, threads > 1),

@@ -1,4 +1,4 @@
-"""Shares: which blocks each thread sweeps, and where it adds up its forces.
+"""Partition: which blocks each thread sweeps, and where it adds up its forces.
 
 A thread scatters into a buffer of its own, over its particles and those within reach. Buffers are
 summed in order, so the same number of threads gives the same bits.
@@ -16,9 +16,9 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.blocks import STRIDE, group
-from solidsph.engines.compiled.rows import Rows
-from solidsph.engines.compiled.sweeps import spread_sweep, sweeps
+from solidsph.engines.compiled.reference.block_sweeps import block_sweeps, spread_sweep
+from solidsph.engines.compiled.reference.blocks import STRIDE, group
+from solidsph.engines.compiled.reference.rows import Rows
 from solidsph.engines.compiled.threads import check_alive, started
 from solidsph.maths.arrays import Indices
 
@@ -39,7 +39,7 @@ def thread_count(operations: int) -> int:
 
 
 @attrs.frozen(eq=False)
-class Shares:
+class Partition:
     """The division of rows among threads."""
 
     # (t, 5) for each thread: its first block, the one after its last, the first particle that it
@@ -62,7 +62,7 @@ class Shares:
             check_alive()
 
 
-def shared(rows: Rows, dimension: int, dtype: str, threads: int) -> Shares:
+def partitioned(rows: Rows, dimension: int, dtype: str, threads: int) -> Partition:
     """Blocks divided among `threads` by the work that they are."""
     done = np.concatenate([[0.0], np.cumsum(rows.costs())])
     edges = np.searchsorted(done, done[-1] * np.arange(threads + 1) / threads)
@@ -78,7 +78,7 @@ def shared(rows: Rows, dimension: int, dtype: str, threads: int) -> Shares:
         table[share] = first, last, a, b, end - a * stride
         # Loops over runs go beyond the last particle by up to a group.
         end += -(-(b - a + margin) * stride // line) * line
-    return Shares(table, aligned(end, dtype))
+    return Partition(table, aligned(end, dtype))
 
 
 def aligned(count: int, dtype: str) -> NDArray[Any]:
@@ -123,7 +123,7 @@ class Passes(NamedTuple):
 def passes(dimension: int, dtype: str, law: Any, threaded: bool) -> Passes:
     """Passes for one dimension, number type and compiled law (H, params) -> T."""
     place, cleared, total = _fields(dimension, dtype, threaded)
-    sweep_forces, sweep_stress = sweeps(dimension, dtype, law)
+    sweep_forces, sweep_stress = block_sweeps(dimension, dtype, law)
 
     @njit(parallel=threaded)
     def forces(table, rows, displacements, u, params, factors, buffers, out):
@@ -145,7 +145,7 @@ def passes(dimension: int, dtype: str, law: Any, threaded: bool) -> Passes:
 
 @cache
 def spread_pass(dimension: int, dtype: str, threaded: bool) -> Any:
-    """Pass (table, rows, stress (d, d, n), factors, buffers, forces (n, d)) for any law."""
+    """LoadKind (table, rows, stress (d, d, n), factors, buffers, forces (n, d)) for any law."""
     _, cleared, total = _fields(dimension, dtype, threaded)
     sweep = spread_sweep(dimension, dtype)
 
