@@ -10,7 +10,6 @@ from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.compilable_terms import (
     LinearExtension,
     PairLoad,
-    PairTable,
     PointwiseLoad,
     ScheduledConstraint,
     ScheduledLoad,
@@ -29,6 +28,7 @@ from solidsph.interfaces.integrator import Integrator, PointwiseIntegrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.law import Law, memory_name
 from solidsph.interfaces.material import Material
+from solidsph.interfaces.pair_table import PairTable
 from solidsph.interfaces.plan import BodySize, Compilation, Operations, Plan
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel, smoothing_kernel

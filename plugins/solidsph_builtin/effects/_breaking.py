@@ -14,6 +14,7 @@ from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import InternalForces, StressFields
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.law import Law, memory_name
+from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.plan import Operations
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Mask
@@ -147,8 +148,8 @@ class BreakingForces(InternalForces):
         return self.advance(time, 0.0, displacements, {})[0]
 
     def advance(
-        self, time: float, step: float, displacements: Array, memory: Mapping[str, Array]
-    ) -> tuple[Array, Mapping[str, Array]]:
+        self, time: float, step: float, displacements: Array, memory: Memory
+    ) -> tuple[Array, Memory]:
         flags = self._remembered(memory)
         kept = {one.name: own for one, own in zip(self.bonds, flags, strict=True)}
         if step > 0.0:
@@ -170,9 +171,7 @@ class BreakingForces(InternalForces):
             kept[_RELEASED] = released - self._spared(flags, memory, histories)
         return forces, {**kept, **histories}
 
-    def _spared(
-        self, flags: Sequence[Array], memory: Mapping[str, Array], after: Mapping[str, Array]
-    ) -> Array:
+    def _spared(self, flags: Sequence[Array], memory: Memory, after: Mapping[str, Array]) -> Array:
         """What laws count as dissipated in a step beyond the part that damage leaves, (n,) [J/m^3].
 
         A law knows nothing of damage; its stress is scaled by 1 - D, and so is what it dissipates.
@@ -191,7 +190,7 @@ class BreakingForces(InternalForces):
     def fields(self, displacements: Array) -> StressFields:
         return self.observed(displacements, {})
 
-    def observed(self, displacements: Array, memory: Mapping[str, Array]) -> StressFields:
+    def observed(self, displacements: Array, memory: Memory) -> StressFields:
         found = self._observed(self._remembered(memory), displacements, memory)
         dissipated = found.dissipated_densities
         released = self._released(memory, displacements)
@@ -199,7 +198,7 @@ class BreakingForces(InternalForces):
         return attrs.evolve(found, dissipated_densities=total)
 
     def _observed(
-        self, flags: tuple[Array, ...], displacements: Array, memory: Mapping[str, Array]
+        self, flags: tuple[Array, ...], displacements: Array, memory: Memory
     ) -> StressFields:
         found = self._of(flags).observed(displacements, memory)
         for one, own in zip(self.bonds, flags, strict=True):
@@ -216,10 +215,10 @@ class BreakingForces(InternalForces):
         whole = tuple(one.whole() for one in self.bonds)
         return self._of(whole).spread(displacements, stress)
 
-    def _remembered(self, memory: Mapping[str, Array]) -> tuple[Array, ...]:
+    def _remembered(self, memory: Memory) -> tuple[Array, ...]:
         return tuple(memory[one.name] if one.name in memory else one.whole() for one in self.bonds)
 
-    def _released(self, memory: Mapping[str, Array], displacements: Array) -> Array:
+    def _released(self, memory: Memory, displacements: Array) -> Array:
         """Strain energy let go so far, (n,) [J/m^3]."""
         return memory.get(_RELEASED, np.zeros(len(displacements)))
 

@@ -10,7 +10,7 @@ import attrs
 from solidsph.interfaces.compilable_terms import ScheduledLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.interfaces.terms import Load, Observation
+from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField, scheduled_forces
 from solidsph.model.regions import Where
@@ -58,6 +58,3 @@ class _MassTimesField(ScheduledLoad):
 
     def schedule(self, times: Array) -> Array:
         return scheduled_forces(self.field, self.positions, self.masses, times)
-
-    def report(self, observation: Observation) -> Mapping[str, float]:
-        return {}

@@ -14,6 +14,7 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.interfaces.terms import (
     EnergyTerm,
@@ -191,13 +192,8 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         return np.asarray(forces[self.particles])
 
     def advance(
-        self,
-        time: float,
-        step: float,
-        positions: Array,
-        velocities: Array,
-        memory: Mapping[str, Array],
-    ) -> tuple[Array, Mapping[str, Array]]:
+        self, time: float, step: float, positions: Array, velocities: Array, memory: Memory
+    ) -> tuple[Array, Memory]:
         forces: Array | None = None
         slips: dict[str, Array] = {}
         asleep = 0
@@ -224,7 +220,7 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         positions: Array,
         velocities: Array,
         step: float,
-        memory: Mapping[str, Array],
+        memory: Memory,
     ) -> tuple[Array | None, Mapping[str, Array]]:
         """Force on the particles of a meeting, (m, d), if there is any, and the new stretches."""
         if not self._rubs(meeting):
@@ -286,7 +282,7 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         # On a line there is no way to slide.
         return self.friction > 0.0 and meeting.kernel.dimension > 1
 
-    def _slip(self, meeting: Meeting, memory: Mapping[str, Array]) -> Array:
+    def _slip(self, meeting: Meeting, memory: Memory) -> Array:
         none = (len(meeting.particles), meeting.kernel.dimension)
         return memory.get(self._slip_name(meeting), np.zeros(none))
 

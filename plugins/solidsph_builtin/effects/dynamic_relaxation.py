@@ -11,6 +11,7 @@ import numpy as np
 from solidsph.errors import SceneError
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.terms import Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.registry.parameters import number
@@ -80,13 +81,8 @@ class _Relaxation(Load):
         return np.zeros_like(velocities)  # before any step nothing is known of the motion
 
     def advance(
-        self,
-        time: float,
-        step: float,
-        positions: Array,
-        velocities: Array,
-        memory: Mapping[str, Array],
-    ) -> tuple[Array, Mapping[str, Array]]:
+        self, time: float, step: float, positions: Array, velocities: Array, memory: Memory
+    ) -> tuple[Array, Memory]:
         last, rate = (memory.get(self._named(name)) for name in ("last velocity", "rate"))
         c = 0.0 if rate is None else float(rate[0])
         if step == 0.0:

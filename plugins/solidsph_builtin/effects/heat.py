@@ -17,6 +17,7 @@ from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.material import Material
+from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.terms import FieldTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices, Tensor
 from solidsph.maths.tensors import particles_first
@@ -24,7 +25,7 @@ from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import Where
 from solidsph.registry.parameters import check_positive, number
 from solidsph.run.stable_step import lattice_frequency
-from solidsph_builtin.effects._gradients import BodyGradient, in_the_reference
+from solidsph_builtin.effects._gradients import BodyGradient, in_the_reference, real_pairs
 
 # Of the largest stable step of the explicit rule, by which heat advances within a step.
 _PART = 0.9
@@ -128,8 +129,7 @@ def _conduction(bodies: Sequence[Body], conductivity: float) -> csr_array:
     rows, columns, values = [], [], []
     for body in bodies:
         pairs, particles = body.pairs(), body.particles
-        real = ~particles.ghosts
-        acts = (pairs.distances > 0.0) & real[pairs.rows] & real[pairs.columns]
+        acts = real_pairs(body, pairs)
         a, b, R = pairs.rows[acts], pairs.columns[acts], pairs.distances[acts]
         V, slope = particles.volumes, np.abs(body.smoothing.slope(R))
         # The second moment of a full neighbourhood, which the integral makes 1.
@@ -179,7 +179,7 @@ class _Conduction(FieldTerm, Load):
     def _name(self) -> str:
         return f"{self.label}: temperature"
 
-    def temperature(self, memory: Mapping[str, Array]) -> Array:
+    def temperature(self, memory: Memory) -> Array:
         """T (n,) [K] of a state with this memory."""
         return memory.get(self._name, self._holding(0.0, self.start))
 
@@ -187,13 +187,8 @@ class _Conduction(FieldTerm, Load):
         return self.advance(time, 0.0, positions, velocities, {})[0]
 
     def advance(
-        self,
-        time: float,
-        step: float,
-        positions: Array,
-        velocities: Array,
-        memory: Mapping[str, Array],
-    ) -> tuple[Array, Mapping[str, Array]]:
+        self, time: float, step: float, positions: Array, velocities: Array, memory: Memory
+    ) -> tuple[Array, Memory]:
         T = self.temperature(memory)
         if step > 0.0:
             T = self._conducted(T, time, step)

@@ -9,12 +9,10 @@ import attrs
 import numpy as np
 
 from solidsph.engines.hourglass import hourglass_operator
-from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.compilable_terms import HourglassLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassPairs
 from solidsph.interfaces.terms import (
     EnergyTerm,
@@ -24,6 +22,7 @@ from solidsph.interfaces.terms import (
 )
 from solidsph.maths.arrays import Array
 from solidsph.registry.parameters import check_positive, number
+from solidsph_builtin.effects._gradients import in_the_reference, real_pairs
 
 # Pairs count where their weight, relative to that of particles one spacing apart, is above this. On
 # lattices with a cover near 3 those are the 2, 8 or 26 around a particle, which hold 98 % of the
@@ -68,12 +67,7 @@ class HourglassControl(Effect):
         check_positive("hourglass-control", "strength", self.strength, "times mu, near 0.5")
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
-        for body in model.bodies:
-            if body.formulation.configuration is not Configuration.REFERENCE:
-                raise SceneError(
-                    "hourglass-control: it is written in the reference configuration, but the "
-                    f"formulation of body {body.name!r} follows the motion; use 'total-lagrangian'"
-                )
+        in_the_reference(model, "hourglass-control")
         return _Control(
             label=label,
             reference=model.particles.positions,
@@ -90,8 +84,7 @@ def penalised(body: Body, strength: float) -> HourglassPairs:
     """Near pairs with c_ab = strength mu V_a V_b W(X_ab) / |X_ab|^2; ghosts have none."""
     particles = body.particles
     pairs = body.pairs(_reach(body))
-    real = ~particles.ghosts
-    apart = (pairs.distances > 0.0) & real[pairs.rows] & real[pairs.columns]
+    apart = real_pairs(body, pairs)
     weights = np.zeros(pairs.count)
     r, a, b = pairs.distances[apart], pairs.rows[apart], pairs.columns[apart]
     _, mu = body.material.lame_parameters

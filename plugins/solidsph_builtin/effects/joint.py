@@ -13,9 +13,10 @@ from scipy.spatial import cKDTree
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.compilable_terms import PairLoad, PairTable
+from solidsph.interfaces.compilable_terms import PairLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.pair_table import PairTable
 from solidsph.interfaces.terms import EnergyTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices, Scalar, Vector
 from solidsph.maths.tensors import dot
@@ -117,9 +118,7 @@ class _Found:
         rows = np.concatenate([self.one, self.other])
         columns = np.concatenate([self.other, self.one])
         values = np.tile(np.column_stack([self.stiffness, self.length]), (2, 1))
-        order = np.lexsort((columns, rows))
-        starts = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=count))])
-        return PairTable(starts.astype(np.intp), columns[order].astype(np.int32), values[order])
+        return PairTable.of(rows, columns, values, count)
 
 
 _FIELDS = tuple(field.name for field in attrs.fields(_Found))

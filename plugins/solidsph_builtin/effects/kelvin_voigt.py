@@ -12,7 +12,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.interfaces.terms import Load, Observation
+from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array, Indices, Tensor
 from solidsph.maths.tensors import add, identity, product, scale, trace, transpose
 from solidsph.registry.parameters import check_positive, number
@@ -115,6 +115,3 @@ class _Dashpot(Load):
             S = _viscous_stress(gradient.body, scale(0.5, add(half, transpose(half))))
             forces[extent] = gradient.forces(self.time * np.array(product(F, S)))
         return forces
-
-    def report(self, observation: Observation) -> Mapping[str, float]:
-        return {}

@@ -13,6 +13,7 @@ from scipy.sparse import bsr_array, csr_array
 from solidsph.errors import SceneError
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.terms import (
     EnergyTerm,
     FieldTerm,
@@ -167,13 +168,8 @@ class _Wall(EnergyTerm, FieldTerm, Load):
         return np.asarray(self.pressed(time, positions)[:, None] * self.normal)
 
     def advance(
-        self,
-        time: float,
-        step: float,
-        positions: Array,
-        velocities: Array,
-        memory: Mapping[str, Array],
-    ) -> tuple[Array, Mapping[str, Array]]:
+        self, time: float, step: float, positions: Array, velocities: Array, memory: Memory
+    ) -> tuple[Array, Memory]:
         if not self.friction:
             return self.forces(time, positions, velocities), {}
         pressed = self.pressed(time, positions)
@@ -221,7 +217,7 @@ class _Wall(EnergyTerm, FieldTerm, Load):
     def fields(self, observation: Observation) -> Mapping[str, Array]:
         return {f"{self.label} force [N]": observation.state.applied[self.label]}
 
-    def _slip(self, memory: Mapping[str, Array]) -> Array:
+    def _slip(self, memory: Memory) -> Array:
         return memory.get(self._slip_name, np.zeros((len(self.particles), len(self.point))))
 
     @property

@@ -1,4 +1,4 @@
-"""A kernel made ready for use: normalised in one dimension, cut at its support radius."""
+"""SmoothingKernel: a kernel normalised in one dimension and cut off at its support radius."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from solidsph.errors import PluginError
 from solidsph.interfaces.kernel import Kernel
 from solidsph.maths.arrays import Array
 
-# Surface of the unit sphere in 1, 2 and 3 dimensions.
 UNIT_SPHERE = {1: 2.0, 2: 2.0 * pi, 3: 4.0 * pi}
+"""Surface of the unit sphere, by dimension."""
 
-# The edge value that rounding may leave of a profile that is zero there by formula.
+# Largest value at the edge, relative to the maximum, that rounding may leave of a zero.
 _EDGE_TOLERANCE = 1e-12
 
 COMPLEX_STEP = 1e-40
-"""Along the imaginary axis: far below any q, so that its square is nothing, and no difference
-is taken that could cancel."""
+"""Step along the imaginary axis: so far below any q that its square vanishes; no difference
+that could cancel is taken."""
 
 
 @attrs.frozen(eq=False)
 class SmoothingKernel:
-    """W(r) = sigma_d / H^d w(r / H), zero from r = H on."""
+    """W(r) = sigma_d / H^d w(r / H), zero for r >= H."""
 
     kernel: Kernel
     dimension: int
@@ -33,14 +33,14 @@ class SmoothingKernel:
     normalisation: float  # sigma_d [-]
 
     def value(self, distances: Array) -> Array:
-        """W(r) for r (m,) [m^-d]."""
+        """W(r) at distances r (m,) [m], (m,) [m^-d]."""
         q = np.asarray(distances) / self.support_radius
         inside = q < 1.0
         w = self.kernel.profile(np.where(inside, q, 0.0), self.kernel.params)
         return np.where(inside, w, 0.0) * (self.normalisation / self.support_radius**self.dimension)
 
     def slope(self, distances: Array) -> Array:
-        """dW/dr for r (m,) [m^-(d+1)]."""
+        """dW/dr at distances r (m,) [m], (m,) [m^-(d+1)]."""
         q = np.asarray(distances) / self.support_radius
         inside = q < 1.0
         dw = profile_slope(self.kernel, np.where(inside, q, 0.0))
@@ -48,18 +48,17 @@ class SmoothingKernel:
         return np.where(inside, dw, 0.0) * factor
 
     def gradient(self, offsets: Array, distances: Array) -> Array:
-        """Derivative of W(x_p - x_q) by x_p, (m, d), from offsets x_q - x_p (m, d)."""
+        """Derivative of W(x_p - x_q) by x_p, (m, d) [m^-(d+1)], from offsets x_q - x_p [m]."""
         return -self.slope_by_distance(distances)[:, None] * offsets
 
     def slope_by_distance(self, distances: Array) -> Array:
-        """dW/dr / r for r (m,) [m^-(d+2)], and 0 at r = 0, where a direction has no meaning."""
-        # The slope of a smooth kernel vanishes there.
+        """dW/dr / r at distances r (m,) [m], (m,) [m^-(d+2)]; 0 at r = 0."""
         safe = np.where(distances > 0.0, distances, 1.0)
         return np.where(distances > 0.0, self.slope(distances) / safe, 0.0)
 
 
 def profile_slope(kernel: Kernel, q: Array) -> Array:
-    """dw/dq of a kernel's profile: its author's formula, or a complex step through `profile`."""
+    """dw/dq of a kernel: the author's formula, or a complex step through `profile`."""
     slope = kernel.slope(q, kernel.params)
     if slope is not None:
         return np.asarray(slope, dtype=np.float64)
@@ -68,7 +67,11 @@ def profile_slope(kernel: Kernel, q: Array) -> Array:
 
 
 def profile_mass(kernel: Kernel, dimension: int) -> float:
-    """Integral of the profile over the unit ball, by Gauss-Legendre panels between the knots."""
+    """Integral of the profile over the unit ball, by Gauss-Legendre panels between the knots.
+
+    Raises:
+        PluginError: two numbers of panels give different values.
+    """
     ends = np.array([0.0, *sorted(kernel.knots), 1.0])
     masses = [_panel_mass(kernel, dimension, ends, panels) for panels in (32, 64)]
     if not isclose(*masses, rel_tol=1e-13, abs_tol=0.0):
@@ -94,7 +97,7 @@ def _panel_mass(kernel: Kernel, dimension: int, ends: Array, panels: int) -> flo
 
 
 def check_profile(kernel: Kernel) -> None:
-    """Raise PluginError if the profile is not a weight: infinite, negative, or cut at its edge."""
+    """Raise PluginError unless the profile is finite, not negative and zero at its edge."""
     name = type(kernel).__name__
     q = np.linspace(0.0, 1.0, 2001)[:-1]
     try:
@@ -140,7 +143,7 @@ def check_profile(kernel: Kernel) -> None:
 
 
 def _check_slope(kernel: Kernel, q: Array, w: Array) -> None:
-    """The slope must be that of the profile: its trapezoidal integral is the profile's change."""
+    """Raise PluginError unless the trapezoidal integral of the slope is the profile's change."""
     try:
         with np.errstate(all="ignore"):
             slope = profile_slope(kernel, q)
@@ -151,7 +154,7 @@ def _check_slope(kernel: Kernel, q: Array, w: Array) -> None:
         ) from cause
     change = 0.5 * (slope[1:] + slope[:-1]) * np.diff(q)
     wrong = np.abs(change - np.diff(w))
-    # Steps of 1/2000: the rule's own error is some 1e-10 of a smooth profile, 1e-6 at a kink.
+    # In steps of 1/2000 the error of the rule is about 1e-10 for a smooth profile, 1e-6 at a kink.
     if not np.all(wrong < 1e-5 * w.max()):
         worst = q[int(np.argmax(np.where(np.isfinite(wrong), wrong, np.inf)))]
         raise PluginError(

@@ -13,7 +13,8 @@ import attrs
 import numpy as np
 
 from solidsph.interfaces.engine import InternalForces
-from solidsph.interfaces.equation_of_motion import NOTHING, EquationOfMotion, Response
+from solidsph.interfaces.equation_of_motion import EquationOfMotion, Response
+from solidsph.interfaces.memory import NOTHING
 from solidsph.interfaces.terms import (
     GhostConstraint,
     Observation,

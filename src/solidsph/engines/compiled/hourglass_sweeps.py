@@ -78,7 +78,7 @@ class HourglassSweeps(HourglassOperator):
         body = pairs.body
         n, d = body.particles.positions.shape
         # Beside the near pairs there are those of the gradient, twice.
-        threads = thread_count(3 * len(pairs.columns))
+        threads = thread_count(3 * len(pairs.table.columns))
         shares = partitioned(rows, d, _DTYPE, threads)
         arrays = HourglassArrays(
             extent=(body.extent.start, body.extent.stop),
@@ -87,8 +87,8 @@ class HourglassSweeps(HourglassOperator):
             flat=aligned((n + group(d, _DTYPE)) * STRIDE[d], _DTYPE),
             factors=-body.particles.volumes,
             buffers=shares.buffers,
-            starts=pairs.starts,
-            columns=pairs.columns,
+            starts=pairs.table.starts,
+            columns=pairs.table.columns,
             weights=pairs.weights,
             positions=body.particles.positions,
             jets=np.empty((n, d, 1 + d)),

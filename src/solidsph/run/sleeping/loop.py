@@ -43,8 +43,13 @@ _LARGEST = "sleep: largest speed"
 def check_sleep(simulation: BuiltScene) -> None:
     """Raise SceneError if a part of the scene cannot sleep."""
     dynamics = simulation.dynamics
-    dynamics.internal.check_parts()
     none = np.empty(0, dtype=np.intp)
+    if dynamics.internal.part(none) is None:
+        raise SceneError(
+            f"sleep: {type(dynamics.internal).__name__} cannot form the forces of some particles "
+            "alone; use one body of the total Lagrangian form whose material has no history, "
+            "without ghosts, or leave [sleep] out"
+        )
     nobody, free = (
         Subset.of(none, dynamics.particles.count),
         np.zeros(dynamics.particles.count, bool),
@@ -181,6 +186,7 @@ class SleepingLoop(TimeLoop):
         asleep = ~awake[slabs.of]
         moving = np.flatnonzero(~asleep[chosen.particles])
         internal = whole.internal.part(chosen.particles)
+        assert internal is not None, "`check_sleep` has refused it"
         still = np.flatnonzero(asleep[chosen.particles])
         u = full.x[chosen.particles] - whole.particles.positions[chosen.particles]
         constraints = [one.part(chosen, asleep) for one in whole.constraints]
