@@ -233,7 +233,7 @@ def test_compiled_by_several_threads(
     simulation = block(2, arrangement, lengths=[4.0, 6.0], formulation=formulation).build()
     reference = prepared(MatrixEngine(), simulation)
     forces = compiled(simulation)
-    assert forces.parts[0].gradient_shares.threaded
+    assert forces.parts[0].gradient_partition.threaded
     u = random_displacements(simulation)
     assert_same(forces, reference, u)
     assert np.array_equal(forces.forces(0.0, u), forces.forces(0.0, u))

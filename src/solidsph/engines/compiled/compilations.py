@@ -1,4 +1,4 @@
-"""What the compiled engine has to compile, each piece once a process and kind."""
+"""What the compiled engine has to compile, each unit once per process and key."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from solidsph.interfaces.terms import GhostConstraint, StressTerm
 def of_forces(
     parts: Sequence[ReferenceBody | MovingBody], stress_terms: Sequence[StressTerm]
 ) -> Iterator[Compilation]:
-    """For one evaluation of the internal forces."""
+    """Compilations for one evaluation of the internal forces."""
     operations = [o for part in parts for o in part.operations]
     threaded = any(o.threaded for o in operations)
     d = parts[0].body.particles.dimension
@@ -40,16 +40,16 @@ def of_forces(
 def of_steps(
     parts: Sequence[ReferenceBody], equation: EquationOfMotion, integrator: Integrator
 ) -> Iterator[Compilation]:
-    """For whole steps, besides."""
+    """Additional compilations for whole steps."""
     d = equation.particles.dimension
     threaded = any(o.threaded for part in parts for o in part.operations)
     kinds = tuple(sorted(type(one).__name__ for one in (*equation.constraints, *equation.loads)))
     laws = frozenset(_law(part) for part in parts)
     yield Compilation(CompilationUnit.STEPS, d, threaded, (type(integrator), laws, kinds))
     for load in equation.loads:
-        piece = kind_of(load).unit
-        key = None if piece is CompilationUnit.LOAD and not kind_of(load).formula else type(load)
-        yield Compilation(piece, d, threaded, key)
+        unit = kind_of(load).unit
+        key = None if unit is CompilationUnit.LOAD and not kind_of(load).formula else type(load)
+        yield Compilation(unit, d, threaded, key)
     if any(isinstance(one, GhostConstraint) for one in equation.constraints):
         yield Compilation(CompilationUnit.EXTENSION, d, threaded)
 

@@ -1,9 +1,10 @@
-"""The compiled engine's plan for bodies that are not built."""
+"""The plan of the compiled engine for bodies that are not built yet."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from solidsph.engines.compiled.constants import STRIDE, WORTH_A_THREAD
 from solidsph.interfaces.plan import (
     BodySize,
     Compilation,
@@ -14,14 +15,9 @@ from solidsph.interfaces.plan import (
     vectors,
 )
 
-# Numbers kept for a vector, by dimension; and from so many pairs on, threads share a sum. As in the
-# engine itself, which brings the compiler with it.
-_STRIDE = {1: 1, 2: 2, 3: 4}
-_THREADED = 200_000
-
 
 def expected_plan(sizes: Sequence[BodySize], precision: int = 8) -> Plan:
-    """The plan for bodies of these sizes; `precision` is that of the sums [bytes of a number]."""
+    """The plan for bodies of these sizes; `precision` is that of the sums [bytes per number]."""
     d, moving = sizes[0].dimension, any(size.moving for size in sizes)
     if moving:
         pieces = [
@@ -46,8 +42,8 @@ def _operations(size: BodySize, precision: int) -> Iterator[Operations]:
         yield Operations(SumMethod.FORMULAS, m, n, held + both, held)
         return
     # Factors, flat displacements, and buffers for the forces.
-    own = precision * n * (1 + 2 * _STRIDE[d])
-    threaded = m > _THREADED
+    own = precision * n * (1 + 2 * STRIDE[d])
+    threaded = m > WORTH_A_THREAD
     if size.lattice:
         yield Operations(SumMethod.STENCILS, m, n, own + both, own, precision, threaded)
         return

@@ -1,4 +1,4 @@
-"""Chain: compiled functions of different kinds of parts, called one after the other."""
+"""Compiled functions of parts of different types, called one after the other."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from numba import njit
 
 @cache
 def call_each(functions: tuple[Any, ...]) -> Any:
-    """Compiled (parts, *arguments): calls the k-th function with the k-th part and the arguments.
+    """Compiled (parts, *arguments) that calls the k-th function with the k-th part and these.
 
-    Parts may be of different types, so the call_each is unrolled when it compiles, and what is not
-    there leaves no code.
+    Parts may be of different types, so the calls are unrolled; without parts there is no code.
     """
     if not functions:
 

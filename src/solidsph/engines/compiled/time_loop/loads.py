@@ -1,4 +1,4 @@
-"""Loads in the compiled loop: their forces, and the work that they do."""
+"""Loads in the compiled loop: their forces and their work."""
 
 from __future__ import annotations
 
@@ -25,18 +25,17 @@ from solidsph.interfaces.compilable_terms import (
     PointwiseLoad,
     ScheduledLoad,
 )
-from solidsph.interfaces.hourglass_energy import HourglassOperator
 from solidsph.interfaces.plan import CompilationUnit
 from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array, Indices
 
 
 class LoadData(NamedTuple):
-    """What the loop holds of one load; `own` is what its kind needs."""
+    """The data of one load; `own` is specific to its kind."""
 
     particles: Indices  # (k,)
     before: Array  # (k, d) force at the end of the last step [N]
-    work: Array  # (threads,) done so far, by thread [J]
+    work: Array  # (threads,) so far, by thread [J]
     own: Any
 
 
@@ -47,7 +46,7 @@ class ScheduledForces(NamedTuple):
 
 
 class PointwiseData(NamedTuple):
-    """Forces by a formula."""
+    """Forces by a formula of each particle."""
 
     reference: Array  # (n, d) X [m]
     values: Array  # (k, m)
@@ -66,42 +65,42 @@ class HourglassData(NamedTuple):
     """Hourglass forces."""
 
     bodies: tuple[HourglassArrays, ...]
-    now: ScheduledForces  # those of the step in hand
+    now: ScheduledForces  # of the current step
 
 
 class CompiledLoad(NamedTuple):
-    """A load made ready for the loop."""
+    """A load prepared for the loop."""
 
     apply: Any  # compiled (load, step, u, v, path, total): total += force, work += that along path
-    own: Callable[[Array], Any]  # times (t,) at which the steps to come end -> what its kind needs
+    own: Callable[[Array], Any]  # times (t,) at which the steps to come end -> `LoadData.own`
 
 
 class LoadKind(NamedTuple):
-    """How loads of one kind become part of the loop."""
+    """How loads of one kind are compiled into the loop."""
 
     kind: Any  # a class of loads
     prepare: Callable[[Any, Array, bool], CompiledLoad]  # (load, X (n, d), threaded)
     piece: CompilationUnit
-    formula: bool = True  # whether each class of the kind compiles anew
+    formula: bool = True  # True if each class of the kind is compiled separately
 
 
 def kind_of(load: Load) -> LoadKind:
-    """The pass of a load's kind.
+    """The kind of a load.
 
     Raises:
-        NotCompilableError: the loop knows no such kind.
+        NotCompilableError: the loop does not know its kind.
     """
     for known in LOAD_KINDS:
         if isinstance(load, known.kind):
             return known
-    raise NotCompilableError(f"load {load.label!r} is not of a kind that the loop knows")
+    raise NotCompilableError(f"load {load.label!r} is not of a compilable kind")
 
 
 def compiled_load(load: Load, reference: Array, threaded: bool) -> CompiledLoad:
-    """A load on particles whose X is `reference` (n, d) [m], made ready.
+    """A load on particles with reference positions (n, d) [m], prepared.
 
     Raises:
-        NotCompilableError: the loop knows no such kind, or its formula does not compile.
+        NotCompilableError: the loop does not know its kind, or its formula does not compile.
     """
     return kind_of(load).prepare(load, reference, threaded)
 
@@ -116,7 +115,10 @@ def _prepare_scheduled(load: ScheduledLoad, reference: Array, threaded: bool) ->
 
 def _prepare_hourglass(load: HourglassLoad, reference: Array, threaded: bool) -> CompiledLoad:
     d = reference.shape[1]
-    sweeps = [_sweeps(operator) for operator in load.operators]
+    sweeps = [
+        one if isinstance(one, HourglassSweeps) else HourglassSweeps.of(one.pairs)
+        for one in load.operators
+    ]
     own = HourglassData(
         tuple(one.arrays for one in sweeps), ScheduledForces(np.zeros((1, *reference.shape)))
     )
@@ -148,12 +150,12 @@ LOAD_KINDS = (
     LoadKind(PairLoad, _prepare_pairs, CompilationUnit.PAIR_LOAD),
     LoadKind(PointwiseLoad, _prepare_pointwise, CompilationUnit.LOAD),
 )
-"""Kinds of load that the loop knows."""
+"""The kinds of load that the loop can compile."""
 
 
 @cache
 def _accounted(fill: Any, dimension: int, threaded: bool) -> Any:
-    # Threads are handed arrays, or arguments that are tuples of them, but no tuple within a tuple.
+    # Threads can take arrays or tuples of arrays as arguments, but no nested tuples.
     @njit(parallel=threaded)
     def add(particles, before, works, own, step, u, v, path, total):
         threads, count = len(works), len(particles)
@@ -208,7 +210,7 @@ def _paired(pull: Any, dimension: int, count: int) -> Any:
         force[:] = 0.0
         for k in range(own.starts[p], own.starts[p + 1]):
             q = own.columns[k]
-            # Differences first: the offset of q from p is then minus that of p from q to the bit.
+            # Differences first, so that the offset of q from p is exactly minus that of p from q.
             apart = moved(row(own.reference, q), -1.0, X_p)
             offset = moved(apart, 1.0, moved(row(u, q), -1.0, u_p))
             velocity = moved(row(v, q), -1.0, v_p)
@@ -217,12 +219,6 @@ def _paired(pull: Any, dimension: int, count: int) -> Any:
                 force[i] += s * offset[i]
 
     return fill
-
-
-def _sweeps(operator: HourglassOperator) -> HourglassSweeps:
-    if isinstance(operator, HourglassSweeps):
-        return operator
-    return HourglassSweeps.of(operator.pairs)
 
 
 @cache

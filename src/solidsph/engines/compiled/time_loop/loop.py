@@ -1,4 +1,4 @@
-"""The compiled time loop: whole steps without Python between two outputs."""
+"""The compiled time loop: whole steps between two outputs as one compiled function."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ from solidsph.model.particles import State
 if TYPE_CHECKING:
     from solidsph.engines.compiled.reference.body import ReferenceBody
 
-# Operations for every particle in a step, beside those for pairs.
+# Operations per particle and step, besides those for pairs.
 _PER_PARTICLE = 10
 
-# Numbers in the tables of what varies in time, for the steps that go together.
+# Largest number of entries in the tables of scheduled values, for the steps that go together.
 _TABLE = 1 << 18
 
-# Operations of about a nanosecond in these steps: an interruption waits for so long.
+# Largest number of operations of about a nanosecond in these steps, for which an interruption waits.
 _AT_ONCE = 3e8
 
 
@@ -60,7 +60,7 @@ class _Moving(NamedTuple):
     v: Array  # velocity [m/s]
     a: Array  # acceleration [m/s^2]
     h: Array  # mean velocity of the last step [m/s]
-    path: Array  # way of the last step [m]
+    path: Array  # displacement in the last step [m]
     total: Array  # force [N]
 
 
@@ -70,8 +70,7 @@ def are_compilable(
     equation: EquationOfMotion,
     integrator: Integrator,
 ) -> bool:
-    """Whether everything in a step is of a kind that this loop knows; then only a formula that
-    does not compile can be in its way."""
+    """True if everything in a step is of a compilable kind, though a formula may still fail."""
     kinds = tuple(one.kind for one in LOAD_KINDS)
     labels = [c.label for c in (*equation.loads, *equation.constraints)]
     fused = not conditions and all(body.fused for body in bodies)
@@ -94,24 +93,24 @@ def compiled_loop(
     equation: EquationOfMotion,
     integrator: Integrator,
 ) -> TimeLoop:
-    """The loop for these prepared bodies, conditions on their stress, and the scene's equation.
+    """The time loop for prepared bodies, conditions on their stress, and an equation of motion.
 
     `sums` are the forces of the same bodies, one evaluation at a time.
 
     Raises:
-        NotCompilableError: one of the parts is not of a declared kind, or does not compile.
+        NotCompilableError: a part is not of a compilable kind, or does not compile.
     """
     if not isinstance(integrator, PointwiseIntegrator):
         raise NotCompilableError(f"integrator {type(integrator).__name__} is not pointwise")
     particles = equation.particles
     d = particles.dimension
-    threads = thread_count(_PER_PARTICLE * particles.count)  # of what is done particle by particle
+    threads = thread_count(_PER_PARTICLE * particles.count)  # for loops over particles
     for body in bodies:
         body.gradient_partition.check()
     internal = internal_forces(bodies, conditions)
     loads = [compiled_load(load, particles.positions, threads > 1) for load in equation.loads]
-    words = [constraint_calls(motion, d) for motion in equation.constraints]
-    by_word = [tuple(one[k] for one in words) for k in range(len(ConstraintCalls._fields))]
+    calls = [constraint_calls(motion, d) for motion in equation.constraints]
+    by_call = [tuple(one[k] for one in calls) for k in range(len(ConstraintCalls._fields))]
     steps = _steps(
         d,
         threads > 1,
@@ -119,7 +118,7 @@ def compiled_loop(
         compiled_function(integrator.end_velocity, *[types.float64] * 3),
         internal.forces,
         call_each(tuple(one.apply for one in loads)),
-        ConstraintCalls(*(call_each(functions) for functions in by_word)),
+        ConstraintCalls(*(call_each(functions) for functions in by_call)),
     )
     return CompiledLoop(sums, equation, internal, loads, steps, threads)
 
@@ -135,7 +134,7 @@ class CompiledLoop(TimeLoop):
     loads: Sequence[CompiledLoad]
     steps: Any  # compiled
     threads: int
-    most_steps: int = attrs.field(init=False)  # for which tables are made at once
+    most_steps: int = attrs.field(init=False)  # that share one set of tables
 
     @most_steps.default
     def _within_memory(self) -> int:
@@ -212,20 +211,20 @@ class CompiledLoop(TimeLoop):
 
 @attrs.define(eq=False)
 class _Accounts:
-    """Forces and work of every load and motion, between the loop's arrays and those of State."""
+    """Forces and work of every load and constraint, between the loop's arrays and a state's."""
 
     sums: InternalForces
     equation: EquationOfMotion
     work: dict[str, float]  # by account [J]
     load_forces: list[Array]  # (k, d) of each load, on its particles [N]
-    reactions: list[Array]  # (m,) of each motion [N]; nothing of one that ghosts follow by
+    reactions: list[Array]  # (m,) of each constraint [N]; empty for ghosts that follow
 
     @classmethod
     def of(cls, sums: InternalForces, equation: EquationOfMotion, state: State) -> _Accounts:
-        """The accounts as a state holds them."""
+        """The accounts of a state."""
         u = state.positions - equation.particles.positions
         loads = [state.applied[load.label][load.particles] for load in equation.loads]
-        # An account may hold more than the reaction: what ghosts of the same handler hand on.
+        # An account also holds the forces that ghosts of the same handler return.
         handed = _handed_on(sums, equation, state.time, u, loads)
         reactions = [
             (state.applied[motion.label] - handed.get(motion.label, 0.0))[motion.entries]
@@ -236,14 +235,14 @@ class _Accounts:
         return cls(sums, equation, dict(state.work), loads, reactions)
 
     def loads(self, own: Sequence[Any], threads: int) -> tuple[LoadData, ...]:
-        """What the loop holds of the loads, with what each kind needs."""
+        """The data of the loads, with the `own` data of each."""
         each = zip(self.equation.loads, self.load_forces, own, strict=True)
         return tuple(
             LoadData(load.particles, before, np.zeros(threads), one) for load, before, one in each
         )
 
     def motions(self, times: Array) -> tuple[ScheduledMotion | FollowingGhosts, ...]:
-        """What the loop holds of the motions."""
+        """The data of the constraints."""
         pairs = zip(self.equation.constraints, self.reactions, strict=True)
         return tuple(
             constraint_data(motion, times, before, self.equation.step_size)
@@ -253,14 +252,13 @@ class _Accounts:
     def settle(
         self, loads: Sequence[LoadData], motions: Sequence[ScheduledMotion | FollowingGhosts]
     ) -> None:
-        """Take back what the loop has done with them."""
+        """Add the work done in the loop; it has updated the forces in place."""
         conditions = (*self.equation.loads, *self.equation.constraints)
         for condition, part in zip(conditions, (*loads, *motions), strict=True):
             self.work[condition.label] += float(part.work.sum())
-        # The arrays `before` are the ones handed out: the loop has written on them.
 
     def applied(self, time: float, u: Array) -> Mapping[str, Array]:
-        """Force of every account on every particle, (n, d) [N], at displacements u (n, d)."""
+        """Force of every account on every particle, (n, d) [N], at displacements u (n, d) [m]."""
         equation = self.equation
         applied = {c.label: np.zeros_like(u) for c in (*equation.loads, *equation.constraints)}
         for load, force in zip(equation.loads, self.load_forces, strict=True):
@@ -280,7 +278,7 @@ def _handed_on(
     u: Array,
     load_forces: Sequence[Array],
 ) -> Mapping[str, Array]:
-    """What ghosts take from themselves and give to those they follow, (n, d) [N] by account."""
+    """Forces that ghosts return to the particles they follow, (n, d) [N] by account."""
     extensions = [c for c in equation.constraints if isinstance(c, GhostConstraint)]
     if not extensions:
         return {}
