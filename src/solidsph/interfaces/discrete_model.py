@@ -56,7 +56,7 @@ class DiscreteModel:
         return Pieces.of(self.particles, self.conditions)
 
     def smoothing_matrix(self) -> csr_array:
-        """Sparse matrix W of the paper's eq. 8, (n, n), which smooths the values that it multiplies."""
+        """Sparse matrix W of the paper's eq. 8, (n, n): its product with values smooths them."""
         return csr_array(block_diag([_smoothing(body) for body in self.bodies], format="csr"))
 
 

@@ -112,8 +112,8 @@ class CompiledForces(InternalForces):
             return super().plan(equation, integrator)
         d = equation.particles.dimension
         loads = [o for load in equation.loads for o in load.operations(d, compiled=True)]
-        pieces = {*self.compilations, *of_steps(fixed, equation, integrator)}
-        return Plan(True, self.operations, loads, frozenset(pieces))
+        units = {*self.compilations, *of_steps(fixed, equation, integrator)}
+        return Plan(True, self.operations, loads, frozenset(units))
 
     @property
     def _fixed(self) -> Sequence[ReferenceBody]:

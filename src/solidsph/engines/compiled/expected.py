@@ -20,18 +20,18 @@ def expected_plan(sizes: Sequence[BodySize], precision: int = 8) -> Plan:
     """The plan for bodies of these sizes; `precision` is that of the sums [bytes per number]."""
     d, moving = sizes[0].dimension, any(size.moving for size in sizes)
     if moving:
-        pieces = [
-            Compilation(piece, d, False)
-            for piece in (CompilationUnit.MOVING_ENGINE, CompilationUnit.MOVING)
+        units = [
+            Compilation(unit, d, False)
+            for unit in (CompilationUnit.MOVING_ENGINE, CompilationUnit.MOVING)
         ]
     else:
         own = (CompilationUnit.FORCES, CompilationUnit.FIELDS, CompilationUnit.STEPS)
-        pieces = [
+        units = [
             Compilation(CompilationUnit.ENGINE, 0, False),
             *(Compilation(p, d, True) for p in own),
         ]
     operations = tuple(o for size in sizes for o in _operations(size, precision))
-    return Plan(not moving, operations, (), frozenset(pieces))
+    return Plan(not moving, operations, (), frozenset(units))
 
 
 def _operations(size: BodySize, precision: int) -> Iterator[Operations]:

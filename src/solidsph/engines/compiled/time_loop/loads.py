@@ -80,7 +80,7 @@ class LoadKind(NamedTuple):
 
     kind: Any  # a class of loads
     prepare: Callable[[Any, Array, bool], CompiledLoad]  # (load, X (n, d), threaded)
-    piece: CompilationUnit
+    unit: CompilationUnit
     formula: bool = True  # True if each class of the kind is compiled separately
 
 

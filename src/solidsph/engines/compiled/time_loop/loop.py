@@ -49,7 +49,7 @@ _PER_PARTICLE = 10
 # Largest number of entries in the tables of scheduled values, for the steps that go together.
 _TABLE = 1 << 18
 
-# Largest number of operations of about a nanosecond in these steps, for which an interruption waits.
+# Largest number of operations of about a nanosecond in these steps: interruptions wait for them.
 _AT_ONCE = 3e8
 
 
