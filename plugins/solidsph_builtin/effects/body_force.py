@@ -1,4 +1,4 @@
-"""A force on every part of a body's mass: gravity, for one."""
+"""A body force, such as gravity."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from solidsph.model.regions import Where
 @final
 @attrs.frozen
 class BodyForce(Effect):
-    """f = m b(X, t). Ismail & Reddy, eq. 14, whose b they neglect."""
+    """f = m b(X, t): the body force of Ismail & Reddy, eq. 14, which they neglect."""
 
     answers: ClassVar[frozenset[Need] | None] = frozenset()
 

@@ -28,27 +28,27 @@ from solidsph.run.stable_step import lattice_frequency
 from solidsph_builtin.effects._breaking import Bonds, BreakingForces
 from solidsph_builtin.effects._gradients import in_the_reference
 
-# What cracks add to the highest frequency of a lattice, in squares: one-sided corrections are
-# stiffer. Of bodies in rubble, 0.9 was the most that was found (`solidsph check bond-failure`).
+# Increase of the highest frequency of a lattice by cracks, relative: one-sided corrections are
+# stiffer. For bodies broken to rubble the largest value measured was 0.9 (`solidsph check
+# bond-failure`).
 _RUBBLE = 1.0
 
 
 @final
 @attrs.frozen
 class BondFailure(Effect):
-    """Two neighbours whose distance exceeds (1 + critical_stretch) times that at the start no
-    longer act on each other, for good.
+    """Permanent failure of pairs stretched to over (1 + critical_stretch) times their distance.
 
-    The kernel gradient of a failed pair is left out of both particles' sums, whose correction is
-    formed anew from what is left: Chakraborty & Shaw (2013), who let pseudo springs fail. A crack
-    is then a free surface to the gradient. A particle that has lost the part D of its bonds has the
-    energy (1 - D) psi(F): without that, what is left of its neighbours may see more strain than all
-    did, and a crack would feed on energy that nobody has spent. Where they determine no gradient
-    any more it loses its last bonds, and flies on without strain. Nothing keeps the two sides of a
-    crack from overlapping but 'contact'.
+    The kernel gradient of a failed pair is left out of the sums of both particles, whose correction
+    is recomputed from the remaining pairs, as in the pseudo-spring method of Chakraborty & Shaw
+    (2013). A crack is then a free surface for the gradient. A particle that has lost a fraction D
+    of its bonds has the energy (1 - D) psi(F); otherwise the remaining neighbours could give more
+    strain than all did, and a crack would gain energy from nowhere. A particle whose remaining
+    bonds do not determine a gradient loses them and flies on without strain. Only 'contact' keeps
+    the two sides of a crack from overlapping.
 
-    The energy that bonds let go is what they dissipate. It depends on the spacing, as the width of
-    the strip that a crack unloads does: choose the stretch for the spacing in use.
+    The energy released by bonds is dissipated. It depends on the spacing, as does the width of the
+    strip that a crack unloads: choose the stretch for the spacing in use.
     """
 
     conserves_momentum: ClassVar[bool] = True
@@ -94,7 +94,7 @@ class BondFailure(Effect):
 @final
 @attrs.frozen(eq=False)
 class _Cracks(FieldTerm, Load, ForcesModifier):
-    """Adds no force of its own; it shows what has failed."""
+    """A term without forces of its own, which shows failed bonds."""
 
     label: str
     bonds: Sequence[Bonds]
@@ -128,7 +128,7 @@ class _Cracks(FieldTerm, Load, ForcesModifier):
         return np.empty((0, positions.shape[1]))
 
     def damage(self, observation: Observation) -> Array:
-        """Part of each particle's bonds that have failed, (n,) [-]."""
+        """Fraction of the bonds of each particle that have failed, (n,) [-]."""
         found, memory = np.zeros(self.count), observation.state.memory
         for one in self.bonds:
             if one.name in memory:

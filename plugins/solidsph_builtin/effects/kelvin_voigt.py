@@ -1,4 +1,4 @@
-"""Damping inside the material, in proportion to stiffness and strain rate."""
+"""Material damping in proportion to stiffness and strain rate."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from solidsph.maths.tensors import add, identity, product, scale, trace, transpo
 from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.effects._gradients import BodyGradient, in_the_reference
 
-# Up to so many freedoms eigenvalues are found by a dense matrix; beyond, to this part.
+# Largest number of freedoms for a dense eigenvalue problem, and the relative tolerance beyond.
 _DENSE, _FOUND = 60, 1e-3
 
 
@@ -27,10 +27,10 @@ _DENSE, _FOUND = 60, 1e-3
 class KelvinVoigt(Effect):
     """A dashpot beside the material: S_v = time (lambda tr(dE/dt) I + 2 mu dE/dt), P_v = F S_v.
 
-    Kelvin and Voigt's solid in the reference configuration, E being the Green-Lagrange strain: it
-    is objective, rigid motions give nothing, and energy is only ever taken. A small vibration of
-    angular frequency w decays as exp(-time w^2 t / 2): Rayleigh's second term, by which short
-    waves fade first. The stress goes through the same gradient and divergence as the material's.
+    The Kelvin-Voigt solid in the reference configuration, with E the Green-Lagrange strain: it is
+    objective, rigid motions give no stress, and energy is only dissipated. A small vibration of
+    angular frequency w decays as exp(-time w^2 t / 2): the stiffness-proportional term of Rayleigh
+    damping, which damps short waves first. Gradient and divergence are those of the material.
     """
 
     conserves_momentum: ClassVar[bool] = True

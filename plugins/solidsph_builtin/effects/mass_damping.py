@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar, final
 
 import attrs
@@ -42,10 +41,6 @@ class _Drag(PointwiseLoad):
     particles: Indices  # (k,)
     values: Array  # c m, (k, 1) [kg/s]
     damping_rate: float  # c [1/s]
-
-    @property
-    def arrays(self) -> Mapping[str, int]:
-        return {"chosen particles": self.particles.nbytes, "drag": self.values.nbytes}
 
     @staticmethod
     def force(position: Vector, velocity: Vector, values: Vector) -> Vector:

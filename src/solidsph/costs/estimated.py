@@ -37,9 +37,6 @@ _POINTS = 1 << 15
 # Along the largest side of a shape, samples by which the area of its surface is found.
 _ALONG = 40
 
-# Numbers that the compiled engine keeps for a vector, by dimension.
-_STRIDE = {1: 1, 2: 2, 3: 4}
-
 # Up to here the matrix engine is what `auto` takes, about: particles times steps.
 _FEW = 2e6
 

@@ -9,14 +9,11 @@ from math import exp
 import attrs
 
 from solidsph.costs.work import Loop, Work
+from solidsph.engines.compiled.constants import PER_PARTICLE, WORTH_A_THREAD
 from solidsph.interfaces.plan import CompilationUnit, Operations, SumMethod
 
 # Of the threads that share a sum, what they are together beside one alone.
 _TOGETHER = 0.95
-
-# From so many operations of about a nanosecond the compiled loop shares what it does particle by
-# particle; each is counted as so many.
-_WORTH_A_THREAD, _PER_PARTICLE = 200_000, 10
 
 # Outputs of which the library of files remembers what it wrote, before it forgets the first.
 _REMEMBERED = 150.0
@@ -94,7 +91,7 @@ def step_terms(work: Work) -> Iterator[CostTerm]:
 def shared_terms(work: Work) -> Iterator[CostTerm]:
     """Those terms of a step that threads share."""
     d = work.dimension
-    if work.loop is Loop.COMPILED and _PER_PARTICLE * work.particles >= _WORTH_A_THREAD:
+    if work.loop is Loop.COMPILED and PER_PARTICLE * work.particles >= WORTH_A_THREAD:
         yield CostTerm(f"compiled step particle {d}D", work.particles, Yard.SPARSE)
     for part in work.operations:
         if part.threaded:

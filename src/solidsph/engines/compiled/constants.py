@@ -6,3 +6,6 @@ STRIDE = {1: 1, 2: 2, 3: 4}
 WORTH_A_THREAD = 200_000
 """Operations of about a nanosecond from which on a second thread pays: to wake it takes some tens
 of microseconds in every pass."""
+
+PER_PARTICLE = 10
+"""Operations per particle in a step of the compiled loop, besides those for pairs."""

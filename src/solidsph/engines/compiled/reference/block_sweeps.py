@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from solidsph.engines.compiled.reference.blocks import STRIDE, block_loops
+from solidsph.engines.compiled.constants import STRIDE
+from solidsph.engines.compiled.reference.blocks import block_loops
 
 
 class BlockSweeps(NamedTuple):

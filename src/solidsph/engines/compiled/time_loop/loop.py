@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 from numba import njit, prange, types
 
+from solidsph.engines.compiled.constants import PER_PARTICLE
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function
 from solidsph.engines.compiled.reference.partition import thread_count
 from solidsph.engines.compiled.time_loop.call_each import call_each
@@ -42,9 +43,6 @@ from solidsph.model.particles import State
 
 if TYPE_CHECKING:
     from solidsph.engines.compiled.reference.body import ReferenceBody
-
-# Operations per particle and step, besides those for pairs.
-_PER_PARTICLE = 10
 
 # Largest number of entries in the tables of scheduled values, for the steps that go together.
 _TABLE = 1 << 18
@@ -104,7 +102,7 @@ def compiled_loop(
         raise NotCompilableError(f"integrator {type(integrator).__name__} is not pointwise")
     particles = equation.particles
     d = particles.dimension
-    threads = thread_count(_PER_PARTICLE * particles.count)  # for loops over particles
+    threads = thread_count(PER_PARTICLE * particles.count)  # for loops over particles
     for body in bodies:
         body.gradient_partition.check()
     internal = internal_forces(bodies, conditions)
@@ -146,7 +144,7 @@ class CompiledLoop(TimeLoop):
             for k in range(3)
         ]
         width = sum(int(part[0].size) for part in parts if len(part) > 1)
-        work = _PER_PARTICLE * self.equation.particles.count + 2 * self.sums.pair_count
+        work = PER_PARTICLE * self.equation.particles.count + 2 * self.sums.pair_count
         return max(1, min(_TABLE // max(1, width), int(_AT_ONCE / work)))
 
     @property
