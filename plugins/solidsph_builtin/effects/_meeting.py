@@ -62,7 +62,7 @@ class Meeting:
 
     def touch(self, positions: Array) -> Touch | None:
         """Pairs at `positions` (n, d) of all particles [m]; None while the boxes are apart."""
-        if self.search.asleep(positions):
+        if self.search.far_apart(positions):
             return None
         x = positions[self.particles]
         i, j = self._near.pairs(x)

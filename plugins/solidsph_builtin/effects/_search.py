@@ -19,7 +19,7 @@ class Search(ABC):
     """Pairs between two groups of particles, or within one."""
 
     @abstractmethod
-    def asleep(self, positions: Array) -> bool:
+    def far_apart(self, positions: Array) -> bool:
         """True if no pair can be within reach and margin at positions (n, d) of all particles."""
 
     @abstractmethod
@@ -38,17 +38,17 @@ class Between(Search):
     one: slice | Indices  # particles of the first body, among all
     other: slice | Indices  # particles of the second body
     split: int  # number of particles of the first body
-    wakes: float  # distance of the boxes at which the search begins [m]
+    range: float  # distance of the boxes at which the search begins [m]
     # A cache: the axis to test first, since bodies mostly stay apart along the same axis.
     _first: list[int] = attrs.field(factory=lambda: [0], init=False, repr=False)
 
-    def asleep(self, positions: Array) -> bool:
+    def far_apart(self, positions: Array) -> bool:
         square, d = 0.0, positions.shape[1]
         for axis in sorted(range(d), key=lambda k: k != self._first[0]):
             x, y = positions[self.one, axis], positions[self.other, axis]
             gap = max(0.0, float(x.min() - y.max()), float(y.min() - x.max()))
             square += gap**2
-            if square > self.wakes**2:
+            if square > self.range**2:
                 self._first[0] = axis
                 return True
         return False
@@ -75,12 +75,12 @@ class Within(Search):
     particles: Indices  # (m,) among all particles
     reference: Array  # X, (m, d) [m]
     apart: float  # smallest distance of a pair in the reference configuration [m]
-    wakes: float  # largest distance of a pair now [m]
+    range: float  # largest distance of a pair now [m]
 
-    def asleep(self, positions: Array) -> bool:
+    def far_apart(self, positions: Array) -> bool:
         # No two displacements differ by more than the diagonal of the box that holds them all.
         u = positions[self.particles] - self.reference
-        return bool(np.linalg.norm(np.ptp(u, axis=0)) < self.apart - self.wakes)
+        return bool(np.linalg.norm(np.ptp(u, axis=0)) < self.apart - self.range)
 
     def within(self, x: Array, radius: float) -> tuple[Indices, Indices]:
         found = cKDTree(x).query_pairs(radius, output_type="ndarray")

@@ -15,12 +15,7 @@ from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.forces_modifier import ForcesModifier
 from solidsph.interfaces.gradient import PointwiseGradient
-from solidsph.interfaces.terms import (
-    FieldTerm,
-    Load,
-    Observation,
-    StressTerm,
-)
+from solidsph.interfaces.terms import FieldTerm, Load, Observation, StressTerm
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.regions import Where
 from solidsph.registry.parameters import check_positive, number

@@ -16,21 +16,10 @@ from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
-from solidsph.interfaces.terms import (
-    EnergyTerm,
-    FieldTerm,
-    Load,
-    Observation,
-)
+from solidsph.interfaces.terms import EnergyTerm, FieldTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.registry.parameters import check_positive, number
-from solidsph_builtin.effects._crowding import (
-    REACH,
-    crowding_kernel,
-    sensitivity,
-    sites,
-    steepest,
-)
+from solidsph_builtin.effects._crowding import REACH, crowding_kernel, sensitivity, sites, steepest
 from solidsph_builtin.effects._meeting import Meeting, Touch
 from solidsph_builtin.effects._search import Between, Search, Within, together
 
@@ -116,15 +105,15 @@ class Contact(Effect):
             object.__setattr__(self, "between", pairs)
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
-        who = self._who(model.bodies)
-        meetings = [_made(one, other, self.strength, self.margin) for one, other in who]
+        pairs = self._pairs_of_bodies(model.bodies)
+        meetings = [_meeting(one, other, self.strength, self.margin) for one, other in pairs]
         return _Contact(
             label=label,
             particles=np.unique(np.concatenate([one.particles for one in meetings])),
             meetings=meetings,
             friction=self.friction,
             dimension=model.particles.dimension,
-            stiffness_rate=max(self._frequency(one, other) for one, other in who),
+            stiffness_rate=max(self._frequency(one, other) for one, other in pairs),
         )
 
     def _frequency(self, one: Body, other: Body) -> float:
@@ -138,7 +127,7 @@ class Contact(Effect):
         # While bodies are apart only boxes are compared; touching surfaces have few pairs.
         return particles
 
-    def _who(self, bodies: Sequence[Body]) -> Sequence[tuple[Body, Body]]:
+    def _pairs_of_bodies(self, bodies: Sequence[Body]) -> Sequence[tuple[Body, Body]]:
         """Pairs of bodies; a body that may touch itself is paired with itself."""
         known = {body.name: body for body in bodies}
         for name in {*(n for pair in self.between or () for n in pair), *self.itself} - {"all"}:
@@ -200,7 +189,7 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         for meeting in self.meetings:
             touch = meeting.touch(positions)
             asleep += touch is None
-            force, slip = self._of(meeting, touch, positions, velocities, step, memory)
+            force, slip = self._contact_force(meeting, touch, positions, velocities, step, memory)
             slips |= slip
             if force is None:
                 continue
@@ -213,7 +202,7 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         found = np.zeros(none) if forces is None else forces[self.particles]
         return found, {self._asleep: count, **slips}
 
-    def _of(
+    def _contact_force(
         self,
         meeting: Meeting,
         touch: Touch | None,
@@ -223,7 +212,7 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         memory: Memory,
     ) -> tuple[Array | None, Mapping[str, Array]]:
         """Force on the particles of a meeting, (m, d) [N] or None, and the new stretches."""
-        if not self._rubs(meeting):
+        if not self._has_friction(meeting):
             return None if touch is None else meeting.normal_forces(touch), {}
         slip = self._slip(meeting, memory)
         if touch is None:
@@ -241,7 +230,7 @@ class _Contact(EnergyTerm, FieldTerm, Load):
             if touch is None:
                 continue
             energies[meeting.particles] += meeting.energies(touch)
-            if self._rubs(meeting):
+            if self._has_friction(meeting):
                 slip = self._slip(meeting, state.memory)
                 held = 0.5 * meeting.spring * np.sum(slip**2, axis=1)
                 energies[meeting.particles] += held
@@ -259,7 +248,9 @@ class _Contact(EnergyTerm, FieldTerm, Load):
                 excess = touch.excess
                 pairs += int(np.sum((excess[touch.i] > 0.0) | (excess[touch.j] > 0.0)))
                 # A step of length 0 leaves the springs as they are: the forces that acted.
-                acted, _ = self._of(meeting, touch, positions, state.velocities, 0.0, state.memory)
+                acted, _ = self._contact_force(
+                    meeting, touch, positions, state.velocities, 0.0, state.memory
+                )
                 force -= 0.0 if acted is None else acted[meeting.belongs].sum(axis=0)
             if meeting.first == meeting.second:
                 continue
@@ -278,7 +269,7 @@ class _Contact(EnergyTerm, FieldTerm, Load):
     def fields(self, observation: Observation) -> Mapping[str, Array]:
         return {f"{self.label} force [N]": observation.state.applied[self.label]}
 
-    def _rubs(self, meeting: Meeting) -> bool:
+    def _has_friction(self, meeting: Meeting) -> bool:
         # There is no sliding in 1D.
         return self.friction > 0.0 and meeting.kernel.dimension > 1
 
@@ -294,7 +285,7 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         return f"{self.label} evaluations asleep"
 
 
-def _made(one: Body, other: Body, strength: float, margin: float) -> Meeting:
+def _meeting(one: Body, other: Body, strength: float, margin: float) -> Meeting:
     kernel, alone = _kernel(one, other), one is other
     reach = kernel.support_radius
     margin *= reach / REACH

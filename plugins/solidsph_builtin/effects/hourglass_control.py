@@ -14,12 +14,7 @@ from solidsph.interfaces.compilable_terms import HourglassLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassPairs
-from solidsph.interfaces.terms import (
-    EnergyTerm,
-    FieldTerm,
-    Load,
-    Observation,
-)
+from solidsph.interfaces.terms import EnergyTerm, FieldTerm, Load, Observation
 from solidsph.maths.arrays import Array
 from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.effects._gradients import in_the_reference, real_pairs

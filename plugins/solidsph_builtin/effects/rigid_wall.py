@@ -14,12 +14,7 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.memory import Memory
-from solidsph.interfaces.terms import (
-    EnergyTerm,
-    FieldTerm,
-    Load,
-    Observation,
-)
+from solidsph.interfaces.terms import EnergyTerm, FieldTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import AXES, Where

@@ -98,7 +98,7 @@ def _panel_mass(kernel: Kernel, dimension: int, ends: Array, panels: int) -> flo
 
 def check_profile(kernel: Kernel) -> None:
     """Raise PluginError unless the profile is finite, not negative and zero at its edge."""
-    name = type(kernel).__name__
+    name = f"kernel {type(kernel).__name__}"
     q = np.linspace(0.0, 1.0, 2001)[:-1]
     try:
         with np.errstate(all="ignore"):
@@ -106,51 +106,49 @@ def check_profile(kernel: Kernel) -> None:
             edge = float(kernel.profile(np.array([1.0 - 1e-12]), kernel.params)[0])
     except Exception as cause:  # a plugin's formula may fail in any way
         raise PluginError(
-            f"kernel {name}: profile(q, params) failed on an array: {type(cause).__name__}: "
-            f"{cause}; use NumPy functions and np.maximum or np.where in place of `if`"
+            f"{name}: profile(q, params) failed on an array: {type(cause).__name__}: {cause}; use "
+            "NumPy functions and np.maximum or np.where in place of `if`"
         ) from cause
     if w.shape != q.shape:
         raise PluginError(
-            f"kernel {name}: profile gave shape {w.shape} for q of shape {q.shape}; it must give "
-            "one value for each"
+            f"{name}: profile gave shape {w.shape} for q of shape {q.shape}; it must give one "
+            "value for each"
         )
     if not np.all(np.isfinite(w)):
         bad = q[~np.isfinite(w)][0]
         raise PluginError(
-            f"kernel {name}: profile({bad:.6g}) is not finite; it must be finite on 0 <= q < 1"
+            f"{name}: profile({bad:.6g}) is not finite; it must be finite on 0 <= q < 1"
         )
     if np.any(w < 0.0):
         bad = q[w < 0.0][0]
         raise PluginError(
-            f"kernel {name}: profile({bad:.6g}) = {w[w < 0.0][0]:.6g} is negative; a weight must "
-            "not be negative on 0 <= q < 1"
+            f"{name}: profile({bad:.6g}) = {w[w < 0.0][0]:.6g} is negative; a weight must not be "
+            "negative on 0 <= q < 1"
         )
     if not np.any(w > 0.0):
-        raise PluginError(f"kernel {name}: profile is zero everywhere; it must have a mass")
+        raise PluginError(f"{name}: profile is zero everywhere; it must have a mass")
     lost = [kernel.lost_mass(d) for d in (1, 2, 3)]
     if not all(0.0 <= loss < 1.0 for loss in lost):
-        raise PluginError(
-            f"kernel {name}: lost_mass must be in [0, 1) in every dimension, got {lost}"
-        )
+        raise PluginError(f"{name}: lost_mass must be in [0, 1) in every dimension, got {lost}")
     if not all(0.0 < knot < 1.0 for knot in kernel.knots):
-        raise PluginError(f"kernel {name}: knots must lie between 0 and 1, got {kernel.knots}")
-    _check_slope(kernel, q, w)
+        raise PluginError(f"{name}: knots must lie between 0 and 1, got {kernel.knots}")
+    _check_slope(kernel, name, q, w)
     if edge > _EDGE_TOLERANCE * w.max() and min(lost) <= 0.0:
         raise PluginError(
-            f"kernel {name}: profile is {edge:.6g} at q = 1, where it must be zero; let it vanish "
-            "there, or declare the mass that the cut loses in `lost_mass`"
+            f"{name}: profile is {edge:.6g} at q = 1, where it must be zero; let it vanish there, "
+            "or declare the mass that the cut loses in `lost_mass`"
         )
 
 
-def _check_slope(kernel: Kernel, q: Array, w: Array) -> None:
+def _check_slope(kernel: Kernel, name: str, q: Array, w: Array) -> None:
     """Raise PluginError unless the trapezoidal integral of the slope is the profile's change."""
     try:
         with np.errstate(all="ignore"):
             slope = profile_slope(kernel, q)
     except Exception as cause:  # a plugin's formula may fail in any way
         raise PluginError(
-            f"kernel {type(kernel).__name__}: its slope failed on an array: "
-            f"{type(cause).__name__}: {cause}; use NumPy functions"
+            f"{name}: its slope failed on an array: {type(cause).__name__}: {cause}; use NumPy "
+            "functions"
         ) from cause
     change = 0.5 * (slope[1:] + slope[:-1]) * np.diff(q)
     wrong = np.abs(change - np.diff(w))
@@ -158,8 +156,8 @@ def _check_slope(kernel: Kernel, q: Array, w: Array) -> None:
     if not np.all(wrong < 1e-5 * w.max()):
         worst = q[int(np.argmax(np.where(np.isfinite(wrong), wrong, np.inf)))]
         raise PluginError(
-            f"kernel {type(kernel).__name__}: slope is not the derivative of profile near q = "
-            f"{worst:.4g}; correct it, or leave it out if profile is a formula without abs"
+            f"{name}: slope is not the derivative of profile near q = {worst:.4g}; correct it, or "
+            "leave it out if profile is a formula without abs"
         )
 
 

@@ -12,12 +12,7 @@ import numpy as np
 from numba import njit
 
 from solidsph.engines.compiled.moving.kernel_pass import KernelPass, kernel_pass
-from solidsph.engines.compiled.moving.neighbourhoods import (
-    Neighbourhoods,
-    Place,
-    fill,
-    kernel_sums,
-)
+from solidsph.engines.compiled.moving.neighbourhoods import Neighbourhoods, Place, fill, kernel_sums
 from solidsph.engines.compiled.moving.pointwise_sums import PointwiseSums
 from solidsph.engines.compiled.moving.search import NeighbourSearch
 from solidsph.engines.compiled.moving.weighted_sums import WeightedSums

@@ -9,11 +9,7 @@ from typing import Any, TypeAlias
 from numba import njit, types
 
 from solidsph.engines.compiled.moving.search import Near
-from solidsph.engines.compiled.pointwise import (
-    NotCompilableError,
-    compiled_function,
-    numbers_type,
-)
+from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function, numbers_type
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.smoothing_kernel import COMPLEX_STEP, SmoothingKernel
 from solidsph.maths.arrays import Array

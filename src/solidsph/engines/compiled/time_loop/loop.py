@@ -28,11 +28,7 @@ from solidsph.engines.compiled.time_loop.loads import (
     LoadData,
     compiled_load,
 )
-from solidsph.interfaces.compilable_terms import (
-    LinearExtension,
-    ScheduledConstraint,
-    ScheduledLoad,
-)
+from solidsph.interfaces.compilable_terms import LinearExtension, ScheduledConstraint, ScheduledLoad
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
