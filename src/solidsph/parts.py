@@ -28,6 +28,7 @@ from solidsph.interfaces.integrator import Integrator, PointwiseIntegrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.law import Law, memory_name
 from solidsph.interfaces.material import Material
+from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.pair_table import PairTable
 from solidsph.interfaces.plan import BodySize, Compilation, Operations, Plan
 from solidsph.interfaces.shape import Shape, Surface
@@ -118,6 +119,7 @@ __all__ = [
     "Mask",
     "Material",
     "Measurement",
+    "Memory",
     "Need",
     "Observation",
     "Operations",

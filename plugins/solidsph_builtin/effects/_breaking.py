@@ -137,7 +137,7 @@ class BreakingForces(InternalForces):
 
     @property
     def pair_count(self) -> int:
-        return sum(one.pairs.count for one in self.bonds)
+        return sum(bonds.pairs.count for bonds in self.bonds)
 
     @property
     def operations(self) -> Sequence[Operations]:
@@ -154,18 +154,18 @@ class BreakingForces(InternalForces):
         self, time: float, step: float, displacements: Array, memory: Memory
     ) -> tuple[Array, Memory]:
         flags = self._remembered(memory)
-        kept = {one.name: own for one, own in zip(self.bonds, flags, strict=True)}
+        kept = {bonds.name: own for bonds, own in zip(self.bonds, flags, strict=True)}
         if step > 0.0:
             after = tuple(
-                one.after(own, displacements[one.body.extent])
-                for one, own in zip(self.bonds, flags, strict=True)
+                bonds.after(own, displacements[bonds.body.extent])
+                for bonds, own in zip(self.bonds, flags, strict=True)
             )
             if any(new is not old for new, old in zip(after, flags, strict=True)):
                 energies = [
-                    self._observed(one, displacements, memory).energy_densities
-                    for one in (flags, after)
+                    self._observed(state, displacements, memory).energy_densities
+                    for state in (flags, after)
                 ]
-                kept = {one.name: own for one, own in zip(self.bonds, after, strict=True)}
+                kept = {bonds.name: own for bonds, own in zip(self.bonds, after, strict=True)}
                 kept[_RELEASED] = self._released(memory, displacements) + energies[0] - energies[1]
                 flags = after
         forces, histories = self._of(flags).advance(time, step, displacements, memory)
@@ -179,15 +179,15 @@ class BreakingForces(InternalForces):
 
         A law does not know the damage; its stress is scaled by 1 - D, and so is its dissipation.
         """
-        spared = np.zeros(sum(one.body.particles.count for one in self.bonds))
-        for law, one, own in zip(self.laws, self.bonds, flags, strict=True):
+        spared = np.zeros(sum(bonds.body.particles.count for bonds in self.bonds))
+        for law, bonds, own in zip(self.laws, self.bonds, flags, strict=True):
             name, material = memory_name(law.body), law.body.material
             if name in after and isinstance(material, HistoryMaterial):
                 lost = [
                     material.dissipated(tuple(history.T))
                     for history in (law.history_of(memory), after[name])
                 ]
-                spared[one.body.extent] = one.damage(own) * (lost[1] - lost[0])
+                spared[bonds.body.extent] = bonds.damage(own) * (lost[1] - lost[0])
         return spared
 
     def fields(self, displacements: Array) -> StressFields:
@@ -204,8 +204,8 @@ class BreakingForces(InternalForces):
         self, flags: tuple[Array, ...], displacements: Array, memory: Memory
     ) -> StressFields:
         found = self._of(flags).observed(displacements, memory)
-        for one, own in zip(self.bonds, flags, strict=True):
-            left, extent = 1.0 - one.damage(own), one.body.extent
+        for bonds, own in zip(self.bonds, flags, strict=True):
+            left, extent = 1.0 - bonds.damage(own), bonds.body.extent
             found.stresses[extent] *= left[:, None, None]
             found.energy_densities[extent] *= left
         return found
@@ -231,12 +231,12 @@ class BreakingForces(InternalForces):
             new is old for new, old in zip(flags, self._flags, strict=True)
         )
         if self._sums is None or not same:
-            made = [one.operators(own) for one, own in zip(self.bonds, flags, strict=True)]
-            self._sums = fixed_forces([one.body for one in self.bonds], made, self.conditions)
+            made = [bonds.operators(own) for bonds, own in zip(self.bonds, flags, strict=True)]
+            self._sums = fixed_forces([bonds.body for bonds in self.bonds], made, self.conditions)
             self._flags = flags
         laws = [
-            _Damaged(law.body, law, 1.0 - one.damage(own))
-            for law, one, own in zip(self.laws, self.bonds, flags, strict=True)
+            _Damaged(law.body, law, 1.0 - bonds.damage(own))
+            for law, bonds, own in zip(self.laws, self.bonds, flags, strict=True)
         ]
         return HistoryForces(self._sums, laws, self.conditions)
 

@@ -183,8 +183,8 @@ def _summed(rows: Indices, values: Array, count: int) -> Array:
     shape = values.shape[1:]
     columns = values.reshape(len(values), prod(shape))
     sums = np.empty((count, columns.shape[1]))
-    for k, one in enumerate(columns.T):
-        sums[:, k] = np.bincount(rows, one, count)
+    for k, column in enumerate(columns.T):
+        sums[:, k] = np.bincount(rows, column, count)
     return sums.reshape(count, *shape)
 
 

@@ -104,16 +104,16 @@ class _Cracks(FieldTerm, Load, ForcesModifier):
                 "bond-failure: it is named twice, and a bond fails once; give it one "
                 "critical_stretch, and places by `where`"
             )
-        laws = [ArrayLaw(one.body) for one in self.bonds]
+        laws = [ArrayLaw(bonds.body) for bonds in self.bonds]
         return BreakingForces(self.bonds, laws, stress_terms)
 
     @property
     def arrays(self) -> Mapping[str, int]:
-        return {f"bonds of {one.body.name}": one.bytes for one in self.bonds}
+        return {f"bonds of {bonds.body.name}": bonds.bytes for bonds in self.bonds}
 
     @property
     def pair_count(self) -> int:
-        return sum(one.pairs.count for one in self.bonds)
+        return sum(bonds.pairs.count for bonds in self.bonds)
 
     @property
     def particles(self) -> Indices:
@@ -125,9 +125,9 @@ class _Cracks(FieldTerm, Load, ForcesModifier):
     def damage(self, observation: Observation) -> Array:
         """Fraction of the bonds of each particle that have failed, (n,) [-]."""
         found, memory = np.zeros(self.count), observation.state.memory
-        for one in self.bonds:
-            if one.name in memory:
-                found[one.body.extent] = one.damage(memory[one.name])
+        for bonds in self.bonds:
+            if bonds.name in memory:
+                found[bonds.body.extent] = bonds.damage(memory[bonds.name])
         return found
 
     def fields(self, observation: Observation) -> Mapping[str, Array]:
@@ -136,7 +136,7 @@ class _Cracks(FieldTerm, Load, ForcesModifier):
     def report(self, observation: Observation) -> Mapping[str, float]:
         memory = observation.state.memory
         failed = sum(
-            float(np.sum(1.0 - memory[one.name])) for one in self.bonds if one.name in memory
+            float(np.sum(1.0 - memory[bonds.name])) for bonds in self.bonds if bonds.name in memory
         )
         return {
             f"{self.label} failed bonds [-]": failed / 2.0,

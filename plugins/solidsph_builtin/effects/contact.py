@@ -109,7 +109,7 @@ class Contact(Effect):
         meetings = [_meeting(one, other, self.strength, self.margin) for one, other in pairs]
         return _Contact(
             label=label,
-            particles=np.unique(np.concatenate([one.particles for one in meetings])),
+            particles=np.unique(np.concatenate([meeting.particles for meeting in meetings])),
             meetings=meetings,
             friction=self.friction,
             dimension=model.particles.dimension,

@@ -110,7 +110,8 @@ class _Relaxation(Load):
 
     def _rate(self, way: Array, acceleration: Array, c: float) -> float:
         weight, power = (
-            float(np.einsum("n,ni,ni->", self.masses, way, one)) for one in (way, acceleration)
+            float(np.einsum("n,ni,ni->", self.masses, way, change))
+            for change in (way, acceleration)
         )
         # The rate is kept before the first motion and while a load drives the body on.
         if not (weight > 0.0 and power < 0.0):

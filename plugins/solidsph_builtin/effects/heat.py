@@ -36,13 +36,14 @@ def _places(given: Any) -> tuple[tuple[Where, Component], ...]:
     wanted = 'heat: held takes a list such as [{where = "left", temperature = 100}]'
     if isinstance(given, (str, Mapping)) or not isinstance(given, Sequence):
         raise SceneError(f"{wanted}, got {given!r}")
-    for one in given:
-        if isinstance(one, tuple) and len(one) == 2:
+    for entry in given:
+        if isinstance(entry, tuple) and len(entry) == 2:
             continue
-        if not isinstance(one, Mapping) or set(one) != {"where", "temperature"}:
-            raise SceneError(f"{wanted}, got the entry {one!r}")
+        if not isinstance(entry, Mapping) or set(entry) != {"where", "temperature"}:
+            raise SceneError(f"{wanted}, got the entry {entry!r}")
     return tuple(
-        (one["where"], one["temperature"]) if isinstance(one, Mapping) else one for one in given
+        (entry["where"], entry["temperature"]) if isinstance(entry, Mapping) else entry
+        for entry in given
     )
 
 
@@ -137,7 +138,7 @@ def _conduction(bodies: Sequence[Body], conductivity: float) -> csr_array:
         rows.append(a + body.extent.start)
         columns.append(b + body.extent.start)
         values.append(2.0 * conductivity * V[a] * V[b] * slope / (R * moments.max()))
-    flat = tuple(np.concatenate(one) for one in (rows, columns))
+    flat = tuple(np.concatenate(ends) for ends in (rows, columns))
     K = csr_array((np.concatenate(values), flat), shape=(count, count))
     return csr_array(K - diags_array(np.asarray(K.sum(axis=1)), format="csr"))
 
@@ -164,12 +165,12 @@ class _Conduction(FieldTerm, Load):
             "conduction": K.data.nbytes + K.indices.nbytes + K.indptr.nbytes,
             "temperature": 8 * n,
             "capacities": 8 * n,
-            **{f"gradient of {one.body.name}": one.matrices.bytes for one in self.gradients},
+            **{f"gradient of {g.body.name}": g.matrices.bytes for g in self.gradients},
         }
 
     @property
     def pair_count(self) -> int:
-        return self.conduction.nnz + 2 * sum(one.pair_count for one in self.gradients)
+        return self.conduction.nnz + 2 * sum(gradient.pair_count for gradient in self.gradients)
 
     @property
     def particles(self) -> Indices:
@@ -250,7 +251,7 @@ def _swelling(material: Material, H: Array, g: Array) -> Array:
     d, n = len(H), H.shape[2]
     F = np.repeat(np.eye(3)[:, :, None], n, axis=2)
     F[:d, :d] += H
-    swollen, own = (_stress(material, one) for one in (F / g, F))
+    swollen, own = (_stress(material, deformation) for deformation in (F / g, F))
     return (g**2 * swollen - own)[:d, :d]
 
 

@@ -110,8 +110,8 @@ class _Control(HourglassLoad, FieldTerm, EnergyTerm):
         u = observation.state.positions - self.reference
         H = observation.deformation_gradients - np.eye(u.shape[1])
         squares = [
-            one.pairs.squares(u[one.pairs.body.extent], H[one.pairs.body.extent])
-            for one in self.operators
+            operator.pairs.squares(u[operator.pairs.body.extent], H[operator.pairs.body.extent])
+            for operator in self.operators
         ]
         return 0.25 * np.concatenate(squares)
 
@@ -138,7 +138,7 @@ class _Control(HourglassLoad, FieldTerm, EnergyTerm):
         own = self.energies(observation)
         share, error = np.zeros_like(own), np.zeros_like(own)
         V = np.where(observation.particles.ghosts, 0.0, observation.particles.volumes)
-        for pairs in (one.pairs for one in self.operators):
+        for pairs in (operator.pairs for operator in self.operators):
             extent = pairs.body.extent
             density, volumes = observation.energy_densities[extent], V[extent]
             strain = volumes * np.maximum(density, volumes @ density / volumes.sum())

@@ -84,7 +84,7 @@ class Joint(Effect):
                 "leave it out, or add a body"
             )
         parts = [_between(a, b, self.reach) for a, b in combinations(chosen, 2)]
-        found = _SpringList(*(np.concatenate([getattr(one, f) for one in parts]) for f in _FIELDS))
+        found = _SpringList(*(np.concatenate([getattr(p, f) for p in parts]) for f in _FIELDS))
         if not len(found.one):
             raise SceneError(
                 f"joint: no particles of {', '.join(body.name for body in chosen)} are closer than "
@@ -152,7 +152,7 @@ def _between(one: Body, other: Body, reach: float) -> _SpringList:
 
 def _squares(ends: Indices, directions: Array, count: int) -> Array:
     """Sum over a particle's springs of (e . n)^2, with n their mean direction, (count,) [-]."""
-    mean = np.column_stack([np.bincount(ends, one, count) for one in directions.T]).astype(float)
+    mean = np.column_stack([np.bincount(ends, e, count) for e in directions.T]).astype(float)
     size = np.linalg.norm(mean, axis=1, keepdims=True)
     normal = np.divide(mean, size, out=np.zeros_like(mean), where=size > 0.0)
     squares = np.einsum("mi,mi->m", directions, normal[ends]) ** 2

@@ -50,7 +50,7 @@ class KelvinVoigt(Effect):
             reference=model.particles.positions,
             time=self.time,
             gradients=gradients,
-            damping_rate=self.time * max(_highest_square(one) for one in gradients),
+            damping_rate=self.time * max(_highest_square(gradient) for gradient in gradients),
         )
 
     def pair_work(self, particles: float, pairs: float) -> float:
@@ -95,11 +95,11 @@ class _Dashpot(Load):
 
     @property
     def arrays(self) -> Mapping[str, int]:
-        return {f"gradient of {one.body.name}": one.matrices.bytes for one in self.gradients}
+        return {f"gradient of {g.body.name}": g.matrices.bytes for g in self.gradients}
 
     @property
     def pair_count(self) -> int:
-        return 3 * sum(one.pair_count for one in self.gradients)  # both gradients, the divergence
+        return 3 * sum(g.pair_count for g in self.gradients)  # both gradients, the divergence
 
     @property
     def particles(self) -> Indices:

@@ -43,14 +43,14 @@ def of_steps(
     """Additional compilations for whole steps."""
     d = equation.particles.dimension
     threaded = any(o.threaded for part in parts for o in part.operations)
-    kinds = tuple(sorted(type(one).__name__ for one in (*equation.constraints, *equation.loads)))
+    kinds = tuple(sorted(type(term).__name__ for term in (*equation.constraints, *equation.loads)))
     laws = frozenset(_law(part) for part in parts)
     yield Compilation(CompilationUnit.STEPS, d, threaded, (type(integrator), laws, kinds))
     for load in equation.loads:
         unit = kind_of(load).unit
         key = None if unit is CompilationUnit.LOAD and not kind_of(load).formula else type(load)
         yield Compilation(unit, d, threaded, key)
-    if any(isinstance(one, GhostConstraint) for one in equation.constraints):
+    if any(isinstance(term, GhostConstraint) for term in equation.constraints):
         yield Compilation(CompilationUnit.EXTENSION, d, threaded)
 
 

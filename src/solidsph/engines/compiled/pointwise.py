@@ -135,7 +135,7 @@ def _called(function: FunctionType) -> Iterator[FunctionType]:
             "math",
         ):
             inside = (vars(value).get(name) for name in names)
-            yield from (one for one in inside if isinstance(one, FunctionType))
+            yield from (inner for inner in inside if isinstance(inner, FunctionType))
 
 
 def _names(code: CodeType) -> Iterator[str]:

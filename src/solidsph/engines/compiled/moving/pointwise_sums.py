@@ -92,8 +92,8 @@ class PointwiseSums:
 @cache
 def _gather(dimension: int, correction: Any, of_differences: bool) -> Any:
     """Loop (place, u, corrections, own, gradients) -> whether all K are finite."""
-    row, one = ROW[dimension], IDENTITY[dimension]
-    nothing = tuple(tuple(0.0 for _ in r) for r in one)
+    row, identity = ROW[dimension], IDENTITY[dimension]
+    nothing = tuple(tuple(0.0 for _ in r) for r in identity)
     corrects = correction is not None
 
     @njit(error_model="numpy")
@@ -115,7 +115,7 @@ def _gather(dimension: int, correction: Any, of_differences: bool) -> Any:
                 total = moved(total, 1.0, plain)
                 if corrects:
                     moment = with_outer(moment, offset, plain)
-            K = one
+            K = identity
             if corrects:
                 K = numbers(correction(moment))
             weight = with_product(nothing[0], K, total)

@@ -87,9 +87,9 @@ class ReferenceBody:
     @property
     def bytes(self) -> int:
         """Memory of all arrays [bytes]."""
-        rows = {id(one): one.bytes for one in (self.gradient, self.force)}
+        rows = {id(part): part.bytes for part in (self.gradient, self.force)}
         both = (self.gradient_partition, self.force_partition)
-        buffers = {id(one): one.buffers.nbytes for one in both}
+        buffers = {id(part): part.buffers.nbytes for part in both}
         own = self.factors.nbytes + self.u.nbytes
         return own + sum(rows.values()) + sum(buffers.values())
 
@@ -99,11 +99,11 @@ class ReferenceBody:
         n, d = self.body.particles.positions.shape
         # Gathering and scattering are one pass each; a pair counts once for the two together.
         both = (self.gradient, self.force)
-        run_pairs = sum(one.run_pairs for one in both) // 2
-        row_pairs = sum(one.row_pairs for one in both) // 2
-        ran = sum(one.run_particles for one in both) // 2
-        row_bytes = sum({id(one): one.row_bytes for one in both}.values())
-        stencil_bytes = sum({id(one): one.bytes for one in both}.values()) - row_bytes
+        run_pairs = sum(part.run_pairs for part in both) // 2
+        row_pairs = sum(part.row_pairs for part in both) // 2
+        ran = sum(part.run_particles for part in both) // 2
+        row_bytes = sum({id(part): part.row_bytes for part in both}.values())
+        stencil_bytes = sum({id(part): part.bytes for part in both}.values()) - row_bytes
         # The number of buffers depends on the threads of the machine; at least one is touched.
         touched = stencil_bytes + self.factors.nbytes + 2 * self.u.nbytes + vectors(n, d)
         held = self.bytes - row_bytes

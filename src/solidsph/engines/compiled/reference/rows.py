@@ -64,7 +64,7 @@ class Rows(NamedTuple):
         return cls(
             blocks=np.ascontiguousarray(blocks[np.argsort(blocks[:, 0])]),
             members=members,
-            stencils=row_starts(np.array([len(one) for one in banded], dtype=np.intp)),
+            stencils=row_starts(np.array([len(own) for own in banded], dtype=np.intp)),
             offsets=np.concatenate([np.empty(0, dtype=np.intp), *(own for own, _ in stencils)]),
             stencil_weights=np.concatenate([row_weights[:0], *weights]),
             bands=np.concatenate([np.empty((0, 3), dtype=np.intp), *banded]),

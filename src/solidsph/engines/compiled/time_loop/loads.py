@@ -112,13 +112,13 @@ def _prepare_scheduled(load: ScheduledLoad, reference: Array, threaded: bool) ->
 def _prepare_hourglass(load: HourglassLoad, reference: Array, threaded: bool) -> CompiledLoad:
     d = reference.shape[1]
     sweeps = [
-        one if isinstance(one, HourglassSweeps) else HourglassSweeps.of(one.pairs)
-        for one in load.operators
+        operator if isinstance(operator, HourglassSweeps) else HourglassSweeps.of(operator.pairs)
+        for operator in load.operators
     ]
     own = HourglassData(
-        tuple(one.arrays for one in sweeps), ScheduledForces(np.zeros((1, *reference.shape)))
+        tuple(sweep.arrays for sweep in sweeps), ScheduledForces(np.zeros((1, *reference.shape)))
     )
-    each = call_each(tuple(body_sweep(one.sweep) for one in sweeps))
+    each = call_each(tuple(body_sweep(sweep.sweep) for sweep in sweeps))
     return CompiledLoad(_hourglass(each, _accounted(_scheduled(d), d, threaded)), lambda times: own)
 
 

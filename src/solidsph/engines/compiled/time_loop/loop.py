@@ -65,17 +65,18 @@ def are_compilable(
     integrator: Integrator,
 ) -> bool:
     """True if everything in a step is of a compilable kind, though a formula may still fail."""
-    kinds = tuple(one.kind for one in LOAD_KINDS)
+    kinds = tuple(kind.kind for kind in LOAD_KINDS)
     labels = [c.label for c in (*equation.loads, *equation.constraints)]
     fused = not conditions and all(body.fused for body in bodies)
-    alone = len(bodies) == 1 and all(isinstance(one, LinearExtension) for one in conditions)
+    alone = len(bodies) == 1 and all(isinstance(term, LinearExtension) for term in conditions)
     return (
         isinstance(integrator, PointwiseIntegrator)
         and (fused or alone)
         and all(isinstance(load, kinds) for load in equation.loads)
         and all(labels.count(load.label) == 1 for load in equation.loads)
         and all(
-            isinstance(one, (ScheduledConstraint, LinearExtension)) for one in equation.constraints
+            isinstance(term, (ScheduledConstraint, LinearExtension))
+            for term in equation.constraints
         )
     )
 
@@ -104,14 +105,14 @@ def compiled_loop(
     internal = internal_forces(bodies, conditions)
     loads = [compiled_load(load, particles.positions, threads > 1) for load in equation.loads]
     calls = [constraint_calls(motion, d) for motion in equation.constraints]
-    by_call = [tuple(one[k] for one in calls) for k in range(len(ConstraintCalls._fields))]
+    by_call = [tuple(call[k] for call in calls) for k in range(len(ConstraintCalls._fields))]
     steps = _steps(
         d,
         threads > 1,
         compiled_function(integrator.mean_velocity, *[types.float64] * 4),
         compiled_function(integrator.end_velocity, *[types.float64] * 3),
         internal.forces,
-        call_each(tuple(one.apply for one in loads)),
+        call_each(tuple(load.apply for load in loads)),
         ConstraintCalls(*(call_each(functions) for functions in by_call)),
     )
     return CompiledLoop(sums, equation, internal, loads, steps, threads)
