@@ -28,10 +28,10 @@ from solidsph.costs.foreseen import foreseen
 from solidsph.costs.model import Built, coefficient, predicted
 from solidsph.costs.shares import shares, without
 from solidsph.costs.timed import timed
-from solidsph.costs.work import CompilationUnit, Loop
+from solidsph.costs.work import Loop
 from solidsph.errors import SceneError
 from solidsph.interfaces.effect import Effect
-from solidsph.interfaces.plan import SumMethod
+from solidsph.interfaces.plan import CompilationUnit, SumMethod
 from solidsph.interfaces.terms import Load
 from solidsph.run.stable_step import largest_step
 from tests.commands.test_cli import solidsph
