@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from solidsph.engines.compiled.engine import CompiledEngine, CompiledForces
-from solidsph.engines.compiled.moving import MovingBody
+from solidsph.engines.compiled.moving.body import MovingBody
 from solidsph.engines.matrix import MatrixEngine
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.smoothing_kernel import smoothing_kernel

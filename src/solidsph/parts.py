@@ -10,7 +10,6 @@ from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.compilable_terms import (
     LinearExtension,
     PairLoad,
-    PairTable,
     PointwiseLoad,
     ScheduledConstraint,
     ScheduledLoad,
@@ -29,7 +28,16 @@ from solidsph.interfaces.integrator import Integrator, PointwiseIntegrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.law import Law, memory_name
 from solidsph.interfaces.material import Material
-from solidsph.interfaces.plan import BodySize, Compilation, Operations, Piece, Plan, Way
+from solidsph.interfaces.memory import Memory
+from solidsph.interfaces.pair_table import PairTable
+from solidsph.interfaces.plan import (
+    BodySize,
+    Compilation,
+    CompilationUnit,
+    Operations,
+    Plan,
+    SumMethod,
+)
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel, smoothing_kernel
 from solidsph.interfaces.subset import Subset
@@ -94,6 +102,7 @@ __all__ = [
     "BuiltScene",
     "Case",
     "Compilation",
+    "CompilationUnit",
     "Component",
     "Configuration",
     "Constraint",
@@ -123,6 +132,7 @@ __all__ = [
     "Mask",
     "Material",
     "Measurement",
+    "Memory",
     "Need",
     "Observation",
     "Operations",
@@ -130,7 +140,6 @@ __all__ = [
     "PairTable",
     "Pairs",
     "Particles",
-    "Piece",
     "Plan",
     "PluginError",
     "PointwiseDivergence",
@@ -152,6 +161,7 @@ __all__ = [
     "StressFields",
     "StressTerm",
     "Subset",
+    "SumMethod",
     "Surface",
     "SurfaceLoad",
     "Tensor",
@@ -160,7 +170,6 @@ __all__ = [
     "Trial",
     "Vector",
     "VectorField",
-    "Way",
     "Where",
     "add",
     "cauchy_stress",

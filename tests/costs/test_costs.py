@@ -30,7 +30,7 @@ from solidsph.costs.timing import time_uncounted
 from solidsph.costs.work import Loop
 from solidsph.errors import SceneError
 from solidsph.interfaces.effect import Effect
-from solidsph.interfaces.plan import Piece, Way
+from solidsph.interfaces.plan import CompilationUnit, SumMethod
 from solidsph.interfaces.terms import Load
 from solidsph.run.stable_step import stable_step
 from tests.commands.test_cli import solidsph
@@ -78,7 +78,7 @@ def test_a_bar_is_counted_as_by_hand() -> None:
     assert work.outputs == 4
     # Two matrices of a number and an index for each pair, and where each of ten rows begins.
     matrices = 2 * (PAIRS * (8 + 8) + 11 * 8)
-    assert part.way is Way.PRODUCTS
+    assert part.method is SumMethod.PRODUCTS
     assert part.held == work.held == simulation.dynamics.internal.bytes == matrices
     assert work.touched == matrices + 2 * 10 * 8  # displacements and forces
     assert work.traffic == work.touched * work.evaluations
@@ -88,7 +88,7 @@ def test_a_bar_is_counted_as_by_hand() -> None:
 
 def test_moving_neighbours_are_counted_at_the_start() -> None:
     (part,) = count_work(bar(formulation="updated-lagrangian").build()).operations
-    assert (part.way, part.pairs) == (Way.PRODUCTS_ANEW, PAIRS)
+    assert (part.method, part.pairs) == (SumMethod.PRODUCTS_ANEW, PAIRS)
     assert part.held == 10 * 8  # the sums of the kernel; all else is formed anew
 
 
@@ -97,14 +97,19 @@ def test_the_compiled_engine_visits_the_same_pairs(engine: str, bytes_each: int)
     simulation = bar(engine).build()
     work = count_work(simulation)
     stencils, rows = work.operations
-    assert (stencils.way, rows.way) == (Way.STENCILS, Way.ROWS)
+    assert (stencils.method, rows.method) == (SumMethod.STENCILS, SumMethod.ROWS)
     assert stencils.pairs + rows.pairs == work.pairs == PAIRS
     assert stencils.particles + rows.particles == 10
     assert {part.precision for part in work.operations} == {bytes_each}
     assert work.held == sum(part.bytes for part in simulation.dynamics.internal.parts)
     assert work.loop is Loop.COMPILED
-    pieces = {one.piece for one in work.compilations}
-    assert pieces == {Piece.ENGINE, Piece.FORCES, Piece.FIELDS, Piece.STEPS}
+    pieces = {one.unit for one in work.compilations}
+    assert pieces == {
+        CompilationUnit.ENGINE,
+        CompilationUnit.FORCES,
+        CompilationUnit.FIELDS,
+        CompilationUnit.STEPS,
+    }
 
 
 def test_effects_add_the_pairs_that_they_visit() -> None:
@@ -113,7 +118,7 @@ def test_effects_add_the_pairs_that_they_visit() -> None:
     assert count_work(viscous).visited == count_work(plain).visited + PAIRS - 10
     held = count_work(bar().effect("hourglass-control").build())
     assert held.visited > 3 * PAIRS  # the gradient's twice, and the nearest between
-    assert held.operations[-1].way is Way.HOURGLASS_PRODUCTS
+    assert held.operations[-1].method is SumMethod.HOURGLASS_PRODUCTS
 
 
 def test_counts_are_the_same_every_time(tmp_path: Path) -> None:
@@ -443,7 +448,7 @@ class _Blowing(Load):
 def test_what_is_not_known_is_priced_by_defaults() -> None:
     simulation = bar().effect(Wind()).build()
     work = count_work(simulation)
-    assert work.operations[-1].way is Way.UNKNOWN
+    assert work.operations[-1].method is SumMethod.UNKNOWN
     assert work.visited == PAIRS  # it says of no pairs that it visits them
     prediction = predictions.try_prediction(simulation, None)
     assert prediction is not None
@@ -512,13 +517,13 @@ def test_only_what_is_of_no_declared_kind_is_timed(monkeypatch: pytest.MonkeyPat
     assert found.seconds == 1.0  # of one evaluation
     assert found.without("heat").seconds == 0.0
     # What is time_uncounted is not counted as well.
-    ways = {part.way for part in found.without_timed(count_work(hot), hot).operations}
-    assert Way.UNKNOWN in {part.way for part in count_work(hot).operations}
+    ways = {part.method for part in found.without_timed(count_work(hot), hot).operations}
+    assert SumMethod.UNKNOWN in {part.method for part in count_work(hot).operations}
     assert not any(
-        p.way is Way.UNKNOWN and p.pairs
+        p.method is SumMethod.UNKNOWN and p.pairs
         for p in found.without_timed(count_work(hot), hot).operations
     )
-    assert Way.PRODUCTS in ways
+    assert SumMethod.PRODUCTS in ways
 
 
 def test_what_was_timed_is_in_the_prediction() -> None:

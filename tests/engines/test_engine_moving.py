@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from solidsph import Simulation
-from solidsph.engines.compiled.cells import NeighbourSearch
 from solidsph.engines.compiled.engine import CompiledEngine, CompiledForces
-from solidsph.engines.compiled.moving import MovingBody
-from solidsph.engines.compiled.neighbourhoods import Neighbourhoods, fill
-from solidsph.engines.compiled.pointwise_sums import PointwiseSums
-from solidsph.engines.compiled.weighted_sums import WeightedSums
+from solidsph.engines.compiled.moving.body import MovingBody
+from solidsph.engines.compiled.moving.neighbourhoods import Neighbourhoods, fill
+from solidsph.engines.compiled.moving.pointwise_sums import PointwiseSums
+from solidsph.engines.compiled.moving.search import NeighbourSearch
+from solidsph.engines.compiled.moving.weighted_sums import WeightedSums
 from solidsph.engines.matrix import MatrixEngine
 from solidsph.errors import BuildError
 from solidsph.interfaces.body import Body

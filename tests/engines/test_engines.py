@@ -13,8 +13,8 @@ import pytest
 
 from solidsph import Simulation
 from solidsph.engines.automatic import AutomaticEngine
-from solidsph.engines.compiled import shares
 from solidsph.engines.compiled.engine import CompiledEngine, CompiledForces
+from solidsph.engines.compiled.reference import partition
 from solidsph.engines.matrix import MatrixEngine, MatrixForces
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import Engine, InternalForces
@@ -241,13 +241,13 @@ def test_compiled_by_several_threads(
     d: int, arrangement: dict[str, Any], divergence: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same forces as the reference's, and the same bits at every call."""
-    monkeypatch.setattr(shares, "WORTH_A_THREAD", 1)
+    monkeypatch.setattr(partition, "WORTH_A_THREAD", 1)
     formulation = {"type": "total-lagrangian", "divergence": divergence}
     lengths = [400.0] if d == 1 else [4.0, 6.0]
     simulation = block(d, arrangement, lengths=lengths, formulation=formulation).build()
     reference = prepared(MatrixEngine(), simulation)
     forces = compiled(simulation)
-    assert forces.parts[0].gradient_shares.threaded
+    assert forces.parts[0].gradient_partition.threaded
     u = random_displacements(simulation)
     assert_same(forces, reference, u)
     assert np.array_equal(forces.forces(0.0, u), forces.forces(0.0, u))

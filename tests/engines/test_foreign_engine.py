@@ -8,7 +8,7 @@ import pytest
 from solidsph import BuildError, Scene, Simulation
 from solidsph.costs.count import count_work
 from solidsph.costs.estimate import estimate_work
-from solidsph.interfaces.plan import Way
+from solidsph.interfaces.plan import SumMethod
 from solidsph.registry import registry
 from tests.helpers.guides import Guide
 from tests.helpers.scenes import box
@@ -46,10 +46,10 @@ def test_it_runs_the_scene_as_the_reference_does(dense: None) -> None:
 def test_its_plan_is_what_costs_read(dense: None) -> None:
     simulation = scene("dense")
     work, n = count_work(simulation), simulation.particles.count
-    assert work.operations[0].way is Way.UNKNOWN
+    assert work.operations[0].method is SumMethod.UNKNOWN
     assert work.operations[0].pairs == n * n
     assert not simulation.plan.compiles_steps
-    assert estimate_work(simulation.scene).operations[0].way is Way.UNKNOWN
+    assert estimate_work(simulation.scene).operations[0].method is SumMethod.UNKNOWN
     (entry,) = [one for one in simulation.parts if one.kind == "engines"]
     assert entry.distribution == "guide-dense"
 

@@ -10,8 +10,8 @@ import pytest
 from numba.core.config import NUMBA_NUM_THREADS
 
 from solidsph import DivergedError, Simulation
-from solidsph.engines.compiled import shares
-from solidsph.engines.compiled.loop import CompiledLoop
+from solidsph.engines.compiled.reference import partition
+from solidsph.engines.compiled.time_loop.loop import CompiledLoop
 from solidsph.interfaces.compilable_terms import PointwiseLoad
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.terms import Load, Observation
@@ -177,7 +177,7 @@ def test_the_paper_s_bar() -> None:
 @pytest.mark.validation  # half a minute of compiling
 @pytest.mark.skipif(NUMBA_NUM_THREADS < 2, reason="there is one thread only")
 def test_several_bodies_and_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shares, "WORTH_A_THREAD", 1)
+    monkeypatch.setattr(partition, "WORTH_A_THREAD", 1)
     builder = box(3, 7).body(
         "other",
         shape={"type": "box", "lengths": [0.4, 0.4, 0.4], "origin": [3.0, 0.0, 0.0]},

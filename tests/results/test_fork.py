@@ -15,9 +15,9 @@ CODE = """
 import multiprocessing as mp, os, sys
 from concurrent.futures import ProcessPoolExecutor
 from solidsph import SolidsphError
-from solidsph.engines.compiled import shares
+from solidsph.engines.compiled.reference import partition
 from tests.helpers.scenes import box
-shares.WORTH_A_THREAD = 1
+partition.WORTH_A_THREAD = 1
 def built():
     return box(1, 12).initial(velocity={{"x": "X"}}).engine("compiled").outputs(1).build()
 def told(simulation=None):

@@ -8,6 +8,7 @@ import attrs
 import pytest
 
 from solidsph import SceneError
+from solidsph.costs.count import count_work
 from solidsph.registry import registry
 from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation

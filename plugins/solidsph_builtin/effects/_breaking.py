@@ -1,4 +1,4 @@
-"""Internal forces of bodies whose bonds fail: pairs of neighbours that act no more."""
+"""Internal forces of bodies with bonds, that is neighbour pairs, that fail."""
 
 from __future__ import annotations
 
@@ -14,54 +14,54 @@ from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import InternalForces, StressFields
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.law import Law, memory_name
-from solidsph.interfaces.plan import Operations
+from solidsph.interfaces.memory import Memory
+from solidsph.interfaces.plan import Operations, array_bytes
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs
+from solidsph_builtin.effects._gradients import real_pairs
 
-# A moment that is I in a full neighbourhood, and half of it at a flat surface: where its least
-# direction has less than this, what is left of the neighbours determines no gradient.
+# Smallest singular value of the moment, which is I in a full neighbourhood and half of that at a
+# flat surface, below which the remaining neighbours do not determine a gradient.
 _LEAST_MOMENT = 0.25
 
 
 @attrs.frozen(eq=False)
 class Bonds:
-    """Pairs of neighbours of one body, and how far each may be stretched."""
+    """Neighbour pairs of one body and their critical stretch."""
 
     body: Body
     pairs: Pairs
     kernel_gradients: Array  # (m, d)
     critical_stretch: float  # [-]
-    may_fail: Mask  # (m,)
-    # (p, q) and (q, p) fail together: their stretches are the same to the bit.
+    may_fail: Mask  # (m,); (p, q) and (q, p) fail together, having the same stretch to the bit
 
     @classmethod
     def of(cls, body: Body, critical_stretch: float, chosen: Mask) -> Bonds:
-        """Those of a body; only bonds with both ends among the chosen particles (n,) may fail."""
+        """The bonds of a body; only those between chosen particles (n,) may fail."""
         pairs = body.pairs()
-        real = ~body.particles.ghosts & chosen
-        may = real[pairs.rows] & real[pairs.columns] & (pairs.distances > 0.0)
+        may = real_pairs(body, pairs) & chosen[pairs.rows] & chosen[pairs.columns]
         kernel_gradients = body.smoothing.gradient(pairs.offsets, pairs.distances)
         return cls(body, pairs, kernel_gradients, critical_stretch, may)
 
     @property
     def name(self) -> str:
-        """Where they are in `State.memory`."""
+        """Name of their flags in `State.memory`."""
         return f"bonds of {self.body.name}"
 
     @property
     def bytes(self) -> int:
-        """Memory of the list, and of the flags."""
+        """Memory of the list and of the flags [bytes]."""
         p = self.pairs
         listed = (p.starts, p.rows, p.columns, p.offsets, p.distances, self.kernel_gradients)
-        return sum(one.nbytes for one in listed) + 9 * p.count
+        return array_bytes(listed) + 9 * p.count
 
-    def whole(self) -> Array:
-        """Flags (m,) of bonds that have not failed: 1, and 0 for those that have."""
+    def intact(self) -> Array:
+        """Flags (m,) of intact bonds, all 1; a bond that has failed has 0."""
         return np.ones(self.pairs.count)
 
     def after(self, flags: Array, displacements: Array) -> Array:
-        """The flags at displacements (n, d): the same array if no bond has failed."""
+        """Flags at displacements (n, d) [m]: the same array if no bond has failed since."""
         u = displacements
         p, q = self.pairs.rows, self.pairs.columns
         now = self.pairs.offsets + u[q] - u[p]
@@ -78,7 +78,7 @@ class Bonds:
             left = np.where(torn, 0.0, left)
 
     def _alone(self, flags: Array) -> Mask:
-        """Particles (n,) whose bonds that are left determine no gradient."""
+        """True for particles (n,) whose remaining bonds do not determine a gradient."""
         weights = self.kernel_gradients * flags[:, None]
         weights *= self.body.particles.cells[self.pairs.columns, None]
         moments = self.pairs.row_sums(self.pairs.offsets[:, :, None] * weights[:, None, :])
@@ -87,16 +87,16 @@ class Bonds:
         return np.asarray(touched & (least < _LEAST_MOMENT))
 
     def damage(self, flags: Array) -> Array:
-        """Part of each particle's bonds that have failed, (n,) [-]."""
+        """Fraction of the bonds of each particle that have failed, (n,) [-]."""
         own = np.diff(self.pairs.starts) - 1  # a particle is among its own neighbours
         failed = self.pairs.row_sums(1.0 - flags)
         return np.asarray(failed / np.maximum(own, 1))
 
     def operators(self, flags: Array) -> Operators:
-        """Gradient and force matrices of the bonds that are left."""
+        """Gradient and force matrices of the remaining bonds."""
         body, pairs = self.body, self.pairs
         alone = pairs.spread(self._alone(flags))
-        # A gradient that nothing determines is not asked for: such a particle stays unstrained.
+        # Where no gradient is determined, none is formed: such a particle stays unstrained.
         acting = np.where(alone, 1.0, flags)[:, None] * self.kernel_gradients
         gradient = body.formulation.gradient.weights(pairs, acting, body.particles.cells)
         gradient = np.where(alone[:, None], 0.0, gradient)
@@ -107,7 +107,7 @@ class Bonds:
 @final
 @attrs.frozen(eq=False)
 class _Damaged(Law):
-    """A law of which damage leaves a part, P = (1 - D) P(F)."""
+    """A law weakened by damage, P = (1 - D) P(F)."""
 
     body: Body
     own: Law
@@ -121,10 +121,10 @@ class _Damaged(Law):
 @final
 @attrs.define(eq=False)
 class BreakingForces(InternalForces):
-    """Internal forces by the bonds that are left, and which those are.
+    """Internal forces of the remaining bonds.
 
-    Which have failed is in `State.memory`, with the energy that was in the strain they let go. The
-    matrices are kept until a bond fails, which changes no result.
+    The flags of bonds and the strain energy that failures have released are in `State.memory`. The
+    matrices are cached until a bond fails.
     """
 
     advances_histories: ClassVar[bool] = True
@@ -137,31 +137,35 @@ class BreakingForces(InternalForces):
 
     @property
     def pair_count(self) -> int:
-        return sum(one.pairs.count for one in self.bonds)
+        return sum(bonds.pairs.count for bonds in self.bonds)
 
     @property
     def operations(self) -> Sequence[Operations]:
-        return self._of(tuple(one.whole() for one in self.bonds)).sums.operations
+        return self._intact.sums.operations
+
+    @property
+    def _intact(self) -> HistoryForces:
+        return self._of(tuple(bonds.intact() for bonds in self.bonds))
 
     def forces(self, time: float, displacements: Array) -> Array:
         return self.advance(time, 0.0, displacements, {})[0]
 
     def advance(
-        self, time: float, step: float, displacements: Array, memory: Mapping[str, Array]
-    ) -> tuple[Array, Mapping[str, Array]]:
+        self, time: float, step: float, displacements: Array, memory: Memory
+    ) -> tuple[Array, Memory]:
         flags = self._remembered(memory)
-        kept = {one.name: own for one, own in zip(self.bonds, flags, strict=True)}
+        kept = {bonds.name: own for bonds, own in zip(self.bonds, flags, strict=True)}
         if step > 0.0:
             after = tuple(
-                one.after(own, displacements[one.body.extent])
-                for one, own in zip(self.bonds, flags, strict=True)
+                bonds.after(own, displacements[bonds.body.extent])
+                for bonds, own in zip(self.bonds, flags, strict=True)
             )
             if any(new is not old for new, old in zip(after, flags, strict=True)):
                 energies = [
-                    self._observed(one, displacements, memory).energy_densities
-                    for one in (flags, after)
+                    self._observed(state, displacements, memory).energy_densities
+                    for state in (flags, after)
                 ]
-                kept = {one.name: own for one, own in zip(self.bonds, after, strict=True)}
+                kept = {bonds.name: own for bonds, own in zip(self.bonds, after, strict=True)}
                 kept[_RELEASED] = self._released(memory, displacements) + energies[0] - energies[1]
                 flags = after
         forces, histories = self._of(flags).advance(time, step, displacements, memory)
@@ -170,28 +174,26 @@ class BreakingForces(InternalForces):
             kept[_RELEASED] = released - self._spared(flags, memory, histories)
         return forces, {**kept, **histories}
 
-    def _spared(
-        self, flags: Sequence[Array], memory: Mapping[str, Array], after: Mapping[str, Array]
-    ) -> Array:
-        """What laws count as dissipated in a step beyond the part that damage leaves, (n,) [J/m^3].
+    def _spared(self, flags: Sequence[Array], memory: Memory, after: Mapping[str, Array]) -> Array:
+        """Excess of the dissipation in a step according to the laws, (n,) [J/m^3].
 
-        A law knows nothing of damage; its stress is scaled by 1 - D, and so is what it dissipates.
+        A law does not know the damage; its stress is scaled by 1 - D, and so is its dissipation.
         """
-        spared = np.zeros(sum(one.body.particles.count for one in self.bonds))
-        for law, one, own in zip(self.laws, self.bonds, flags, strict=True):
+        spared = np.zeros(sum(bonds.body.particles.count for bonds in self.bonds))
+        for law, bonds, own in zip(self.laws, self.bonds, flags, strict=True):
             name, material = memory_name(law.body), law.body.material
             if name in after and isinstance(material, HistoryMaterial):
                 lost = [
                     material.dissipated(tuple(history.T))
                     for history in (law.history_of(memory), after[name])
                 ]
-                spared[one.body.extent] = one.damage(own) * (lost[1] - lost[0])
+                spared[bonds.body.extent] = bonds.damage(own) * (lost[1] - lost[0])
         return spared
 
     def fields(self, displacements: Array) -> StressFields:
         return self.observed(displacements, {})
 
-    def observed(self, displacements: Array, memory: Mapping[str, Array]) -> StressFields:
+    def observed(self, displacements: Array, memory: Memory) -> StressFields:
         found = self._observed(self._remembered(memory), displacements, memory)
         dissipated = found.dissipated_densities
         released = self._released(memory, displacements)
@@ -199,42 +201,42 @@ class BreakingForces(InternalForces):
         return attrs.evolve(found, dissipated_densities=total)
 
     def _observed(
-        self, flags: tuple[Array, ...], displacements: Array, memory: Mapping[str, Array]
+        self, flags: tuple[Array, ...], displacements: Array, memory: Memory
     ) -> StressFields:
         found = self._of(flags).observed(displacements, memory)
-        for one, own in zip(self.bonds, flags, strict=True):
-            left, extent = 1.0 - one.damage(own), one.body.extent
+        for bonds, own in zip(self.bonds, flags, strict=True):
+            left, extent = 1.0 - bonds.damage(own), bonds.body.extent
             found.stresses[extent] *= left[:, None, None]
             found.energy_densities[extent] *= left
         return found
 
     def gradients(self, displacements: Array) -> Array:
-        whole = tuple(one.whole() for one in self.bonds)
-        return self._of(whole).gradients(displacements)
+        return self._intact.gradients(displacements)
 
     def spread(self, displacements: Array, stress: Array) -> Array:
-        whole = tuple(one.whole() for one in self.bonds)
-        return self._of(whole).spread(displacements, stress)
+        return self._intact.spread(displacements, stress)
 
-    def _remembered(self, memory: Mapping[str, Array]) -> tuple[Array, ...]:
-        return tuple(memory[one.name] if one.name in memory else one.whole() for one in self.bonds)
+    def _remembered(self, memory: Memory) -> tuple[Array, ...]:
+        return tuple(
+            memory[bonds.name] if bonds.name in memory else bonds.intact() for bonds in self.bonds
+        )
 
-    def _released(self, memory: Mapping[str, Array], displacements: Array) -> Array:
-        """Strain energy let go so far, (n,) [J/m^3]."""
+    def _released(self, memory: Memory, displacements: Array) -> Array:
+        """Strain energy released so far, (n,) [J/m^3]."""
         return memory.get(_RELEASED, np.zeros(len(displacements)))
 
     def _of(self, flags: tuple[Array, ...]) -> HistoryForces:
-        """The forces by these bonds."""
+        """The forces of bonds with these flags."""
         same = len(flags) == len(self._flags) and all(
             new is old for new, old in zip(flags, self._flags, strict=True)
         )
         if self._sums is None or not same:
-            made = [one.operators(own) for one, own in zip(self.bonds, flags, strict=True)]
-            self._sums = fixed_forces([one.body for one in self.bonds], made, self.conditions)
+            made = [bonds.operators(own) for bonds, own in zip(self.bonds, flags, strict=True)]
+            self._sums = fixed_forces([bonds.body for bonds in self.bonds], made, self.conditions)
             self._flags = flags
         laws = [
-            _Damaged(law.body, law, 1.0 - one.damage(own))
-            for law, one, own in zip(self.laws, self.bonds, flags, strict=True)
+            _Damaged(law.body, law, 1.0 - bonds.damage(own))
+            for law, bonds, own in zip(self.laws, self.bonds, flags, strict=True)
         ]
         return HistoryForces(self._sums, laws, self.conditions)
 

@@ -1,4 +1,4 @@
-"""How much of a place a body fills: smoothed, so that a lattice does not show."""
+"""Smoothed volume fraction of a body, in which a lattice does not show."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from solidsph.interfaces.smoothing_kernel import SmoothingKernel, smoothing_kern
 from solidsph.maths.arrays import Array, Indices, Scalar
 
 REACH = 2.5
-"""Support of the smoothing in spacings: beside a lattice the place where two bodies touch then
-varies by less than a thousandth of a spacing, in 2D by less than a ten-thousandth."""
+"""Support radius of the smoothing in spacings: along a lattice the position at which bodies touch
+then varies by less than a thousandth of a spacing, in 2D by less than a ten-thousandth."""
 
 _NODES, _WEIGHTS = leggauss(64)
 
-# Depths at which the filling beside a plane face is tabulated: read off between two of them, it is
-# right to 1e-6.
+# Number of depths at which the volume fraction beside a plane face is tabulated; interpolation is
+# then right to 1e-6.
 _TABULATED = 1000
 
 
 @final
 @attrs.frozen
 class _QuinticSpline(Kernel):
-    """The M6 spline of Schoenberg (1946): it keeps a constant on a lattice to 3e-4."""
+    """The M6 spline of Schoenberg (1946), which reproduces a constant on a lattice to 3e-4."""
 
     knots: ClassVar[tuple[float, ...]] = (1.0 / 3.0, 2.0 / 3.0)
 
@@ -56,26 +56,26 @@ class Sites:
     particles: Indices  # (m,) among those of all bodies
     positions: Array  # (m, d) X [m]
     volumes: Array  # (m,) V [m^d]
-    room: Array  # (m,) the part around each that the other may fill [-]
-    depths: Array  # (m,) below the body's surface [m]
+    room: Array  # (m,) volume fraction around each that the other may fill [-]
+    depths: Array  # (m,) below the surface of the body [m]
 
 
 def crowding_kernel(dimension: int, radius: float) -> SmoothingKernel:
-    """W of a support radius [m]."""
+    """The smoothing kernel with a support radius [m]."""
     return smoothing_kernel(_QuinticSpline(), dimension, radius)
 
 
 def steepest(kernel: SmoothingKernel) -> float:
-    """The largest change of what a body fills on the way into it [1/m]: at its surface."""
+    """Largest gradient of the volume fraction of a body, at its surface [1/m]."""
     return float(_layer(kernel, np.zeros(1))[0])
 
 
 def sensitivity(kernel: SmoothingKernel, excess: float) -> float:
-    """What K / rho is multiplied by in the square of a frequency of contact, at most [1/m^2].
+    """Bound on the squared angular frequency of contact, over K / rho [1/m^2].
 
-    The excess of a particle has the gradient g, and K V g g^T is its stiffness. The Gram matrix
-    of all g, by mass, has no row whose absolute values add up to more than the square of the
-    integral of |dW/dr|. What a push bends adds twice the integral of |W''| times the excess.
+    The excess of a particle has the gradient g, and K V g g^T is its stiffness. The absolute values
+    in a row of the mass-weighted Gram matrix of all g add up to at most the square of the integral
+    of |dW/dr|. The geometric stiffness adds twice the integral of |W''| times the excess.
     """
     d, H = kernel.dimension, kernel.support_radius
     r = np.linspace(0.0, H, 2001)
@@ -88,13 +88,13 @@ def sensitivity(kernel: SmoothingKernel, excess: float) -> float:
 
 
 def sites(body: Body, other: Body, kernel: SmoothingKernel, *, near_surface: bool = False) -> Sites:
-    """The particles of a body that have a mass, or only those `near_surface`, to touch the `other`.
+    """The particles of a body, or only those `near_surface`, that may touch the `other`.
 
-    Around a particle below a plane face, another plane face that lies on that face fills a part
-    that depends on the particle's depth and on the other's rows of particles: a sum over rows is
-    not the integral, and unlike rows make unlike sums. That part is the particle's room, so that
-    faces touch where their surfaces are, however both bodies are divided. Less than a plane face,
-    such as its edge, never fills more.
+    Around a particle below a plane face, a body whose plane face lies on that face has a volume
+    fraction that depends on the particle's depth and on the rows of particles of the other body,
+    because a sum over rows is not the integral. That fraction is the particle's room, so that faces
+    touch where their surfaces are, however both bodies are divided. Less than a plane face, such as
+    an edge, never fills more.
     """
     own = body.particles
     real = np.flatnonzero(~own.ghosts)
@@ -112,7 +112,7 @@ def sites(body: Body, other: Body, kernel: SmoothingKernel, *, near_surface: boo
 
 
 def _filled_beside(body: Body, kernel: SmoothingKernel, heights: Array) -> Array:
-    """What the body fills at `heights` (m,) above a plane face of it, (m,) [-]."""
+    """Volume fraction of the body at `heights` (m,) above a plane face of it [m], (m,) [-]."""
     table = np.linspace(0.0, kernel.support_radius, _TABULATED)
     filled = np.zeros(_TABULATED)
     for depth, thickness in _rows(body, kernel.support_radius):
@@ -121,9 +121,9 @@ def _filled_beside(body: Body, kernel: SmoothingKernel, heights: Array) -> Array
 
 
 def _rows(body: Body, reach: float) -> list[tuple[float, float]]:
-    """Depth and thickness of the rows of particles below a plane face [m], down to `reach`.
+    """Depth and thickness of the rows of particles below a plane face, down to `reach` [m].
 
-    The first is as deep as the particles that own the surface usually are: half a spacing at the
+    The first is at the median depth of the particles that own the surface: half a spacing for
     centres of cells, and 0 on the surface, where a row is half as thick as the others.
     """
     own = body.particles
@@ -138,7 +138,7 @@ def _rows(body: Body, reach: float) -> list[tuple[float, float]]:
 
 
 def _layer(kernel: SmoothingKernel, heights: Array) -> Array:
-    """W integrated over the plane so far away, (m,) [1/m]."""
+    """W integrated over a plane at distances `heights` (m,) [m], (m,) [1/m]."""
     d, H = kernel.dimension, kernel.support_radius
     if d == 1:
         return kernel.value(heights)

@@ -1,4 +1,4 @@
-"""The gradient and the divergence of a body in the reference configuration, for effects."""
+"""Gradient, divergence and pairs of bodies in the reference configuration, for effects."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.formulation import Configuration
-from solidsph.maths.arrays import Array
+from solidsph.maths.arrays import Array, Mask
+from solidsph.model.neighbours import Pairs
 
 
 @attrs.frozen(eq=False)
 class BodyGradient:
-    """The sums that the internal forces of one body are made of."""
+    """The sums of which the internal forces of one body consist."""
 
     body: Body
     matrices: Operators
 
     @classmethod
     def of(cls, body: Body) -> BodyGradient:
-        """That of a body."""
+        """The gradient of a body."""
         return cls(body, operators(body, body.pairs()))
 
     @property
@@ -32,22 +33,24 @@ class BodyGradient:
 
     def gradient(self, field: Array) -> Array:
         """Gradient (d, d, n) of a vector field (n, d) of the body's particles."""
-        n, d = field.shape
-        along = (self.matrices.gradient @ field).reshape(d, n, d)
-        return np.asarray(along.transpose(2, 0, 1))
+        return self.matrices.gradients(field)
 
     def forces(self, stress: Array) -> Array:
         """Forces (n, d) [N] of a first Piola-Kirchhoff stress (d, d, n) [Pa]; ghosts have none."""
-        d = len(stress)
-        own = np.where(self.body.particles.ghosts, 0.0, stress)
-        return np.asarray(self.matrices.force @ own.transpose(1, 2, 0).reshape(-1, d))
+        return self.matrices.forces(np.where(self.body.particles.ghosts, 0.0, stress))
 
 
 def in_the_reference(model: DiscreteModel, effect: str) -> None:
-    """Raise SceneError unless the formulations of all bodies have their pairs in the reference."""
+    """Raise SceneError if the formulation of a body is not in the reference configuration."""
     for body in model.bodies:
         if body.formulation.configuration is not Configuration.REFERENCE:
             raise SceneError(
                 f"{effect}: it is written in the reference configuration, but the formulation of "
                 f"body {body.name!r} follows the motion; use 'total-lagrangian'"
             )
+
+
+def real_pairs(body: Body, pairs: Pairs) -> Mask:
+    """True for pairs of different particles neither of which is a ghost, (m,)."""
+    real = ~body.particles.ghosts
+    return np.asarray((pairs.distances > 0.0) & real[pairs.rows] & real[pairs.columns])

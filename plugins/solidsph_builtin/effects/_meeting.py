@@ -1,4 +1,4 @@
-"""Two bodies that may touch, or a body and itself: what they do to each other."""
+"""Contact forces between two bodies, or between parts of one."""
 
 from __future__ import annotations
 
@@ -14,41 +14,41 @@ from solidsph_builtin.effects._crowding import REACH
 from solidsph_builtin.effects._search import NeighbourList, Search
 from solidsph_builtin.effects._slip import slid
 
-# Below this part of the squared reach, particles in a line have no moment of inertia about it.
+# Relative to the squared reach: moments of inertia below this are those of particles on a line.
 _SLENDER = 1e-6
 
-# Sums of the same terms, taken in another order or moved as one, differ by less.
+# Bound on the relative rounding of sums of the same terms, in another order or after a translation.
 _ROUNDING = 1e-9
 
 
 @attrs.frozen(eq=False)
 class Touch:
-    """Pairs within reach, and how far particles are in each other's way."""
+    """Pairs within reach, and the excess of the volume fraction at every particle."""
 
     i: Indices  # (k,)
     j: Indices  # (k,)
     offsets: Array  # (k, d) x_i - x_j [m]
     values: Array  # (k,) W [m^-d]
     slopes: Array  # (k,) dW/dr / r [m^-(d+2)]
-    excess: Array  # (m,) o, by which the room of every particle is exceeded [-]
+    excess: Array  # (m,) o, volume fraction of the other body beyond the room [-]
 
 
 @attrs.frozen(eq=False)
 class Meeting:
-    """Particles are numbered here among those of the meeting, those of the first body before."""
+    """Two bodies that may touch; particles of the first are numbered before those of the second."""
 
     first: str  # name of a body
     second: str  # the other's, or the same
-    particles: Indices  # (m,) among all
-    belongs: Mask  # (m,) to the first body
+    particles: Indices  # (m,) among all particles
+    belongs: Mask  # (m,) True for those of the first body
     volumes: Array  # (m,) V [m^d]
-    room: Array  # (m,) what the other may fill around them [-]
-    depths: Array  # (m,) below their own surface [m]
+    room: Array  # (m,) volume fraction that the other may fill around them [-]
+    depths: Array  # (m,) below the surface of their body [m]
     modulus: float  # K [Pa]
     spring: Array  # (m,) of friction [N/m]
     kernel: SmoothingKernel
     search: Search
-    # A pure cache: no bit of a result depends on what is in it.
+    # A cache, which does not influence results.
     _near: NeighbourList = attrs.field(init=False, repr=False)
 
     @_near.default
@@ -57,12 +57,12 @@ class Meeting:
 
     @property
     def name(self) -> str:
-        """Who meets whom."""
+        """Names of the bodies."""
         return self.first if self.first == self.second else f"{self.first} and {self.second}"
 
     def touch(self, positions: Array) -> Touch | None:
-        """Who is near whom at `positions` (n, d) of all; None while no box is near another."""
-        if self.search.asleep(positions):
+        """Pairs at `positions` (n, d) of all particles [m]; None while the boxes are apart."""
+        if self.search.far_apart(positions):
             return None
         x = positions[self.particles]
         i, j = self._near.pairs(x)
@@ -79,11 +79,11 @@ class Meeting:
         )
 
     def unloaded(self, X: Array) -> Meeting:
-        """The same, without a force at the reference positions X (m, d) of its own particles.
+        """The meeting without forces at the reference positions X (m, d) of its particles [m].
 
-        Bodies are apart there, so what one fills around the other's particles is theirs to fill.
-        That settles faces that lie on each other at the start to rounding, also of scattered
-        particles, and in corners of the other, which fill more than a plane face does.
+        Bodies are apart there by definition, so room is at least the volume fraction of the other.
+        Faces that lie on each other initially then touch to rounding, also with scattered particles
+        and in corners of the other, which fill more than a plane face does.
         """
         i, j = self.search.within(X, self.kernel.support_radius)
         values = self.kernel.value(np.linalg.norm(X[i] - X[j], axis=1))
@@ -91,40 +91,40 @@ class Meeting:
         return attrs.evolve(self, room=np.maximum(self.room, filled))
 
     def _filled(self, i: Indices, j: Indices, values: Array) -> Array:
-        """What the other body fills around every particle, (m,) [-], by W of the pairs."""
-        filled = self._gathered(i, values * self.volumes[j])
-        return filled + self._gathered(j, values * self.volumes[i])
+        """Volume fraction of the other body around every particle, (m,) [-], by W of pairs."""
+        filled = self._summed_here(i, values * self.volumes[j])
+        return filled + self._summed_here(j, values * self.volumes[i])
 
     def pushes(self, touch: Touch) -> Array:
-        """Force on i of every pair, along the line between the two, (k, d) [N]; j has the other."""
+        """Force on i of every pair along the line between the two, (k, d) [N]; opposite on j."""
         i, j = touch.i, touch.j
         both = touch.excess[i] + touch.excess[j]
         pull = self.modulus * self.volumes[i] * self.volumes[j] * both
         return np.asarray(-(pull * touch.slopes)[:, None] * touch.offsets)
 
     def normal_forces(self, touch: Touch) -> Array:
-        """On every particle, (m, d) [N]: minus the derivative of the energies."""
+        """Normal force on every particle, (m, d) [N]: minus the derivative of the energies."""
         pushes = self.pushes(touch)
-        return self._gathered(touch.i, pushes) - self._gathered(touch.j, pushes)
+        return self._summed_here(touch.i, pushes) - self._summed_here(touch.j, pushes)
 
     def energies(self, touch: Touch) -> Array:
-        """K V o^2 / 2 of every particle, (m,) [J]."""
+        """Energy K V o^2 / 2 of every particle, (m,) [J]."""
         return np.asarray(0.5 * self.modulus * self.volumes * touch.excess**2)
 
     def rubbed(
         self, touch: Touch, x: Array, v: Array, slip: Array, step: float, friction: float
     ) -> tuple[Array, Array]:
-        """Friction on every particle, (m, d) [N], and the stretch of its spring after the step.
+        """Friction on every particle, (m, d) [N], and the stretch of its spring, (m, d) [m].
 
-        A particle that is in the other's way is tied by a spring to the place of the other where
-        it would be if the other's particles nearby, weighted by what they fill, went on as a rigid
-        body: that motion is the one with their linear and angular momentum. The force of the spring
-        acts on them as a force and a moment of the same weights, so that all momenta are kept and
-        the power is that of the spring.
+        A particle with an excess is tied by a spring to the other body, which moves there like a
+        rigid body with the linear and angular momentum of its particles nearby, weighted by their
+        contribution to the volume fraction. The spring acts on them as a force and a moment with
+        the same weights, so that all momenta are conserved and the power is that of the spring.
         """
         m, d = x.shape
         forces, slipped = np.zeros((m, d)), np.zeros((m, d))
-        # Both ways: the particle p that is in the way of q. Those in the way are numbered anew.
+        # Both directions: particle p with an excess, renumbered, beside particle q of the other
+        # body.
         active = np.flatnonzero(touch.excess > 0.0)
         count = len(active)
         if not count:
@@ -138,7 +138,7 @@ class Meeting:
         sign = np.where(chosen < len(touch.i), 1.0, -1.0)
         fills = self.volumes[q]
         slope = (fills * touch.slopes[pair] * sign)[:, None] * touch.offsets[pair]
-        inward = _summed(p, slope, count)  # gradient of what the other fills
+        inward = _summed(p, slope, count)  # gradient of the volume fraction
         shares = fills * touch.values[pair]
         shares /= np.bincount(p, shares, count)[p]
         centre = _summed(p, shares[:, None] * x[q], count)
@@ -166,7 +166,7 @@ class Meeting:
         return forces, slipped
 
     def least_gap(self, positions: Array) -> float:
-        """Between the surfaces of two bodies [m], by the nearest of their outermost particles."""
+        """Distance of the surfaces of two bodies [m], by their nearest outermost particles."""
         x = positions[self.particles]
         outer = self.depths <= self.kernel.support_radius / REACH
         one, other = np.flatnonzero(outer & self.belongs), np.flatnonzero(outer & ~self.belongs)
@@ -174,7 +174,7 @@ class Meeting:
         gaps = distances - self.depths[one] - self.depths[other[nearest]]
         return float(gaps.min())
 
-    def _gathered(self, rows: Indices, values: Array) -> Array:
+    def _summed_here(self, rows: Indices, values: Array) -> Array:
         return _summed(rows, values, len(self.particles))
 
 
@@ -183,8 +183,8 @@ def _summed(rows: Indices, values: Array, count: int) -> Array:
     shape = values.shape[1:]
     columns = values.reshape(len(values), prod(shape))
     sums = np.empty((count, columns.shape[1]))
-    for k, one in enumerate(columns.T):
-        sums[:, k] = np.bincount(rows, one, count)
+    for k, column in enumerate(columns.T):
+        sums[:, k] = np.bincount(rows, column, count)
     return sums.reshape(count, *shape)
 
 

@@ -1,4 +1,4 @@
-"""Which particles are near each other: asked only where boxes say that some may be."""
+"""Search for near pairs of particles, only while bounding boxes are close."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from scipy.spatial import cKDTree
 
 from solidsph.maths.arrays import Array, Indices
 
-# A list of pairs has room for this much motion, in parts of the reach.
+# Margin of a list of pairs, relative to the reach.
 _SKIN = 0.2
 
 
 class Search(ABC):
-    """Pairs of two groups of particles, or of one group with itself."""
+    """Pairs between two groups of particles, or within one."""
 
     @abstractmethod
-    def asleep(self, positions: Array) -> bool:
-        """Whether no pair can be within the reach and the margin; positions (n, d) of all."""
+    def far_apart(self, positions: Array) -> bool:
+        """True if no pair can be within reach and margin at positions (n, d) of all particles."""
 
     @abstractmethod
     def within(self, x: Array, radius: float) -> tuple[Indices, Indices]:
-        """Pairs (k,), (k,) no further apart than `radius`, each once, in any order.
+        """Pairs (k,), (k,) at most `radius` apart, each once, in any order.
 
         Positions x (m, d) and pairs are those of the groups alone, the first before the second.
         """
@@ -33,22 +33,22 @@ class Search(ABC):
 @final
 @attrs.frozen(eq=False)
 class Between(Search):
-    """Particles of two bodies, those of the first before the others."""
+    """Pairs between the particles of two bodies."""
 
-    one: slice | Indices  # those of the first body, among all
-    other: slice | Indices  # and of the second
-    split: int  # how many the first has
-    wakes: float  # distance of the boxes at which the search begins [m]
-    # A pure cache: along which axis to look first. Bodies that stay apart do so along the same.
+    one: slice | Indices  # particles of the first body, among all
+    other: slice | Indices  # particles of the second body
+    split: int  # number of particles of the first body
+    range: float  # distance of the boxes at which the search begins [m]
+    # A cache: the axis to test first, since bodies mostly stay apart along the same axis.
     _first: list[int] = attrs.field(factory=lambda: [0], init=False, repr=False)
 
-    def asleep(self, positions: Array) -> bool:
+    def far_apart(self, positions: Array) -> bool:
         square, d = 0.0, positions.shape[1]
         for axis in sorted(range(d), key=lambda k: k != self._first[0]):
             x, y = positions[self.one, axis], positions[self.other, axis]
             gap = max(0.0, float(x.min() - y.max()), float(y.min() - x.max()))
             square += gap**2
-            if square > self.wakes**2:
+            if square > self.range**2:
                 self._first[0] = axis
                 return True
         return False
@@ -56,7 +56,7 @@ class Between(Search):
     def within(self, x: Array, radius: float) -> tuple[Indices, Indices]:
         one = np.arange(self.split)
         other = np.arange(self.split, len(x))
-        # All that is inside the other's box, however deep: interiors can touch, too.
+        # All particles inside the other box, however deep: interiors can touch, too.
         one = one[_inside(x[one], x[other], radius)]
         other = other[_inside(x[other], x[one], radius)] if one.size else other[:0]
         if not other.size:
@@ -70,17 +70,17 @@ class Between(Search):
 @final
 @attrs.frozen(eq=False)
 class Within(Search):
-    """Particles of one body that were far from each other."""
+    """Pairs of particles of one body that were far from each other."""
 
-    particles: Indices  # (m,) among all
+    particles: Indices  # (m,) among all particles
     reference: Array  # X, (m, d) [m]
-    apart: float  # distance from which on they count, in the reference configuration [m]
-    wakes: float  # distance up to which the search goes on [m]
+    apart: float  # smallest distance of a pair in the reference configuration [m]
+    range: float  # largest distance of a pair now [m]
 
-    def asleep(self, positions: Array) -> bool:
+    def far_apart(self, positions: Array) -> bool:
         # No two displacements differ by more than the diagonal of the box that holds them all.
         u = positions[self.particles] - self.reference
-        return bool(np.linalg.norm(np.ptp(u, axis=0)) < self.apart - self.wakes)
+        return bool(np.linalg.norm(np.ptp(u, axis=0)) < self.apart - self.range)
 
     def within(self, x: Array, radius: float) -> tuple[Indices, Indices]:
         found = cKDTree(x).query_pairs(radius, output_type="ndarray")
@@ -92,10 +92,10 @@ class Within(Search):
 
 @attrs.define(eq=False)
 class NeighbourList:
-    """The pairs within a reach, found anew only when particles have moved by half the skin.
+    """All pairs closer than a reach, in ascending order.
 
-    A pure cache: what it returns are all pairs closer than the reach, in rising order, whatever
-    it was asked before.
+    The search is repeated only when particles have moved by half the margin; the result does not
+    depend on earlier calls.
     """
 
     search: Search
@@ -103,8 +103,8 @@ class NeighbourList:
     _made: tuple[Array, Indices, Indices] | None = None  # positions, and pairs within both
 
     def pairs(self, x: Array) -> tuple[Indices, Indices]:
-        """(k,), (k,) at positions x (m, d)."""
-        if not np.isfinite(x).all():  # a run that is lost; whoever runs it will see
+        """Pairs (k,), (k,) at positions x (m, d) [m]."""
+        if not np.isfinite(x).all():  # the run has diverged and is stopped elsewhere
             return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
         if self._made is None or self._moved(self._made[0], x):
             i, j = self.search.within(x, (1.0 + _SKIN) * self.reach)
@@ -116,19 +116,19 @@ class NeighbourList:
         return i[near], j[near]
 
     def _moved(self, before: Array, x: Array) -> bool:
-        # With a little to spare, for rounding.
+        # A little less than half, for rounding.
         largest = 0.49 * _SKIN * self.reach
         return bool(np.max(np.sum((x - before) ** 2, axis=1), initial=0.0) > largest**2)
 
 
 def _inside(x: Array, other: Array, margin: float) -> Array:
-    """Which of x (k, d) are inside the box of `other`, or nearly, (k,)."""
+    """True for points x (k, d) inside the box of `other` plus a margin, (k,)."""
     lower, upper = other.min(axis=0) - margin, other.max(axis=0) + margin
     return np.asarray(np.all((x >= lower) & (x <= upper), axis=1))
 
 
 def together(particles: Indices) -> slice | Indices:
-    """The same particles as a slice, where they follow each other: what it takes is no copy."""
+    """The particles (k,), as a slice if they are consecutive, which then takes no copies."""
     first, count = int(particles[0]), len(particles)
     whole = slice(first, first + count)
     return whole if np.array_equal(particles, np.arange(first, first + count)) else particles

@@ -1,4 +1,4 @@
-"""Coulomb's friction as a spring that slides."""
+"""Coulomb friction as a spring that slides."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from solidsph.maths.arrays import Array
 def slid(
     slip: Array, velocity: Array, normals: Array, step: float, stiffness: Array, limits: Array
 ) -> Array:
-    """Stretch of the springs (k, d) [m] after a step; the force is -stiffness times it.
+    """Stretch of the springs after a step, (k, d) [m]; the force is -stiffness times it.
 
-    Each is stretched by the tangential motion and gives way where it would pull with more than its
-    limit. Cundall & Strack (1979).
+    The tangential motion stretches each spring, which slides at its limit force. Cundall & Strack
+    (1979).
 
     Args:
         slip: stretch before the step, (k, d) [m].
-        velocity: of the particle relative to what it touches, (k, d) [m/s].
-        normals: of the surface touched, (k, d).
-        step: [s]; 0 changes nothing.
+        velocity: of the particle relative to the surface that it touches, (k, d) [m/s].
+        normals: of that surface, (k, d).
+        step: length of the step [s]; 0 changes nothing.
         stiffness: (k,) [N/m].
-        limits: the normal force times the coefficient, (k,) [N].
+        limits: normal force times the coefficient of friction, (k,) [N].
     """
     if step == 0.0:
         return slip
     trial = slip + step * velocity
-    # What the normal has turned by since the last step must not remain in it.
+    # Remove the normal component, which a rotation of the normal would leave in it.
     trial -= np.sum(trial * normals, axis=1)[:, None] * normals
     pull = stiffness * np.linalg.norm(trial, axis=1)
     part = np.where(pull > limits, limits / np.where(pull > 0.0, pull, 1.0), 1.0)

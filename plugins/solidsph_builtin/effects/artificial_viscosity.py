@@ -1,8 +1,7 @@
-"""Viscosity that gives shocks a width that the particles resolve."""
+"""Artificial viscosity, which gives shocks a width that the particles resolve."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar, final
 
 import attrs
@@ -10,38 +9,39 @@ import numpy as np
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.compilable_terms import PairLoad, PairTable
+from solidsph.interfaces.compilable_terms import PairLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.interfaces.formulation import Configuration
-from solidsph.interfaces.terms import Load, Observation
-from solidsph.maths.arrays import Scalar, Vector
+from solidsph.interfaces.pair_table import PairTable
+from solidsph.interfaces.terms import Load
+from solidsph.maths.arrays import Array, Indices, Scalar, Vector
 from solidsph.maths.tensors import dot
 from solidsph.registry.parameters import number
+from solidsph_builtin.effects._gradients import in_the_reference, real_pairs
 
-# Keeps the approach of two particles that meet finite, in squares of their first distance.
+# Keeps the approach rate of meeting particles finite; relative to the squared initial distance.
 _SOFTENING = 1e-4
 
-# Approach of neighbours, over the wave speed, for which the step is kept stable: a jump of velocity
-# by the wave speed itself is spread over some three spacings.
+# Approach rate of neighbours, over the wave speed, for which the step is stable: a velocity jump of
+# the wave speed itself is spread over about three spacings.
 _APPROACH = 1.0 / 3.0
 
 
 @final
 @attrs.frozen
 class ArtificialViscosity(Effect):
-    """Neighbours that approach each other push each other apart. Monaghan & Gingold (1983).
+    """Viscous repulsion between neighbours that approach each other, Monaghan & Gingold (1983).
 
     With s the particle spacing, c the confined wave speed and the pair's approach
     m = s v_ab . x_ab / |x_ab|^2, taken as 0 where it is positive,
 
         f_a = - sum over b of V_a V_b rho_0 |W'(X_ab)| (-linear c m + quadratic m^2) x_ab / |x_ab|,
 
-    with the kernel at the reference distance, as total Lagrangian sums have it, and the force
-    along the pair as it is now: momentum and angular momentum are kept to rounding, and energy is
-    only ever taken. Lengths are in spacings and not in supports, so that a uniform compression at
-    the rate k meets the pressure rho_0 (linear c s k + quadratic s^2 k^2) / 2 in every dimension
-    and with every kernel.
+    with the kernel at the reference distance, as in total Lagrangian sums, and the force along the
+    current direction of the pair: momentum and angular momentum are conserved to rounding, and
+    energy is only dissipated. Lengths are in spacings, not in supports, so that a uniform
+    compression at the rate k meets the pressure rho_0 (linear c s k + quadratic s^2 k^2) / 2 in
+    every dimension and with every kernel.
     """
 
     conserves_momentum: ClassVar[bool] = True
@@ -62,55 +62,36 @@ class ArtificialViscosity(Effect):
             raise SceneError("artificial-viscosity: both strengths are 0; leave the effect out")
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
-        for body in model.bodies:
-            if body.formulation.configuration is not Configuration.REFERENCE:
-                raise SceneError(
-                    "artificial-viscosity: its pairs are those of the reference configuration, but "
-                    f"the formulation of body {body.name!r} follows the motion; use "
-                    "'total-lagrangian'"
-                )
-        tables = [self._table(body) for body in model.bodies]
-        firsts = np.cumsum([0, *(len(table.columns) for table in tables)])
-        return _Viscosity(
-            label,
-            PairTable(
-                starts=np.concatenate(
-                    [[0], *(t.starts[1:] + k for t, k in zip(tables, firsts[:-1], strict=True))]
-                ).astype(np.intp),
-                columns=np.concatenate(
-                    [
-                        t.columns + body.extent.start
-                        for t, body in zip(tables, model.bodies, strict=True)
-                    ]
-                ).astype(np.int32),
-                values=np.concatenate([table.values for table in tables]),
-            ),
-            damping_rate=max(self._rate(body) for body in model.bodies),
+        in_the_reference(model, "artificial-viscosity")
+        rows, columns, values = zip(*(self._pairs(body) for body in model.bodies), strict=True)
+        table = PairTable.of(
+            np.concatenate(rows),
+            np.concatenate(columns),
+            np.concatenate(values),
+            model.particles.count,
         )
+        return _Viscosity(label, table, damping_rate=max(self._rate(b) for b in model.bodies))
 
-    def _table(self, body: Body) -> PairTable:
-        """Of a body's own pairs: both coefficients over |x_ab| [kg/s], [kg], softening [m^2]."""
+    def _pairs(self, body: Body) -> tuple[Indices, Indices, Array]:
+        """Pairs of a body among all particles, (m,) and (m,), and their values (m, 3).
+
+        The values are both coefficients over |x_ab| [kg/s], [kg], and the softening [m^2].
+        """
         pairs, particles = body.pairs(), body.particles
-        real = ~particles.ghosts
-        acts = np.flatnonzero((pairs.distances > 0.0) & real[pairs.rows] & real[pairs.columns])
+        acts = np.flatnonzero(real_pairs(body, pairs))
         a, b, R = pairs.rows[acts], pairs.columns[acts], pairs.distances[acts]
         V, spacing = particles.volumes, 0.5 * (particles.spacings[a] + particles.spacings[b])
         weight = V[a] * V[b] * body.material.density * np.abs(body.smoothing.slope(R))
-        counts = np.bincount(a, minlength=particles.count)
-        return PairTable(
-            starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.intp),
-            columns=b.astype(np.int32),
-            values=np.column_stack(
-                [
-                    self.linear * body.material.wave_speed * spacing * weight,
-                    self.quadratic * spacing**2 * weight,
-                    _SOFTENING * R**2,
-                ]
-            ),
-        )
+        values = [
+            self.linear * body.material.wave_speed * spacing * weight,
+            self.quadratic * spacing**2 * weight,
+            _SOFTENING * R**2,
+        ]
+        first = body.extent.start
+        return a + first, b + first, np.column_stack(values)
 
     def _rate(self, body: Body) -> float:
-        """Of two neighbours in opposite motion, both ways [1/s]."""
+        """Damping rate of two neighbours in opposite motion [1/s]."""
         pairs, particles = body.pairs(), body.particles
         apart = pairs.distances > 0.0
         rates = np.zeros(pairs.count)
@@ -136,6 +117,3 @@ class _Viscosity(PairLoad):
         square = dot(offset, offset)
         approach = np.minimum(dot(velocity, offset), 0.0) / (square + values[2])
         return (values[0] * approach - values[1] * approach**2) / np.sqrt(square + values[2])
-
-    def report(self, observation: Observation) -> Mapping[str, float]:
-        return {}

@@ -1,4 +1,4 @@
-"""A force on every part of a body's mass: gravity, for one."""
+"""A body force, such as gravity."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import attrs
 from solidsph.interfaces.compilable_terms import ScheduledLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.interfaces.terms import Load, Observation
+from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField, scheduled_forces
 from solidsph.model.regions import Where
@@ -20,7 +20,7 @@ from solidsph.registry.parameters import formula
 @final
 @attrs.frozen
 class BodyForce(Effect):
-    """f = m b(X, t). Ismail & Reddy, eq. 14, whose b they neglect."""
+    """f = m b(X, t): the body force of Ismail & Reddy, eq. 14, which they neglect."""
 
     answers: ClassVar[frozenset[Need] | None] = frozenset()
 
@@ -61,6 +61,3 @@ class _MassTimesField(ScheduledLoad):
 
     def schedule(self, times: Array) -> Array:
         return scheduled_forces(self.field, self.positions, self.masses, times)
-
-    def report(self, observation: Observation) -> Mapping[str, float]:
-        return {}

@@ -8,19 +8,14 @@ from typing import Any, ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.engines.history import ArrayLaw
+from solidsph.engines.array_law import ArrayLaw
 from solidsph.errors import SceneError
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.forces_modifier import ForcesModifier
 from solidsph.interfaces.gradient import PointwiseGradient
-from solidsph.interfaces.terms import (
-    FieldTerm,
-    Load,
-    Observation,
-    StressTerm,
-)
+from solidsph.interfaces.terms import FieldTerm, Load, Observation, StressTerm
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.regions import Where
 from solidsph.registry.parameters import check_positive, number
@@ -28,27 +23,27 @@ from solidsph.run.stable_step import lattice_frequency
 from solidsph_builtin.effects._breaking import Bonds, BreakingForces
 from solidsph_builtin.effects._gradients import in_the_reference
 
-# What cracks add to the highest frequency of a lattice, in squares: one-sided corrections are
-# stiffer. Of bodies in rubble, 0.9 was the most that was found (`solidsph check bond-failure`).
+# Increase of the highest frequency of a lattice by cracks, relative: one-sided corrections are
+# stiffer. For bodies broken to rubble the largest value measured was 0.9 (`solidsph check
+# bond-failure`).
 _RUBBLE = 1.0
 
 
 @final
 @attrs.frozen
 class BondFailure(Effect):
-    """Two neighbours whose distance exceeds (1 + critical_stretch) times that at the start no
-    longer act on each other, for good.
+    """Permanent failure of pairs stretched to over (1 + critical_stretch) times their distance.
 
-    The kernel gradient of a failed pair is left out of both particles' sums, whose correction is
-    formed anew from what is left: Chakraborty & Shaw (2013), who let pseudo springs fail. A crack
-    is then a free surface to the gradient. A particle that has lost the part D of its bonds has the
-    energy (1 - D) psi(F): without that, what is left of its neighbours may see more strain than all
-    did, and a crack would feed on energy that nobody has spent. Where they determine no gradient
-    any more it loses its last bonds, and flies on without strain. Nothing keeps the two sides of a
-    crack from overlapping but 'contact'.
+    The kernel gradient of a failed pair is left out of the sums of both particles, whose correction
+    is recomputed from the remaining pairs, as in the pseudo-spring method of Chakraborty & Shaw
+    (2013). A crack is then a free surface for the gradient. A particle that has lost a fraction D
+    of its bonds has the energy (1 - D) psi(F); otherwise the remaining neighbours could give more
+    strain than all did, and a crack would gain energy from nowhere. A particle whose remaining
+    bonds do not determine a gradient loses them and flies on without strain. Only 'contact' keeps
+    the two sides of a crack from overlapping.
 
-    The energy that bonds let go is what they dissipate. It depends on the spacing, as the width of
-    the strip that a crack unloads does: choose the stretch for the spacing in use.
+    The energy released by bonds is dissipated. It depends on the spacing, as does the width of the
+    strip that a crack unloads: choose the stretch for the spacing in use.
     """
 
     conserves_momentum: ClassVar[bool] = True
@@ -96,7 +91,7 @@ class BondFailure(Effect):
 @final
 @attrs.frozen(eq=False)
 class _Cracks(FieldTerm, Load, ForcesModifier):
-    """Adds no force of its own; it shows what has failed."""
+    """A term without forces of its own, which shows failed bonds."""
 
     label: str
     bonds: Sequence[Bonds]
@@ -111,16 +106,16 @@ class _Cracks(FieldTerm, Load, ForcesModifier):
                 "bond-failure: it is named twice, and a bond fails once; give it one "
                 "critical_stretch, and places by `where`"
             )
-        laws = [ArrayLaw(one.body) for one in self.bonds]
+        laws = [ArrayLaw(bonds.body) for bonds in self.bonds]
         return BreakingForces(self.bonds, laws, stress_terms)
 
     @property
     def arrays(self) -> Mapping[str, int]:
-        return {f"bonds of {one.body.name}": one.bytes for one in self.bonds}
+        return {f"bonds of {bonds.body.name}": bonds.bytes for bonds in self.bonds}
 
     @property
     def pair_count(self) -> int:
-        return sum(one.pairs.count for one in self.bonds)
+        return sum(bonds.pairs.count for bonds in self.bonds)
 
     @property
     def particles(self) -> Indices:
@@ -130,11 +125,11 @@ class _Cracks(FieldTerm, Load, ForcesModifier):
         return np.empty((0, positions.shape[1]))
 
     def damage(self, observation: Observation) -> Array:
-        """Part of each particle's bonds that have failed, (n,) [-]."""
+        """Fraction of the bonds of each particle that have failed, (n,) [-]."""
         found, memory = np.zeros(self.count), observation.state.memory
-        for one in self.bonds:
-            if one.name in memory:
-                found[one.body.extent] = one.damage(memory[one.name])
+        for bonds in self.bonds:
+            if bonds.name in memory:
+                found[bonds.body.extent] = bonds.damage(memory[bonds.name])
         return found
 
     def fields(self, observation: Observation) -> Mapping[str, Array]:
@@ -143,7 +138,7 @@ class _Cracks(FieldTerm, Load, ForcesModifier):
     def report(self, observation: Observation) -> Mapping[str, float]:
         memory = observation.state.memory
         failed = sum(
-            float(np.sum(1.0 - memory[one.name])) for one in self.bonds if one.name in memory
+            float(np.sum(1.0 - memory[bonds.name])) for bonds in self.bonds if bonds.name in memory
         )
         return {
             f"{self.label} failed bonds [-]": failed / 2.0,

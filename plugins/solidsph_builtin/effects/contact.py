@@ -1,4 +1,4 @@
-"""Contact of bodies, with each other and with themselves."""
+"""Contact between bodies, and of a body with itself."""
 
 from __future__ import annotations
 
@@ -14,36 +14,26 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
-from solidsph.interfaces.terms import (
-    EnergyTerm,
-    FieldTerm,
-    Load,
-    Observation,
-)
+from solidsph.interfaces.terms import EnergyTerm, FieldTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.registry.parameters import check_positive, number
-from solidsph_builtin.effects._crowding import (
-    REACH,
-    crowding_kernel,
-    sensitivity,
-    sites,
-    steepest,
-)
+from solidsph_builtin.effects._crowding import REACH, crowding_kernel, sensitivity, sites, steepest
 from solidsph_builtin.effects._meeting import Meeting, Touch
 from solidsph_builtin.effects._search import Between, Search, Within, together
 
-# 1 / integral of (dS/dz)^2 dz, in parts of the support: the depth of the layer that is squeezed.
+# Depth of the compressed layer, 1 / integral of (dS/dz)^2 dz, relative to the support radius.
 _LAYER = 0.87
 
-# Particles of one body count as touching from so many supports of the smoothing on.
+# Smallest initial distance of particles of one body that may touch, in support radii.
 _APART = 2.0
 
-# Stiffness of the spring of friction over that against penetration, as between elastic bodies of
-# usual Poisson's ratio (Mindlin 1949: 2 (1 - nu) / (2 - nu)).
+# Tangential over normal stiffness, as between elastic bodies of usual Poisson's ratio (Mindlin
+# 1949: 2 (1 - nu) / (2 - nu)).
 _TANGENTIAL = 0.8
 
-# For the stable step: what is squeezed more than this is squeezed by half a spacing.
+# Largest excess assumed for the stable step, that of a penetration by half a spacing.
 _EXCESS = 0.2
 
 _NAMES = ("x", "y", "z")
@@ -52,36 +42,36 @@ _NAMES = ("x", "y", "z")
 @final
 @attrs.frozen
 class Contact(Effect):
-    """Where two bodies together fill more than there is, they push each other out.
+    """Repulsion of two bodies whose volume fractions add up to more than one.
 
-    With S_B(x) = sum over b of V_b W(x - x_b) the part that body B fills around x, smoothed over
-    2.5 spacings, a particle a has the room r_a, which is what a plane face of B fills at a when it
-    lies on the surface of A, and the excess o_a = max(0, S_B(x_a) - r_a). The energy
+    Let S_B(x) = sum over b of V_b W(x - x_b) be the volume fraction of body B around x, smoothed
+    over 2.5 spacings. A particle a of body A has the room r_a, the volume fraction at a of a body
+    whose plane face lies on the surface of A, and the excess o_a = max(0, S_B(x_a) - r_a). The
+    energy
 
         U = K / 2 (sum over a of V_a o_a^2 + sum over b of V_b o_b^2)
 
-    has the form of the embedded atom, Daw & Baskes (1984): it depends on distances only, so its
-    exact derivative is a force along the line between two particles, opposite at its ends, and
-    momentum, angular momentum and energy are kept. Bodies touch where their surfaces are, whatever
-    their spacings: r_a follows from the depth of a below its surface and from the rows of particles
-    of B. It is no less than what B fills at a in the reference configuration, where the bodies are
-    apart by definition. The usual pair force of a range of one spacing lets a lattice sink into
-    another one, half a spacing off, by 0.13 spacings, and sliding bodies interlock; here it is
-    below 0.001.
+    has the form of the embedded-atom method, Daw & Baskes (1984). It depends on distances only, so
+    its exact derivative is a force along the line between two particles, opposite at its ends, and
+    momentum, angular momentum and energy are conserved. Bodies touch where their surfaces are, for
+    any spacings: r_a follows from the depth of a below its surface and from the rows of particles
+    of B, and is at least S_B in the reference configuration, where bodies are apart by definition.
+    The usual pair force with a range of one spacing lets a lattice sink into another one, half a
+    spacing off, by 0.13 spacings, so that sliding bodies interlock; here it is below 0.001.
 
-    K is such that the contact yields as much as `1 / strength` spacings of material with the
-    harmonic mean of both confined moduli. Deep inside, where S_B no longer changes, nothing pushes
-    back any more: a strength that is too low, or a body thinner than two spacings, may be passed.
+    K makes the contact as compliant as `1 / strength` spacings of material with the harmonic mean
+    of both confined moduli. Deep inside, where S_B is constant, there is no force: a body may pass
+    if the strength is too low or a body is thinner than two spacings.
 
-    With `friction`, a spring along the surface for every particle with an excess pulls with at
-    most that part of the particle's normal force, and slides there: Coulomb's law, with an
-    elastic play as small as that of the contact itself (Cundall & Strack 1979). Its force acts
-    on the other's particles nearby with its moment. The springs are in `State.memory`.
+    With `friction`, every particle with an excess has a tangential spring that slides at this
+    fraction of its normal force: Coulomb's law with an elastic displacement as small as that of the
+    contact itself (Cundall & Strack 1979). The spring acts on the particles of the other body
+    nearby, moment included. The stretches are in `State.memory`.
 
-    Of a body with itself, particles count that were further apart than two supports, so a crease
-    does not close. Search begins where the boxes of two bodies come within `margin` of the
-    reach; all particles in both boxes take part, so that nothing is missed however deep it goes.
-    Of a body with itself only those near its surface do.
+    Particles of one body touch only if they were more than two support radii apart, so a crease
+    does not close. The search begins when the boxes of two bodies come within `margin` of the
+    reach. All particles in both boxes take part, so that deep penetration is not missed; of a body
+    with itself, only those near its surface.
     """
 
     conserves_momentum: ClassVar[bool] = True
@@ -91,7 +81,7 @@ class Contact(Effect):
     itself: Sequence[str] = ()  # names of bodies that may touch themselves; ["all"] for each
     friction: float = number(default=0.0)  # coefficient [-]
     strength: float = number(default=1.0)  # [-]
-    margin: float = number(default=1.0)  # [spacings]; infinite to search always
+    margin: float = number(default=1.0)  # [spacings]; infinite to search at every step
 
     def __attrs_post_init__(self) -> None:
         check_positive("contact", "strength", self.strength, "1 / spacings that it yields, near 1")
@@ -115,15 +105,15 @@ class Contact(Effect):
             object.__setattr__(self, "between", pairs)
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
-        who = self._who(model.bodies)
-        meetings = [_made(one, other, self.strength, self.margin) for one, other in who]
+        pairs = self._pairs_of_bodies(model.bodies)
+        meetings = [_meeting(one, other, self.strength, self.margin) for one, other in pairs]
         return _Contact(
             label=label,
-            particles=np.unique(np.concatenate([one.particles for one in meetings])),
+            particles=np.unique(np.concatenate([meeting.particles for meeting in meetings])),
             meetings=meetings,
             friction=self.friction,
             dimension=model.particles.dimension,
-            stiffness_rate=max(self._frequency(one, other) for one, other in who),
+            stiffness_rate=max(self._frequency(one, other) for one, other in pairs),
         )
 
     def _frequency(self, one: Body, other: Body) -> float:
@@ -134,11 +124,11 @@ class Contact(Effect):
         return sqrt(modulus / density * sensitivity(kernel, _EXCESS))
 
     def pair_work(self, particles: float, pairs: float) -> float:
-        # Asleep it asks for boxes only; awake, surfaces meet, and they have few of all pairs.
+        # While bodies are apart only boxes are compared; touching surfaces have few pairs.
         return particles
 
-    def _who(self, bodies: Sequence[Body]) -> Sequence[tuple[Body, Body]]:
-        """Pairs of bodies, the same twice where it may touch itself."""
+    def _pairs_of_bodies(self, bodies: Sequence[Body]) -> Sequence[tuple[Body, Body]]:
+        """Pairs of bodies; a body that may touch itself is paired with itself."""
         known = {body.name: body for body in bodies}
         for name in {*(n for pair in self.between or () for n in pair), *self.itself} - {"all"}:
             if name not in known:
@@ -164,7 +154,7 @@ class _Contact(EnergyTerm, FieldTerm, Load):
     meetings: Sequence[Meeting]
     friction: float
     dimension: int
-    stiffness_rate: float  # [rad/s]; the springs of friction yield by stretch, not by speed
+    stiffness_rate: float  # [rad/s]
 
     @property
     def arrays(self) -> Mapping[str, int]:
@@ -178,11 +168,11 @@ class _Contact(EnergyTerm, FieldTerm, Load):
 
     @property
     def pair_count(self) -> int:
-        # Where boxes are apart it asks for them only; where they meet, surfaces have few pairs.
+        # As in `Contact.pair_work`.
         return len(self.particles)
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
-        """Without friction, which depends on what has been."""
+        """Normal forces; friction depends on memory."""
         forces = np.zeros_like(positions)
         for meeting in self.meetings:
             touch = meeting.touch(positions)
@@ -191,20 +181,15 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         return np.asarray(forces[self.particles])
 
     def advance(
-        self,
-        time: float,
-        step: float,
-        positions: Array,
-        velocities: Array,
-        memory: Mapping[str, Array],
-    ) -> tuple[Array, Mapping[str, Array]]:
+        self, time: float, step: float, positions: Array, velocities: Array, memory: Memory
+    ) -> tuple[Array, Memory]:
         forces: Array | None = None
         slips: dict[str, Array] = {}
         asleep = 0
         for meeting in self.meetings:
             touch = meeting.touch(positions)
             asleep += touch is None
-            force, slip = self._of(meeting, touch, positions, velocities, step, memory)
+            force, slip = self._contact_force(meeting, touch, positions, velocities, step, memory)
             slips |= slip
             if force is None:
                 continue
@@ -217,17 +202,17 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         found = np.zeros(none) if forces is None else forces[self.particles]
         return found, {self._asleep: count, **slips}
 
-    def _of(
+    def _contact_force(
         self,
         meeting: Meeting,
         touch: Touch | None,
         positions: Array,
         velocities: Array,
         step: float,
-        memory: Mapping[str, Array],
+        memory: Memory,
     ) -> tuple[Array | None, Mapping[str, Array]]:
-        """Force on the particles of a meeting, (m, d), if there is any, and the new stretches."""
-        if not self._rubs(meeting):
+        """Force on the particles of a meeting, (m, d) [N] or None, and the new stretches."""
+        if not self._has_friction(meeting):
             return None if touch is None else meeting.normal_forces(touch), {}
         slip = self._slip(meeting, memory)
         if touch is None:
@@ -237,7 +222,7 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         return meeting.normal_forces(touch) + rubbed, {self._slip_name(meeting): slipped}
 
     def energies(self, observation: Observation) -> Array:
-        """What is squeezed and what the springs of friction hold, (n,) [J]."""
+        """Energy of compression and of the tangential springs, (n,) [J]."""
         state = observation.state
         energies = np.zeros(len(state.positions))
         for meeting in self.meetings:
@@ -245,7 +230,7 @@ class _Contact(EnergyTerm, FieldTerm, Load):
             if touch is None:
                 continue
             energies[meeting.particles] += meeting.energies(touch)
-            if self._rubs(meeting):
+            if self._has_friction(meeting):
                 slip = self._slip(meeting, state.memory)
                 held = 0.5 * meeting.spring * np.sum(slip**2, axis=1)
                 energies[meeting.particles] += held
@@ -262,8 +247,10 @@ class _Contact(EnergyTerm, FieldTerm, Load):
             if touch is not None:
                 excess = touch.excess
                 pairs += int(np.sum((excess[touch.i] > 0.0) | (excess[touch.j] > 0.0)))
-                # Over a step of no length springs of friction stay as they are: what acted.
-                acted, _ = self._of(meeting, touch, positions, state.velocities, 0.0, state.memory)
+                # A step of length 0 leaves the springs as they are: the forces that acted.
+                acted, _ = self._contact_force(
+                    meeting, touch, positions, state.velocities, 0.0, state.memory
+                )
                 force -= 0.0 if acted is None else acted[meeting.belongs].sum(axis=0)
             if meeting.first == meeting.second:
                 continue
@@ -282,11 +269,11 @@ class _Contact(EnergyTerm, FieldTerm, Load):
     def fields(self, observation: Observation) -> Mapping[str, Array]:
         return {f"{self.label} force [N]": observation.state.applied[self.label]}
 
-    def _rubs(self, meeting: Meeting) -> bool:
-        # On a line there is no way to slide.
+    def _has_friction(self, meeting: Meeting) -> bool:
+        # There is no sliding in 1D.
         return self.friction > 0.0 and meeting.kernel.dimension > 1
 
-    def _slip(self, meeting: Meeting, memory: Mapping[str, Array]) -> Array:
+    def _slip(self, meeting: Meeting, memory: Memory) -> Array:
         none = (len(meeting.particles), meeting.kernel.dimension)
         return memory.get(self._slip_name(meeting), np.zeros(none))
 
@@ -298,7 +285,7 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         return f"{self.label} evaluations asleep"
 
 
-def _made(one: Body, other: Body, strength: float, margin: float) -> Meeting:
+def _meeting(one: Body, other: Body, strength: float, margin: float) -> Meeting:
     kernel, alone = _kernel(one, other), one is other
     reach = kernel.support_radius
     margin *= reach / REACH
@@ -336,7 +323,7 @@ def _kernel(one: Body, other: Body) -> SmoothingKernel:
 
 
 def _modulus(one: Body, other: Body, reach: float, strength: float) -> float:
-    """K [Pa]: the pressure of a penetration z is K z over the depth of the layer squeezed."""
+    """K [Pa]: the pressure of a penetration z is K z over the depth of the compressed layer."""
     first, second = (body.material.density * body.material.wave_speed**2 for body in (one, other))
     spacing = 0.5 * sum(float(body.particles.spacings.max()) for body in (one, other))
     return strength * 2.0 * first * second / (first + second) * _LAYER * reach / spacing

@@ -1,4 +1,4 @@
-"""Damping that finds the rate by which a body comes to rest soonest."""
+"""Adaptive damping that brings a body to rest fastest."""
 
 from __future__ import annotations
 
@@ -11,30 +11,31 @@ import numpy as np
 from solidsph.errors import SceneError
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.terms import Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.registry.parameters import number
 from solidsph.run.stable_step import lattice_frequency
 
-# Of the highest frequency of a lattice: no motion worth waiting for is that fast, and a rate that
-# stays below costs a tenth of the time step at most.
+# Largest damping rate, relative to the highest frequency of a lattice: no relevant motion is that
+# fast, and the rate costs at most a tenth of the time step.
 _CAP = 0.1
 
 
 @final
 @attrs.frozen
 class DynamicRelaxation(Effect):
-    """f = -2 damping w m v, with w the frequency of the motion as it is: critical by default.
+    """f = -2 damping w m v, with w the frequency of the current motion: critical by default.
 
-    After Underwood (1983). The frequency is Rayleigh's quotient of the way that the body has gone,
+    After Underwood (1983). The frequency is the Rayleigh quotient of the displacement,
 
         w^2 = -(u . m a) / (u . m u),
 
-    with u and a the changes of position and of acceleration, its own part left out, since the
-    first step: -m a is the stiffness times u if the loads stay. That way soon resembles the
-    equilibrium, in which slow motions outweigh fast ones. No stiffness is needed, and what it comes
-    to rest at is the equilibrium whatever the rate was. For a body that is not held it is of no
-    use, and for an equilibrium alone [statics] is quicker.
+    with u and a the changes of position and of acceleration, without this damping, since the first
+    step: -m a is the stiffness times u if the loads are constant. The displacement soon resembles
+    that of the equilibrium, in which slow motions dominate. No stiffness matrix is needed, and the
+    equilibrium does not depend on the rate. It does not work for a body that is not held, and for
+    an equilibrium alone [statics] is faster.
     """
 
     answers: ClassVar[frozenset[Need] | None] = frozenset({Need.REST})
@@ -65,7 +66,7 @@ class _Relaxation(Load):
     shape: tuple[int, int]  # (n, d)
     masses: Array  # (n,) [kg]
     damping: float
-    damping_rate: float  # the highest [1/s]
+    damping_rate: float  # largest [1/s]
 
     @property
     def arrays(self) -> Mapping[str, int]:
@@ -77,16 +78,11 @@ class _Relaxation(Load):
         return np.arange(len(self.masses))
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
-        return np.zeros_like(velocities)  # before any step nothing is known of the motion
+        return np.zeros_like(velocities)  # before the first step the motion is not known
 
     def advance(
-        self,
-        time: float,
-        step: float,
-        positions: Array,
-        velocities: Array,
-        memory: Mapping[str, Array],
-    ) -> tuple[Array, Mapping[str, Array]]:
+        self, time: float, step: float, positions: Array, velocities: Array, memory: Memory
+    ) -> tuple[Array, Memory]:
         last, rate = (memory.get(self._named(name)) for name in ("last velocity", "rate"))
         c = 0.0 if rate is None else float(rate[0])
         if step == 0.0:
@@ -94,7 +90,7 @@ class _Relaxation(Load):
         elif last is None:
             kept = {self._named("last velocity"): velocities}
         else:
-            # What acts besides: the change of velocity without what this part took of it.
+            # Acceleration by all other forces: without the part of this damping.
             acceleration = (velocities - last) / step + c * velocities
             first = (
                 memory.get(self._named("first position"), positions),
@@ -114,9 +110,10 @@ class _Relaxation(Load):
 
     def _rate(self, way: Array, acceleration: Array, c: float) -> float:
         weight, power = (
-            float(np.einsum("n,ni,ni->", self.masses, way, one)) for one in (way, acceleration)
+            float(np.einsum("n,ni,ni->", self.masses, way, change))
+            for change in (way, acceleration)
         )
-        # Before it has gone anywhere, or while a load pushes it on, the rate stays.
+        # The rate is kept before the first motion and while a load drives the body on.
         if not (weight > 0.0 and power < 0.0):
             return c
         return min(2.0 * self.damping * float(np.sqrt(-power / weight)), self.damping_rate)

@@ -1,4 +1,4 @@
-"""Heat that is conducted through bodies and makes them swell."""
+"""Heat conduction and thermal expansion."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.material import Material
+from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.terms import FieldTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices, Tensor
 from solidsph.maths.tensors import particles_first
@@ -24,24 +25,25 @@ from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import Where
 from solidsph.registry.parameters import check_positive, formula, number
 from solidsph.run.stable_step import lattice_frequency
-from solidsph_builtin.effects._gradients import BodyGradient, in_the_reference
+from solidsph_builtin.effects._gradients import BodyGradient, in_the_reference, real_pairs
 
-# Of the largest stable step of the explicit rule, by which heat advances within a step.
+# Step of the explicit rule for the temperature, relative to its largest stable step.
 _PART = 0.9
 
 
 def _places(given: Any) -> tuple[tuple[Where, Component], ...]:
-    """(where, temperature) of what is held, from what a scene gives."""
+    """(where, temperature) of all held places, from the value in a scene."""
     wanted = 'heat: held takes a list such as [{where = "left", temperature = 100}]'
     if isinstance(given, (str, Mapping)) or not isinstance(given, Sequence):
         raise SceneError(f"{wanted}, got {given!r}")
-    for one in given:
-        if isinstance(one, tuple) and len(one) == 2:
+    for entry in given:
+        if isinstance(entry, tuple) and len(entry) == 2:
             continue
-        if not isinstance(one, Mapping) or set(one) != {"where", "temperature"}:
-            raise SceneError(f"{wanted}, got the entry {one!r}")
+        if not isinstance(entry, Mapping) or set(entry) != {"where", "temperature"}:
+            raise SceneError(f"{wanted}, got the entry {entry!r}")
     return tuple(
-        (one["where"], one["temperature"]) if isinstance(one, Mapping) else one for one in given
+        (entry["where"], entry["temperature"]) if isinstance(entry, Mapping) else entry
+        for entry in given
     )
 
 
@@ -50,15 +52,15 @@ def _places(given: Any) -> tuple[tuple[Where, Component], ...]:
 class Heat(Effect):
     """rho c dT/dt = div(k Grad T) + source, and free stretches of 1 + expansion T.
 
-    T is the difference from the temperature at which the body is as it was modelled; nothing flows
-    through a surface where it is not held. Between two particles heat flows at the rate
+    T is the difference from the temperature of the reference configuration. Surfaces are insulated
+    where T is not held. Between two particles heat flows at the rate
     2 k V_a V_b |W'| / R (T_b - T_a), Cleary & Monaghan (1999), in the reference configuration and
-    scaled so that a full neighbourhood conducts exactly as told: what one loses the other gains.
+    scaled so that a full neighbourhood has exactly the given conductivity; heat is conserved.
 
-    With the stretch g = 1 + expansion T, the body's own material has the energy g^3 psi(F / g),
-    across the plane too: free swelling has no stress, and the stress of a hindered one follows
-    from the law at any strain. The work of its account is what swelling does on the motion. What
-    deformation gives back to the temperature is left out.
+    With the stretch g = 1 + expansion T the material has the energy g^3 psi(F / g), also out of the
+    plane: free swelling is free of stress, and the stress of restrained swelling follows from the
+    law at any strain. The account holds the work of swelling on the motion. Heating by deformation
+    is neglected.
     """
 
     conserves_momentum: ClassVar[bool] = True
@@ -71,7 +73,7 @@ class Heat(Effect):
     initial: Component = formula(default=0.0)  # T at the start, of X, Y, Z [K]
     source: Component = formula(default=0.0)  # of X, Y, Z and t [W/m^3]
     held: Sequence[Any] = attrs.field(default=(), converter=_places)
-    largest: float = number(default=1000.0)  # |T| up to which the time step is stable [K]
+    largest: float = number(default=1000.0)  # largest |T| for which the time step is stable [K]
 
     example: ClassVar[Mapping[str, Any]] = {
         "conductivity": 50.0,
@@ -96,8 +98,8 @@ class Heat(Effect):
             if self.expansion and isinstance(body.material, HistoryMaterial):
                 raise SceneError(
                     f"heat: the swelling of body {body.name!r} needs a material that is a formula "
-                    f"of F, and {type(body.material).__name__} remembers; set expansion = 0, or "
-                    "take another material"
+                    f"of F, and {type(body.material).__name__} has a history; set expansion = 0, "
+                    "or take another material"
                 )
         X = model.particles.positions
         held = [
@@ -120,7 +122,7 @@ class Heat(Effect):
             source=VectorField.of({"x": self.source}, "heat: source", end=model.end),
             held=held,
             gradients=[BodyGradient.of(b) for b in model.bodies] if self.expansion else [],
-            # A body that has swollen is stiffer by about three times its stretch.
+            # A swollen body is stiffer by about three times its stretch.
             stiffness_rate=sqrt(3.0 * abs(self.expansion) * self.largest)
             * lattice_frequency(model.bodies),
         )
@@ -130,21 +132,20 @@ class Heat(Effect):
 
 
 def _conduction(bodies: Sequence[Body], conductivity: float) -> csr_array:
-    """K (n, n) [W/K], so that K T is the heat that flows to every particle."""
+    """K (n, n) [W/K]: K T is the heat flow to every particle [W]."""
     count = bodies[-1].extent.stop
     rows, columns, values = [], [], []
     for body in bodies:
         pairs, particles = body.pairs(), body.particles
-        real = ~particles.ghosts
-        acts = (pairs.distances > 0.0) & real[pairs.rows] & real[pairs.columns]
+        acts = real_pairs(body, pairs)
         a, b, R = pairs.rows[acts], pairs.columns[acts], pairs.distances[acts]
         V, slope = particles.volumes, np.abs(body.smoothing.slope(R))
-        # The second moment of a full neighbourhood, which the integral makes 1.
+        # The second moment of a full neighbourhood, of which the integral is 1.
         moments = np.bincount(a, V[b] * slope * R, particles.count) / particles.dimension
         rows.append(a + body.extent.start)
         columns.append(b + body.extent.start)
         values.append(2.0 * conductivity * V[a] * V[b] * slope / (R * moments.max()))
-    flat = tuple(np.concatenate(one) for one in (rows, columns))
+    flat = tuple(np.concatenate(ends) for ends in (rows, columns))
     K = csr_array((np.concatenate(values), flat), shape=(count, count))
     return csr_array(K - diags_array(np.asarray(K.sum(axis=1)), format="csr"))
 
@@ -171,12 +172,12 @@ class _Conduction(FieldTerm, Load):
             "conduction": K.data.nbytes + K.indices.nbytes + K.indptr.nbytes,
             "temperature": 8 * n,
             "capacities": 8 * n,
-            **{f"gradient of {one.body.name}": one.matrices.bytes for one in self.gradients},
+            **{f"gradient of {g.body.name}": g.matrices.bytes for g in self.gradients},
         }
 
     @property
     def pair_count(self) -> int:
-        return self.conduction.nnz + 2 * sum(one.pair_count for one in self.gradients)
+        return self.conduction.nnz + 2 * sum(gradient.pair_count for gradient in self.gradients)
 
     @property
     def particles(self) -> Indices:
@@ -186,28 +187,23 @@ class _Conduction(FieldTerm, Load):
     def _name(self) -> str:
         return f"{self.label}: temperature"
 
-    def temperature(self, memory: Mapping[str, Array]) -> Array:
-        """T (n,) [K] of a state with this memory."""
+    def temperature(self, memory: Memory) -> Array:
+        """T of a state with this memory, (n,) [K]."""
         return memory.get(self._name, self._holding(0.0, self.start))
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         return self.advance(time, 0.0, positions, velocities, {})[0]
 
     def advance(
-        self,
-        time: float,
-        step: float,
-        positions: Array,
-        velocities: Array,
-        memory: Mapping[str, Array],
-    ) -> tuple[Array, Mapping[str, Array]]:
+        self, time: float, step: float, positions: Array, velocities: Array, memory: Memory
+    ) -> tuple[Array, Memory]:
         T = self.temperature(memory)
         if step > 0.0:
             T = self._conducted(T, time, step)
         return self._forces(positions, T), {self._name: T}
 
     def _conducted(self, T: Array, time: float, step: float) -> Array:
-        """T after a step that ends at `time`, in as many parts as stability asks for."""
+        """T after a step that ends at `time`, in as many parts as stability requires."""
         parts = max(1, ceil(step * self._fastest / (2.0 * _PART)))
         part = step / parts
         for k in range(parts):
@@ -226,7 +222,7 @@ class _Conduction(FieldTerm, Load):
 
     @cached_property
     def _fastest(self) -> float:
-        """A bound on the rate at which differences of temperature decay [1/s]."""
+        """A bound on the decay rate of temperature differences [1/s]."""
         return float(2.0 * (-self.conduction.diagonal() * self._inverse).max())
 
     def _holding(self, time: float, T: Array) -> Array:
@@ -258,11 +254,11 @@ class _Conduction(FieldTerm, Load):
 
 
 def _swelling(material: Material, H: Array, g: Array) -> Array:
-    """What swelling by g (n,) adds to the stress, g^2 P(F / g) - P(F), (d, d, n)."""
+    """Change of the stress by a free stretch g (n,), g^2 P(F / g) - P(F), (d, d, n) [Pa]."""
     d, n = len(H), H.shape[2]
     F = np.repeat(np.eye(3)[:, :, None], n, axis=2)
     F[:d, :d] += H
-    swollen, own = (_stress(material, one) for one in (F / g, F))
+    swollen, own = (_stress(material, deformation) for deformation in (F / g, F))
     return (g**2 * swollen - own)[:d, :d]
 
 

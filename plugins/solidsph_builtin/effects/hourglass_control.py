@@ -1,4 +1,4 @@
-"""Control of motions that the gradient does not see."""
+"""Hourglass control: a penalty on motions that the gradient does not see."""
 
 from __future__ import annotations
 
@@ -9,35 +9,28 @@ import attrs
 import numpy as np
 
 from solidsph.engines.hourglass import hourglass_operator
-from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.compilable_terms import HourglassLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassPairs
-from solidsph.interfaces.terms import (
-    EnergyTerm,
-    FieldTerm,
-    Load,
-    Observation,
-)
+from solidsph.interfaces.terms import EnergyTerm, FieldTerm, Load, Observation
 from solidsph.maths.arrays import Array
 from solidsph.registry.parameters import check_positive, number
+from solidsph_builtin.effects._gradients import in_the_reference, real_pairs
 
-# Pairs count where their weight, relative to that of particles one spacing apart, is above this. On
-# lattices with a cover near 3 those are the 2, 8 or 26 around a particle, which hold 98 % of the
-# sum of all weights.
+# Smallest weight of a pair, relative to that of particles one spacing apart. On lattices with a
+# cover near 3 this leaves the 2, 8 or 26 nearest neighbours, with 98 % of the sum of all weights.
 _SMALLEST_WEIGHT = 0.02
 
-# Strain that rounding may leave of a rigid motion.
+# Strain that rounding may give a rigid motion.
 _AT_REST = 1e-10
 
 
 @final
 @attrs.frozen
 class HourglassControl(Effect):
-    """Penalises what remains of a neighbour's offset after both deformation gradients.
+    """A penalty on the part of a neighbour's offset that the deformation gradients do not explain.
 
     With e_ab = (F_a + F_b)/2 X_ab - x_ab, Ganzenmueller (2015), the energy
 
@@ -48,14 +41,12 @@ class HourglassControl(Effect):
     The usual form projects e_ab on the current direction of the pair, and has no energy. Since F
     is linear in the displacements so is e_ab, and the force is a constant matrix times them.
 
-    The scale is mu, since what the gradient does not see moves like shear: measured, the slowest
-    such motion has about sqrt(strength) times shear speed over spacing, whatever the kernel, the
+    The scale is mu, since motions that the gradient does not see are like shear: the slowest has a
+    measured frequency of about sqrt(strength) times shear speed over spacing, for any kernel,
     gradient and Poisson's ratio, while a tenth of lambda + 2 mu stiffens a beam of nu = 0.4999 by
     6 to 80 per cent. The default is the smallest strength with which a column thrown to the side
-    stays smooth in every scheme tried; it changes that beam's deflection, 5 particles across, by
-    0.1 to 0.6 per cent, and the stable step by less than one (docs/hourglass.md has the tables).
-
-    Each particle's share is recorded as a field, and as a number for the whole body.
+    stays smooth in every scheme tried; it changes the deflection of that beam, 5 particles across,
+    by 0.1 to 0.6 per cent, and the stable step by less than one (docs/hourglass.md has the tables).
     """
 
     conserves_momentum: ClassVar[bool] = True
@@ -68,12 +59,7 @@ class HourglassControl(Effect):
         check_positive("hourglass-control", "strength", self.strength, "times mu, near 0.5")
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
-        for body in model.bodies:
-            if body.formulation.configuration is not Configuration.REFERENCE:
-                raise SceneError(
-                    "hourglass-control: it is written in the reference configuration, but the "
-                    f"formulation of body {body.name!r} follows the motion; use 'total-lagrangian'"
-                )
+        in_the_reference(model, "hourglass-control")
         return _Control(
             label=label,
             reference=model.particles.positions,
@@ -81,17 +67,15 @@ class HourglassControl(Effect):
         )
 
     def pair_work(self, particles: float, pairs: float) -> float:
-        # The gradient's pairs for H and for the stress in return, and the nearest in between: up
-        # to 26 on a lattice.
+        # All pairs for H and for the stress, and in between the nearest, up to 26 on a lattice.
         return 2.0 * pairs + min(pairs, 26.0 * particles)
 
 
 def penalised(body: Body, strength: float) -> HourglassPairs:
-    """Near pairs with c_ab = strength mu V_a V_b W(X_ab) / |X_ab|^2; ghosts have none."""
+    """Near pairs with c_ab = strength mu V_a V_b W(X_ab) / |X_ab|^2, without ghosts."""
     particles = body.particles
     pairs = body.pairs(_reach(body))
-    real = ~particles.ghosts
-    apart = (pairs.distances > 0.0) & real[pairs.rows] & real[pairs.columns]
+    apart = real_pairs(body, pairs)
     weights = np.zeros(pairs.count)
     r, a, b = pairs.distances[apart], pairs.rows[apart], pairs.columns[apart]
     _, mu = body.material.lame_parameters
@@ -101,7 +85,7 @@ def penalised(body: Body, strength: float) -> HourglassPairs:
 
 
 def _reach(body: Body) -> float:
-    """Distance beyond which the weights are too small to count [m]."""
+    """Distance beyond which weights are negligible [m]."""
     spacing, support = float(body.particles.spacings.max()), body.smoothing.support_radius
     r = np.linspace(spacing, support, 1001)
     weights = body.smoothing.value(r) / r**2
@@ -116,7 +100,7 @@ class _Control(HourglassLoad, FieldTerm, EnergyTerm):
     operators: Sequence[HourglassOperator]
 
     def energies(self, observation: Observation) -> Array:
-        """The penalty's energy, particle by particle, (n,) [J]: half of each pair's."""
+        """Energy of the penalty per particle, (n,) [J]: half of that of each of its pairs."""
         if self not in observation.made:
             observation.made[self] = self._energies(observation)
         found: Array = observation.made[self]
@@ -126,8 +110,8 @@ class _Control(HourglassLoad, FieldTerm, EnergyTerm):
         u = observation.state.positions - self.reference
         H = observation.deformation_gradients - np.eye(u.shape[1])
         squares = [
-            one.pairs.squares(u[one.pairs.body.extent], H[one.pairs.body.extent])
-            for one in self.operators
+            operator.pairs.squares(u[operator.pairs.body.extent], H[operator.pairs.body.extent])
+            for operator in self.operators
         ]
         return 0.25 * np.concatenate(squares)
 
@@ -136,25 +120,25 @@ class _Control(HourglassLoad, FieldTerm, EnergyTerm):
         own = float(self.energies(observation).sum())
         return {
             f"{self.label} energy [J]": own,
-            # Beyond some per cent, motions that the gradient does not see matter to the answer.
+            # Above some per cent, motions that the gradient does not see affect the result.
             f"{self.label} share [-]": own / (own + strain) if own + strain > 0.0 else 0.0,
         }
 
     def fields(self, observation: Observation) -> Mapping[str, Array]:
-        """Where, and how far, motions that the gradient does not see matter.
+        """Error and share, which show where motions matter that the gradient does not see.
 
-        The error is the strain that F misses, the mean of |e_ab| / |X_ab| over neighbours: to be
-        held against the strains of the problem, and almost independent of the strength.
+        The error is the strain that F misses, the mean of |e_ab| / |X_ab| over neighbours, to be
+        compared with the strains of the problem; it hardly depends on the strength.
 
-        The share is the penalty's part of a particle's energy: near 1 where the motion is one that
-        the gradient does not see, near 0 where it is resolved, whatever the size of the load. The
-        strain energy counts as at least its mean over the body: an end that is next to unstrained
-        would show the ratio of two small numbers, and hide where the answer suffers.
+        The share is the penalty's fraction of a particle's energy: near 1 for a motion that the
+        gradient does not see, near 0 for a resolved one, for any load. The strain energy counts as
+        at least its mean over the body, since an almost unstrained end would otherwise show the
+        ratio of two small numbers.
         """
         own = self.energies(observation)
         share, error = np.zeros_like(own), np.zeros_like(own)
         V = np.where(observation.particles.ghosts, 0.0, observation.particles.volumes)
-        for pairs in (one.pairs for one in self.operators):
+        for pairs in (operator.pairs for operator in self.operators):
             extent = pairs.body.extent
             density, volumes = observation.energy_densities[extent], V[extent]
             strain = volumes * np.maximum(density, volumes @ density / volumes.sum())

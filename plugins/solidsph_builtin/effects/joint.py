@@ -1,4 +1,4 @@
-"""Bodies of different material, joined where they touch."""
+"""Joints between bodies of different materials."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from scipy.spatial import cKDTree
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.compilable_terms import PairLoad, PairTable
+from solidsph.interfaces.compilable_terms import PairLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.pair_table import PairTable
 from solidsph.interfaces.terms import EnergyTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices, Scalar, Vector
 from solidsph.maths.tensors import dot
@@ -27,15 +28,15 @@ from solidsph.registry.parameters import number
 class Joint(Effect):
     """Springs between particles of two bodies that are neighbours in the reference configuration.
 
-    psi = k_ab / 2 (|x_ab| - |X_ab|)^2: along the line between the two, so that momentum and angular
-    momentum are kept to rounding and rigid motions cost nothing. The springs of a particle add up,
-    in the direction of its partners, to the stiffness of what lies between the outermost particles
-    of both bodies: half a spacing of each material, in series,
+    psi = k_ab / 2 (|x_ab| - |X_ab|)^2: forces act along the line between the two, so that momentum
+    and angular momentum are conserved to rounding and rigid motions have no energy. In the
+    direction of its partners, the springs of a particle add up to the stiffness of the material
+    between the outermost particles of both bodies: half a spacing of each, in series,
 
         sum over b of k_ab (e_ab . n_a)^2 = s^(d-1) / (s_A / (2 M_A) + s_B / (2 M_B)),
 
-    with M = lambda + 2 mu. A joint of equal materials is then as stiff as the material, to the
-    first order in the spacing. Particles closer than `reach` mean spacings are partners.
+    with M = lambda + 2 mu. A joint of equal materials is then as stiff as the material, to first
+    order in the spacing. Particles closer than `reach` mean spacings are partners.
     """
 
     conserves_momentum: ClassVar[bool] = True
@@ -58,7 +59,7 @@ class Joint(Effect):
             )
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
-        springs = self._found(model.bodies)
+        springs = self._springs(model.bodies)
         return _Springs(
             label=label,
             pairs=springs.table(model.particles.count),
@@ -67,9 +68,9 @@ class Joint(Effect):
         )
 
     def pair_work(self, particles: float, pairs: float) -> float:
-        return 0.0  # of the few at the faces nothing is known before they are found
+        return 0.0  # few, at the faces, and not known before they are searched
 
-    def _found(self, bodies: Sequence[Body]) -> _Found:
+    def _springs(self, bodies: Sequence[Body]) -> _SpringList:
         names = [body.name for body in bodies]
         for name in self.between or ():
             if name not in names:
@@ -83,7 +84,7 @@ class Joint(Effect):
                 "leave it out, or add a body"
             )
         parts = [_between(a, b, self.reach) for a, b in combinations(chosen, 2)]
-        found = _Found(*(np.concatenate([getattr(one, f) for one in parts]) for f in _FIELDS))
+        found = _SpringList(*(np.concatenate([getattr(p, f) for p in parts]) for f in _FIELDS))
         if not len(found.one):
             raise SceneError(
                 f"joint: no particles of {', '.join(body.name for body in chosen)} are closer than "
@@ -93,17 +94,17 @@ class Joint(Effect):
 
 
 @attrs.frozen(eq=False)
-class _Found:
+class _SpringList:
     """Springs, each once."""
 
-    one: Indices  # (m,) its ends, numbered among all particles
-    other: Indices
+    one: Indices  # (m,) first end, among all particles
+    other: Indices  # (m,) second end
     stiffness: Array  # k (m,) [N/m]
     length: Array  # |X_ab| (m,) [m]
 
     def highest_frequency(self, masses: Array) -> float:
-        """Above all angular frequencies of these springs alone, of masses (n,) [rad/s]."""
-        # No eigenvalue exceeds the largest sum of a row's entries, scaled evenly.
+        """Bound on the angular frequencies of these springs alone, with masses (n,) [rad/s]."""
+        # Gershgorin: no eigenvalue exceeds the largest row sum of the scaled matrix.
         a, b, k = self.one, self.other, self.stiffness
         own = np.asarray(np.bincount(a, k, len(masses)) + np.bincount(b, k, len(masses)))
         across = k / np.sqrt(masses[a] * masses[b])
@@ -117,15 +118,13 @@ class _Found:
         rows = np.concatenate([self.one, self.other])
         columns = np.concatenate([self.other, self.one])
         values = np.tile(np.column_stack([self.stiffness, self.length]), (2, 1))
-        order = np.lexsort((columns, rows))
-        starts = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=count))])
-        return PairTable(starts.astype(np.intp), columns[order].astype(np.int32), values[order])
+        return PairTable.of(rows, columns, values, count)
 
 
-_FIELDS = tuple(field.name for field in attrs.fields(_Found))
+_FIELDS = tuple(field.name for field in attrs.fields(_SpringList))
 
 
-def _between(one: Body, other: Body, reach: float) -> _Found:
+def _between(one: Body, other: Body, reach: float) -> _SpringList:
     """The springs between two bodies."""
     real = [np.flatnonzero(~body.particles.ghosts) for body in (one, other)]
     X, Y = one.particles.positions[real[0]], other.particles.positions[real[1]]
@@ -139,11 +138,11 @@ def _between(one: Body, other: Body, reach: float) -> _Found:
     a, b, R = a[order], b[order], R[order]
     e = (Y[b] - X[a]) / R[:, None]
     d = e.shape[1]
-    # What lies between, of the confined moduli, on the area of the smaller cell.
+    # The layer between, by the confined moduli, on the area of the smaller cell.
     M, N = (body.material.density * body.material.wave_speed**2 for body in (one, other))
     layer = np.minimum(s[a], t[b]) ** (d - 1) / (0.5 * s[a] / M + 0.5 * t[b] / N)
     shares = 0.5 * (1.0 / _squares(a, e, len(X))[a] + 1.0 / _squares(b, e, len(Y))[b])
-    return _Found(
+    return _SpringList(
         one=real[0][a] + one.extent.start,
         other=real[1][b] + other.extent.start,
         stiffness=layer * shares,
@@ -152,8 +151,8 @@ def _between(one: Body, other: Body, reach: float) -> _Found:
 
 
 def _squares(ends: Indices, directions: Array, count: int) -> Array:
-    """Sum over a particle's springs of (e . n)^2, n the direction of all of them, (count,)."""
-    mean = np.column_stack([np.bincount(ends, one, count) for one in directions.T]).astype(float)
+    """Sum over a particle's springs of (e . n)^2, with n their mean direction, (count,) [-]."""
+    mean = np.column_stack([np.bincount(ends, e, count) for e in directions.T]).astype(float)
     size = np.linalg.norm(mean, axis=1, keepdims=True)
     normal = np.divide(mean, size, out=np.zeros_like(mean), where=size > 0.0)
     squares = np.einsum("mi,mi->m", directions, normal[ends]) ** 2
@@ -167,10 +166,6 @@ class _Springs(PairLoad, EnergyTerm):
     pairs: PairTable
     reference: Array  # X (n, d)
     stiffness_rate: float  # [rad/s]
-
-    @property
-    def arrays(self) -> Mapping[str, int]:
-        return {"springs": self.pairs.bytes}
 
     @staticmethod
     def pull(offset: Vector, velocity: Vector, values: Vector) -> Scalar:

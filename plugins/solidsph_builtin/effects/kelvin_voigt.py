@@ -1,4 +1,4 @@
-"""Damping inside the material, in proportion to stiffness and strain rate."""
+"""Material damping in proportion to stiffness and strain rate."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.interfaces.terms import Load, Observation
+from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array, Indices, Tensor
 from solidsph.maths.tensors import add, identity, product, scale, trace, transpose
 from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.effects._gradients import BodyGradient, in_the_reference
 
-# Up to so many freedoms eigenvalues are found by a dense matrix; beyond, to this part.
+# Largest number of freedoms for a dense eigenvalue problem, and the relative tolerance beyond.
 _DENSE, _FOUND = 60, 1e-3
 
 
@@ -27,10 +27,10 @@ _DENSE, _FOUND = 60, 1e-3
 class KelvinVoigt(Effect):
     """A dashpot beside the material: S_v = time (lambda tr(dE/dt) I + 2 mu dE/dt), P_v = F S_v.
 
-    Kelvin and Voigt's solid in the reference configuration, E being the Green-Lagrange strain: it
-    is objective, rigid motions give nothing, and energy is only ever taken. A small vibration of
-    angular frequency w decays as exp(-time w^2 t / 2): Rayleigh's second term, by which short
-    waves fade first. The stress goes through the same gradient and divergence as the material's.
+    The Kelvin-Voigt solid in the reference configuration, with E the Green-Lagrange strain: it is
+    objective, rigid motions give no stress, and energy is only dissipated. A small vibration of
+    angular frequency w decays as exp(-time w^2 t / 2): the stiffness-proportional term of Rayleigh
+    damping, which damps short waves first. Gradient and divergence are those of the material.
     """
 
     conserves_momentum: ClassVar[bool] = True
@@ -52,7 +52,7 @@ class KelvinVoigt(Effect):
             reference=model.particles.positions,
             time=self.time,
             gradients=gradients,
-            damping_rate=self.time * max(_highest_square(one) for one in gradients),
+            damping_rate=self.time * max(_highest_square(gradient) for gradient in gradients),
         )
 
     def pair_work(self, particles: float, pairs: float) -> float:
@@ -97,11 +97,11 @@ class _Dashpot(Load):
 
     @property
     def arrays(self) -> Mapping[str, int]:
-        return {f"gradient of {one.body.name}": one.matrices.bytes for one in self.gradients}
+        return {f"gradient of {g.body.name}": g.matrices.bytes for g in self.gradients}
 
     @property
     def pair_count(self) -> int:
-        return 3 * sum(one.pair_count for one in self.gradients)  # both gradients, the divergence
+        return 3 * sum(g.pair_count for g in self.gradients)  # both gradients, the divergence
 
     @property
     def particles(self) -> Indices:
@@ -117,6 +117,3 @@ class _Dashpot(Load):
             S = _viscous_stress(gradient.body, scale(0.5, add(half, transpose(half))))
             forces[extent] = gradient.forces(self.time * np.array(product(F, S)))
         return forces
-
-    def report(self, observation: Observation) -> Mapping[str, float]:
-        return {}

@@ -10,7 +10,7 @@ import attrs
 from solidsph.interfaces.compilable_terms import PointwiseLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.interfaces.terms import Load, Observation
+from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array, Indices, Vector
 from solidsph.maths.tensors import scaled
 from solidsph.model.regions import Where
@@ -45,13 +45,6 @@ class _Drag(PointwiseLoad):
     values: Array  # c m, (k, 1) [kg/s]
     damping_rate: float  # c [1/s]
 
-    @property
-    def arrays(self) -> Mapping[str, int]:
-        return {"chosen particles": self.particles.nbytes, "drag": self.values.nbytes}
-
     @staticmethod
     def force(position: Vector, velocity: Vector, values: Vector) -> Vector:
         return scaled(-values[0], velocity)
-
-    def report(self, observation: Observation) -> Mapping[str, float]:
-        return {}

@@ -1,4 +1,4 @@
-"""A plane that nothing passes."""
+"""A rigid plane wall."""
 
 from __future__ import annotations
 
@@ -13,12 +13,8 @@ from scipy.sparse import bsr_array, csr_array
 from solidsph.errors import SceneError
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
-from solidsph.interfaces.terms import (
-    EnergyTerm,
-    FieldTerm,
-    Load,
-    Observation,
-)
+from solidsph.interfaces.memory import Memory
+from solidsph.interfaces.terms import EnergyTerm, FieldTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import AXES, Where
@@ -35,20 +31,19 @@ _NAMES = ("x", "y", "z")
 @final
 @attrs.frozen
 class RigidWall(Effect):
-    """A particle nearer to the plane than its `clearance` is pushed back, as by a spring.
+    """A spring that pushes back every particle nearer to the plane than its `clearance`.
 
-    The normal points to the side where bodies are. With g the distance from the plane less the
-    clearance, the energy is k min(g, 0)^2 / 2, and k = strength (lambda + 2 mu) V / s^2: the
-    wall yields as much as 1 / strength spacings of material. The clearance of a particle is its
-    depth below the surface of its body, and no more than half a spacing, so that a body touches
-    where its surface is, wherever its particles are, unless a number is given. A wall may move by
-    formulas in t; what it gives is the work of its account.
+    The normal points to the side of the bodies. With g the distance from the plane minus the
+    clearance, the energy is k min(g, 0)^2 / 2 with k = strength (lambda + 2 mu) V / s^2: the wall
+    is as compliant as 1 / strength spacings of material. The clearance of a particle, unless it is
+    given, is its depth below the surface of its body, at most half a spacing, so that a body
+    touches where its surface is. A wall may move by formulas in t; its work is in its account.
 
-    Friction is Coulomb's law with a spring along the plane for each particle that touches, which
-    gives way where it would pull with more than `friction` times the normal force, Cundall &
-    Strack (1979). A law by velocity alone would let every block creep down its incline; with
-    the spring it stands, for an elastic play that is known: f N / (0.8 k). The stretches are in
-    `State.memory`; what is lost by sliding is what the account has taken and does not store.
+    Friction is Coulomb's law with a tangential spring for each touching particle, which slides at
+    `friction` times the normal force, Cundall & Strack (1979). A law of velocity alone would let
+    every block creep down its incline; with the spring it rests, after an elastic displacement of
+    f N / (0.8 k). The stretches are in `State.memory`; the energy lost by sliding is the work that
+    the account has taken and does not store.
     """
 
     answers: ClassVar[frozenset[Need] | None] = frozenset()
@@ -103,18 +98,18 @@ class RigidWall(Effect):
             springs=self.strength * moduli * V / s**2,
             friction=self.friction,
             field=field,
-            # Every particle is tied to the wall alone: k / m, and the spring along it is softer.
+            # Every particle is tied to the wall alone, by k / m; the tangential spring is softer.
             stiffness_rate=sqrt(self.strength)
             * max(
                 body.material.wave_speed / float(body.particles.spacings.min())
                 for body in model.bodies
             ),
         )
-        wall.motion(0.0, 0)  # a formula out of its domain shows now, not in mid-run
+        wall.motion(0.0, 0)  # a formula outside its domain raises now, not during the run
         return wall
 
     def _clearances(self, model: DiscreteModel) -> Array:
-        """Of all particles, (n,) [m]."""
+        """Clearance of every particle, (n,) [m]."""
         particles = model.particles
         if self.clearance is not None:
             return np.asarray(self.clearance * particles.spacings)
@@ -165,17 +160,12 @@ class _Wall(EnergyTerm, FieldTerm, Load):
         return np.asarray(self.springs * np.maximum(-self.gaps(time, positions), 0.0))
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
-        """Without friction, which depends on what has been."""
+        """Normal forces; friction depends on memory."""
         return np.asarray(self.pressed(time, positions)[:, None] * self.normal)
 
     def advance(
-        self,
-        time: float,
-        step: float,
-        positions: Array,
-        velocities: Array,
-        memory: Mapping[str, Array],
-    ) -> tuple[Array, Mapping[str, Array]]:
+        self, time: float, step: float, positions: Array, velocities: Array, memory: Memory
+    ) -> tuple[Array, Memory]:
         if not self.friction:
             return self.forces(time, positions, velocities), {}
         pressed = self.pressed(time, positions)
@@ -191,7 +181,7 @@ class _Wall(EnergyTerm, FieldTerm, Load):
         return forces, {self._slip_name: slip}
 
     def stiffness(self, displacements: Array, time: float) -> csr_array:
-        """As `solidsph.statics.stiff.Stiff` has it, without friction."""
+        """Minus the derivative of the normal forces, (d n, d n) [N/m]."""
         n, d = displacements.shape
         touching = self.gaps(time, self.reference + displacements) < 0.0
         springs = np.zeros(n)
@@ -202,7 +192,7 @@ class _Wall(EnergyTerm, FieldTerm, Load):
         return csr_array(matrix)
 
     def energies(self, observation: Observation) -> Array:
-        """What the springs hold, (n,) [J]."""
+        """Energy of the springs, (n,) [J]."""
         state = observation.state
         gaps = np.minimum(self.gaps(state.time, state.positions), 0.0)
         slips = np.sum(self._slip(state.memory) ** 2, axis=1) if self.friction else 0.0
@@ -223,7 +213,7 @@ class _Wall(EnergyTerm, FieldTerm, Load):
     def fields(self, observation: Observation) -> Mapping[str, Array]:
         return {f"{self.label} force [N]": observation.state.applied[self.label]}
 
-    def _slip(self, memory: Mapping[str, Array]) -> Array:
+    def _slip(self, memory: Memory) -> Array:
         return memory.get(self._slip_name, np.zeros((len(self.particles), len(self.point))))
 
     @property

@@ -23,9 +23,11 @@ class CentralDifference(PointwiseIntegrator):
     stability_limit: ClassVar[float] = 2.0
 
     @staticmethod
-    def leap(velocity: Scalar, acceleration: Scalar, last: Scalar, step_size: float) -> Scalar:
+    def mean_velocity(
+        velocity: Scalar, acceleration: Scalar, last: Scalar, step_size: float
+    ) -> Scalar:
         return last + step_size * acceleration
 
     @staticmethod
-    def arrive(mean_velocity: Scalar, acceleration: Scalar, step_size: float) -> Scalar:
+    def end_velocity(mean_velocity: Scalar, acceleration: Scalar, step_size: float) -> Scalar:
         return mean_velocity + 0.5 * step_size * acceleration

@@ -22,7 +22,7 @@ from solidsph.interfaces.engine import Engine
 from solidsph.interfaces.formulation import Configuration, Formulation
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.material import Material
-from solidsph.interfaces.plan import BodySize, Operations, Way
+from solidsph.interfaces.plan import BodySize, Operations, SumMethod
 from solidsph.interfaces.shape import Shape
 from solidsph.interfaces.smoothing_kernel import UNIT_SPHERE
 from solidsph.registry.construct import construct
@@ -76,7 +76,7 @@ def estimate_work(scene: Scene) -> Work:
     loads: tuple[Operations, ...] = ()
     visited = sum(effect.pair_work(n, pairs) for effect in effects)
     if visited:
-        way = Way.PAIR_LOOPS if compiled else Way.PAIR_ARRAYS
+        way = SumMethod.PAIR_LOOPS if compiled else SumMethod.PAIR_ARRAYS
         kept = round(visited * (4 + 3 * 8))
         loads = (Operations(way, round(visited), n, kept, kept, threaded=compiled),)
     return Work(

@@ -12,7 +12,7 @@ from solidsph.costs.calibration import Calibration
 from solidsph.costs.coefficients import COEFFICIENTS
 from solidsph.costs.terms import CostTerm
 from solidsph.costs.work import Loop, Work
-from solidsph.interfaces.plan import Compilation, Way
+from solidsph.interfaces.plan import Compilation, SumMethod
 
 # Additional cost of a step per particle on which a constant or pointwise force acts; not part of
 # the fit yet.
@@ -23,7 +23,7 @@ _UNFITTED = {
 }
 
 # Ways that form their weights at every evaluation, too expensive to stand for an unknown way.
-_ANEW = (Way.PRODUCTS_ANEW, Way.FORMULAS, Way.WEIGHTS)
+_ANEW = (SumMethod.PRODUCTS_ANEW, SumMethod.FORMULAS, SumMethod.WEIGHTS)
 
 
 @attrs.frozen
@@ -149,7 +149,7 @@ def coefficient(name: str) -> float:
         return COEFFICIENTS[" ".join(words)]
     candidates = [
         COEFFICIENTS.get(" ".join([way.name, *words[1:]]), 0.0)
-        for way in Way
-        if words[0] in Way.__members__ and way not in _ANEW
+        for way in SumMethod
+        if words[0] in SumMethod.__members__ and way not in _ANEW
     ]
     return max(candidates, default=0.0)

@@ -10,14 +10,11 @@ import attrs
 
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.work import Loop, Work
-from solidsph.interfaces.plan import Operations, Piece, Way
+from solidsph.engines.compiled.constants import PER_PARTICLE, WORTH_A_THREAD
+from solidsph.interfaces.plan import CompilationUnit, Operations, SumMethod
 
 # Parallel efficiency of threads that share a sum.
 _EFFICIENCY = 0.95
-
-# The compiled loop uses threads for a pass over particles from this many operations of about a
-# nanosecond on; a particle counts as so many.
-_WORTH_A_THREAD, _PER_PARTICLE = 200_000, 10
 
 # Outputs whose chunks HDF5 keeps cached.
 _CACHED_OUTPUTS = 150.0
@@ -25,7 +22,7 @@ _CACHED_OUTPUTS = 150.0
 # The C library requests larger arrays from the system one by one, which clears every page [bytes].
 _LARGE = 128 * 1024
 
-_OF_BUILD = (Piece.ENGINE, Piece.MOVING_ENGINE)
+_OF_BUILD = (CompilationUnit.ENGINE, CompilationUnit.MOVING_ENGINE)
 
 
 class Unit(Enum):
@@ -59,9 +56,9 @@ def build_terms(work: Work) -> Iterator[CostTerm]:
     yield CostTerm(f"build particle {d}D", work.particles, Unit.SPARSE)
     yield CostTerm(f"build pair {kind} {d}D", work.pairs, Unit.SPARSE)
     for part in work.operations:
-        if part.way is Way.HOURGLASS_PRODUCTS or part.way is Way.HOURGLASS_SWEEPS:
+        if part.method is SumMethod.HOURGLASS_PRODUCTS or part.method is SumMethod.HOURGLASS_SWEEPS:
             yield CostTerm(f"build hourglass {d}D", part.pairs, Unit.SPARSE)
-        if part.way is Way.PAIR_ARRAYS or part.way is Way.PAIR_LOOPS:
+        if part.method is SumMethod.PAIR_ARRAYS or part.method is SumMethod.PAIR_LOOPS:
             yield CostTerm(f"build force {d}D", part.pairs, Unit.SPARSE)
     yield from _compilations(work, of_build=True)
 
@@ -79,7 +76,9 @@ def step_terms(work: Work) -> Iterator[CostTerm]:
     yield CostTerm(f"{loop} particle {d}D", n, Unit.SPARSE)
     loads = work.conditions - work.motions
     if work.loop is Loop.COMPILED:  # a load on some particles costs nothing on the others
-        local = [part for part in work.operations if part.way is Way.UNKNOWN and not part.pairs]
+        local = [
+            part for part in work.operations if part.method is SumMethod.UNKNOWN and not part.pairs
+        ]
         loads -= len(local)
         count = sum(part.particles for part in local)
         yield CostTerm(f"{loop} loaded particle {d}D", count, Unit.SPARSE)
@@ -87,17 +86,17 @@ def step_terms(work: Work) -> Iterator[CostTerm]:
         yield CostTerm(f"{loop} {kind} {d}D", count, Unit.CALLS)
         yield CostTerm(f"{loop} {kind} particle {d}D", count * n, Unit.SPARSE)
     for part in work.operations:
-        if part.way is Way.UNKNOWN and not part.pairs:
+        if part.method is SumMethod.UNKNOWN and not part.pairs:
             continue  # a load on particles, counted among the conditions
         if work.loop is Loop.STEPS:
-            yield CostTerm(f"{part.way.name} call", 1.0, Unit.CALLS)
+            yield CostTerm(f"{part.method.name} call", 1.0, Unit.CALLS)
         yield from _sum_terms(part, d)
 
 
 def shared_terms(work: Work) -> Iterator[CostTerm]:
     """Terms of a step that threads share."""
     d = work.dimension
-    if work.loop is Loop.COMPILED and _PER_PARTICLE * work.particles >= _WORTH_A_THREAD:
+    if work.loop is Loop.COMPILED and PER_PARTICLE * work.particles >= WORTH_A_THREAD:
         yield CostTerm(f"compiled step particle {d}D", work.particles, Unit.SPARSE)
     for part in work.operations:
         if part.threaded:
@@ -114,7 +113,7 @@ def output_terms(work: Work) -> Iterator[CostTerm]:
     if 8 * n * d * d >= _LARGE:
         yield CostTerm(f"output large particle {d}D", n, Unit.SPARSE)
     for part in work.operations:
-        if part.way in (Way.HOURGLASS_PRODUCTS, Way.HOURGLASS_SWEEPS):
+        if part.method in (SumMethod.HOURGLASS_PRODUCTS, SumMethod.HOURGLASS_SWEEPS):
             yield CostTerm("output hourglass pair", part.pairs, Unit.SPARSE)
 
 
@@ -161,11 +160,11 @@ def run_memory(work: Work) -> Iterator[CostTerm]:
     yield CostTerm("memory of a file", 1.0 - exp(-work.outputs / _CACHED_OUTPUTS), Unit.BYTES)
     yield CostTerm(f"memory of a run, particle {_kind(work)} {d}D", work.particles, Unit.BYTES)
     for part in work.operations:
-        if part.way is Way.PRODUCTS_ANEW or part.way is Way.PAIR_ARRAYS:
-            yield CostTerm(f"memory of a run, pair {part.way.name} {d}D", part.pairs, Unit.BYTES)
+        if part.method is SumMethod.PRODUCTS_ANEW or part.method is SumMethod.PAIR_ARRAYS:
+            yield CostTerm(f"memory of a run, pair {part.method.name} {d}D", part.pairs, Unit.BYTES)
     for c in work.compilations:
-        if c.piece not in _OF_BUILD:
-            yield CostTerm(f"memory of {c.piece.name}{_threads(c.threaded)}", 1.0, Unit.BYTES)
+        if c.unit not in _OF_BUILD:
+            yield CostTerm(f"memory of {c.unit.name}{_threads(c.threaded)}", 1.0, Unit.BYTES)
     if work.statics is not None:
         yield CostTerm(f"memory of a tangent entry {d}D", work.statics.entries, Unit.BYTES)
         yield CostTerm(f"memory of a factor entry {d}D", work.statics.fill, Unit.BYTES)
@@ -178,23 +177,26 @@ def speedup(threads: int) -> float:
 
 def _sum_terms(part: Operations, d: int) -> Iterator[CostTerm]:
     precision = f" float{8 * part.precision}" if part.precision != 8 else ""
-    yield CostTerm(f"{part.way.name} {d}D{precision} pair", part.pairs, Unit.SPARSE)
-    if part.way in (Way.STENCILS, Way.ROWS):  # the material, always in double precision
-        yield CostTerm(f"{part.way.name} {d}D particle", part.particles, Unit.SPARSE)
+    yield CostTerm(f"{part.method.name} {d}D{precision} pair", part.pairs, Unit.SPARSE)
+    if part.method in (
+        SumMethod.STENCILS,
+        SumMethod.ROWS,
+    ):  # the material, always in double precision
+        yield CostTerm(f"{part.method.name} {d}D particle", part.particles, Unit.SPARSE)
 
 
 def _compilations(work: Work, *, of_build: bool) -> Iterator[CostTerm]:
     for part in work.compilations:
-        if (part.piece in _OF_BUILD) == of_build:
+        if (part.unit in _OF_BUILD) == of_build:
             yield CostTerm(
-                f"compile {part.piece.name}{_threads(part.threaded)}", 1.0, Unit.COMPILING
+                f"compile {part.unit.name}{_threads(part.threaded)}", 1.0, Unit.COMPILING
             )
 
 
 def _compiler_memory(work: Work) -> Iterator[CostTerm]:
     for part in work.compilations:
-        if part.piece in _OF_BUILD:
-            yield CostTerm(f"memory of {part.piece.name}", 1.0, Unit.BYTES)
+        if part.unit in _OF_BUILD:
+            yield CostTerm(f"memory of {part.unit.name}", 1.0, Unit.BYTES)
 
 
 def _threads(threaded: bool) -> str:
@@ -203,9 +205,9 @@ def _threads(threaded: bool) -> str:
 
 def _kind(work: Work) -> str:
     """Engine as the names of coefficients have it."""
-    ways = {part.way for part in work.operations}
-    if ways & {Way.STENCILS, Way.ROWS}:
+    ways = {part.method for part in work.operations}
+    if ways & {SumMethod.STENCILS, SumMethod.ROWS}:
         return "compiled"
-    if ways & {Way.FORMULAS, Way.WEIGHTS}:
+    if ways & {SumMethod.FORMULAS, SumMethod.WEIGHTS}:
         return "moving"
-    return "anew" if Way.PRODUCTS_ANEW in ways else "matrix"
+    return "anew" if SumMethod.PRODUCTS_ANEW in ways else "matrix"

@@ -10,10 +10,10 @@ import attrs
 import numpy as np
 
 from solidsph.costs.work import Loop, Work
-from solidsph.interfaces.plan import Way
+from solidsph.interfaces.plan import SumMethod
 from solidsph.simulation import Simulation
 
-_COMPILED = (Way.STENCILS, Way.ROWS)
+_COMPILED = (SumMethod.STENCILS, SumMethod.ROWS)
 
 # The fastest of this many evaluations counts, after a first one that may fill caches.
 _REPEATS = 3
@@ -41,7 +41,9 @@ class Timings:
         internal = () if self.internal is not None else work.operations[:count]
         others = work.operations[count:]
         if self.loads:
-            others = tuple(part for part in others if part.way is not Way.UNKNOWN or not part.pairs)
+            others = tuple(
+                part for part in others if part.method is not SumMethod.UNKNOWN or not part.pairs
+            )
         return attrs.evolve(work, operations=(*internal, *others))
 
 
@@ -59,7 +61,7 @@ def time_uncounted(simulation: Simulation, work: Work) -> Timings:
         if not load.is_counted
     }
     internal = dynamics.internal
-    if internal.advances_histories and all(p.way not in _COMPILED for p in internal.operations):
+    if internal.advances_histories and all(p.method not in _COMPILED for p in internal.operations):
         return Timings(loads, _seconds(partial(internal.advance, step, step, u, {})))
     return Timings(loads)
 

@@ -1,4 +1,4 @@
-"""AutomaticEngine: the compiled engine where that pays."""
+"""AutomaticEngine: the compiled engine where compiling pays, otherwise the matrix engine."""
 
 from __future__ import annotations
 
@@ -15,21 +15,20 @@ from solidsph.interfaces.engine import Engine, InternalForces
 from solidsph.interfaces.plan import BodySize, Plan
 from solidsph.interfaces.terms import StressTerm
 
-# What the matrix engine takes for a step and for each pair in it, if the pairs stay and if they
-# are found anew, and what compilation takes, all [s], about; beside them the compiled engine's own
-# steps are as good as free.
+# Rough times [s] of the matrix engine per step and per pair, for constant and for moving
+# neighbours, and of compilation; the steps of the compiled engine are negligible beside them.
 _STEP, _PAIR = 1e-4, 25e-9
 _MOVING_STEP, _MOVING_PAIR = 1e-3, 400e-9
 _COMPILATION = 10.0
 
-# Beyond so many pairs the matrices alone fill a gigabyte, however few steps there are.
+# Number of pairs beyond which the matrices alone fill a gigabyte.
 _MANY_PAIRS = 1e7
 
 
 @final
 @attrs.frozen
 class AutomaticEngine(Engine):
-    """The compiled engine where there is more to do than compiling is; the matrix engine else."""
+    """The compiled engine if the matrix engine would take longer than compiling takes."""
 
     def prepare(
         self, bodies: Sequence[Body], conditions: Sequence[StressTerm], evaluations: int = 1
@@ -47,13 +46,13 @@ class AutomaticEngine(Engine):
 
 
 def compiling_pays(sizes: Sequence[BodySize], evaluations: int) -> bool:
-    """True if so many evaluations by matrices take longer than compiling, or matrices too much."""
+    """True if evaluations by matrices take longer than compiling, or matrices too much memory."""
     work = evaluations * sum(_matrix_time(size) for size in sizes)
     return work > _COMPILATION or sum(size.pairs for size in sizes) > _MANY_PAIRS
 
 
 def _matrix_time(size: BodySize) -> float:
-    """What the matrix engine takes for a step of a body [s], about."""
+    """Approximate time of the matrix engine for a step of a body [s]."""
     if size.moving:
         return _MOVING_STEP + _MOVING_PAIR * size.pairs
     return _STEP + _PAIR * size.pairs

@@ -1,4 +1,4 @@
-"""Internal forces of bodies whose materials remember."""
+"""Internal forces of bodies whose materials have internal variables."""
 
 from __future__ import annotations
 
@@ -8,39 +8,17 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
+from solidsph.engines.array_law import ArrayLaw
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import InternalForces, StressFields
 from solidsph.interfaces.forces_modifier import ForcesModifier
 from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.interfaces.law import Law, memory_name
+from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.plan import Compilation, Operations
 from solidsph.interfaces.terms import FieldTerm, Observation, StressTerm, Term
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import components_first, particles_first
-
-
-@final
-@attrs.frozen(eq=False)
-class ArrayLaw(Law):
-    """By arrays of all particles: the reference for every other way."""
-
-    body: Body
-
-    def flux(self, H: Array, history: Array, step: float) -> tuple[Array, Array]:
-        formulation, material = self.body.formulation, self.body.material
-        n = self.body.particles.count
-        with np.errstate(all="ignore"):  # a run that leaves the material's domain is caught later
-            F = formulation.deformation_gradient(components_first(H))
-            if isinstance(material, HistoryMaterial):
-                h: History = tuple(history.T)
-                if step > 0.0:
-                    h = material.advance(F, h, step, material.params)
-                P = material.stress(F, h, material.params)
-                history = np.column_stack([np.broadcast_to(one, n) for one in h])
-            else:
-                P = material.first_piola(F, material.params)
-            T = formulation.flux(F, P)
-        return np.moveaxis(particles_first(T, n), 0, -1), history
 
 
 def modified(
@@ -49,22 +27,22 @@ def modified(
     terms: Sequence[Term],
     conditions: Sequence[StressTerm],
 ) -> InternalForces:
-    """Internal forces as `terms` modify them, which advance the histories of materials.
+    """Internal forces with all modifiers among `terms`, which advance the histories of materials.
 
     Args:
-        internal: by the scene's engine.
-        bodies: what exerts them.
-        terms: those among them that are modifiers are applied in this order.
-        conditions: what changes the stress before forces are formed.
+        internal: forces by the scene's engine.
+        bodies: all bodies.
+        terms: all terms; modifiers are applied in this order.
+        conditions: terms that change the stress before forces are formed.
 
     Raises:
-        SceneError: two modifiers do not go together.
+        SceneError: two modifiers cannot be combined.
     """
     for term in terms:
         if isinstance(term, ForcesModifier):
             internal = term.modified(internal, conditions)
-    asked = internal.advances_histories
-    if asked or not any(isinstance(body.material, HistoryMaterial) for body in bodies):
+    have_history = any(isinstance(body.material, HistoryMaterial) for body in bodies)
+    if internal.advances_histories or not have_history:
         return internal
     return HistoryForces(
         internal, tuple(internal.law(body) or ArrayLaw(body) for body in bodies), tuple(conditions)
@@ -74,7 +52,7 @@ def modified(
 @final
 @attrs.frozen(eq=False)
 class HistoryForces(InternalForces):
-    """The sums are the engine's; the law comes between its two passes."""
+    """Internal forces by the two passes of an engine, with the laws between them."""
 
     advances_histories: ClassVar[bool] = True
 
@@ -102,8 +80,8 @@ class HistoryForces(InternalForces):
         return self.advance(time, 0.0, displacements, {})[0]
 
     def advance(
-        self, time: float, step: float, displacements: Array, memory: Mapping[str, Array]
-    ) -> tuple[Array, Mapping[str, Array]]:
+        self, time: float, step: float, displacements: Array, memory: Memory
+    ) -> tuple[Array, Memory]:
         n, d = displacements.shape
         H = self.sums.gradients(displacements)
         stress = np.zeros((d, d, n))
@@ -127,7 +105,7 @@ class HistoryForces(InternalForces):
     def spread(self, displacements: Array, stress: Array) -> Array:
         return self.sums.spread(displacements, stress)
 
-    def observed(self, displacements: Array, memory: Mapping[str, Array]) -> StressFields:
+    def observed(self, displacements: Array, memory: Memory) -> StressFields:
         virgin = self.sums.fields(displacements)
         dissipated = np.zeros(len(displacements))
         for law in self.laws:
@@ -147,7 +125,7 @@ class HistoryForces(InternalForces):
 @final
 @attrs.frozen(eq=False)
 class HistoryFields(FieldTerm):
-    """Shows what the materials of some bodies remember."""
+    """Internal variables of materials, as fields of the record."""
 
     bodies: Sequence[Body]
     count: int  # of all particles
@@ -156,11 +134,8 @@ class HistoryFields(FieldTerm):
     def label(self) -> str:
         return "history"
 
-    def report(self, observation: Observation) -> Mapping[str, float]:
-        return {}
-
     def fields(self, observation: Observation) -> Mapping[str, Array]:
-        found: dict[str, Array] = {}
+        fields: dict[str, Array] = {}
         for body in self.bodies:
             material = body.material
             if not isinstance(material, HistoryMaterial):
@@ -168,6 +143,6 @@ class HistoryFields(FieldTerm):
             history = ArrayLaw(body).history_of(observation.state.memory)
             names = list(material.initial_history(body.smoothing.dimension))
             for name in material.shown:
-                values = found.setdefault(name, np.zeros(self.count))
+                values = fields.setdefault(name, np.zeros(self.count))
                 values[body.extent] = history[:, names.index(name)]
-        return found
+        return fields

@@ -11,7 +11,7 @@ from solidsph.interfaces.smoothing_kernel import UNIT_SPHERE
 
 
 def size_of(body: Body) -> BodySize:
-    """The size of a body; its pairs are those that there would be in complete supports."""
+    """The size of a body; the pairs are counted as if all supports were complete."""
     d = body.smoothing.dimension
     ball = UNIT_SPHERE[d] / d * body.smoothing.support_radius**d
     return BodySize(

@@ -1,4 +1,4 @@
-"""Body: one run of particles with its own material, kernel support and neighbours."""
+"""Body: consecutive particles with one material, kernel support and formulation."""
 
 from __future__ import annotations
 
@@ -16,35 +16,37 @@ from solidsph.maths.arrays import Array, Indices
 from solidsph.model.neighbours import Hidden, Pairs, neighbour_pairs
 from solidsph.model.particles import Particles
 
-# Of nearest neighbours, in spacings.
+# Largest distance of nearest neighbours, in spacings.
 _NEAREST = 1.2
 
 
 @attrs.frozen(eq=False)
 class Body:
-    """What an engine needs to know to find the internal forces of one body."""
+    """What an engine needs to compute the internal forces of one body."""
 
     name: str
-    shape: Shape  # that its particles fill
-    extent: slice  # its place among all particles
-    particles: Particles  # its own only
+    shape: Shape  # the region that the particles fill
+    extent: slice  # of its particles, among those of all bodies
+    particles: Particles  # of this body alone
     smoothing: SmoothingKernel
     material: Material
     formulation: Formulation
     hidden: Hidden | None = None  # near particles that do not see each other
 
     def pairs(self, radius: float | None = None) -> Pairs:
-        """Neighbours in the reference configuration, numbered within the body: within the support,
-        or within a smaller `radius` [m].
+        """Neighbour pairs in the reference configuration, numbered within the body.
 
-        Found anew at every call: an engine that needs them for longer keeps what it needs.
+        Each call searches again; a caller keeps what it needs.
+
+        Args:
+            radius: largest distance [m], at most the support radius, which is the default.
         """
         within = self.smoothing.support_radius if radius is None else radius
         return neighbour_pairs(self.particles.positions, within, self.hidden)
 
     @cached_property
     def nearest_pairs(self) -> tuple[Indices, Indices]:
-        """Particles (m,) and (m,) up to 1.2 spacings apart in the reference, each pair once."""
+        """Particles (m,) and (m,) at most 1.2 spacings apart in the reference, each pair once."""
         particles = self.particles
         reach = _NEAREST * float(particles.spacings.max())
         pairs = cKDTree(particles.positions).query_pairs(reach, output_type="ndarray")
@@ -56,22 +58,13 @@ class Body:
 
     @property
     def masses(self) -> Array:
-        """(n,) [kg, per unit of the missing dimensions]; ghosts have none."""
+        """Mass of every particle, (n,) [kg, per unit of the missing dimensions]; 0 for ghosts."""
         return np.where(self.particles.ghosts, 0.0, self.material.density * self.particles.volumes)
 
 
 def part_of(body: Body, chosen: Indices) -> Body:
-    """The same body of these particles (k,) alone, numbered in their order, without faces or
-    tags."""
-    own = body.particles
-    particles = Particles(
-        positions=own.positions[chosen],
-        volumes=own.volumes[chosen],
-        spacings=own.spacings[chosen],
-        area_vectors=own.area_vectors[chosen],
-        ghosts=own.ghosts[chosen],
-        images=own.images[chosen],
-        cells=own.cells[chosen],
-    )
+    """The body of the chosen particles (k,) alone, renumbered in order, without faces and tags."""
+    names = ("positions", "volumes", "spacings", "area_vectors", "ghosts", "images", "cells")
+    particles = Particles(**{name: getattr(body.particles, name)[chosen] for name in names})
     hidden = None if body.hidden is None else body.hidden.part(chosen)
     return attrs.evolve(body, particles=particles, extent=slice(0, len(chosen)), hidden=hidden)

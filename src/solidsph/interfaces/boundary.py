@@ -1,4 +1,4 @@
-"""BoundaryHandler: what is imposed, and where."""
+"""BoundaryHandler: a boundary condition and where it holds."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from solidsph.interfaces.terms import Term
 
 
 class BoundaryHandler(Part):
-    """Parameters of what is imposed; `bind` makes it act on particles.
+    """Parameters of a boundary condition; `bind` applies it to particles.
 
-    An implementation is a frozen attrs class whose fields are the TOML keys of the handler. One
-    that loads a surface says so, and takes what `DiscreteModel.surface` finds at its `where`.
+    An implementation is a frozen attrs class whose fields are the TOML keys of the handler.
     """
 
     loads_surface: ClassVar[bool] = False
+    """True if it loads a surface: that which `DiscreteModel.surface` gives for its `where`."""
 
     @abstractmethod
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
-        """The conditions that impose it, reporting under `label`.
+        """Terms that impose the condition and report under `label`.
 
         Raises:
-            SceneError: it matches no particle, or cannot be imposed on those it matches.
+            SceneError: it matches no particle, or cannot be imposed on those that it matches.
         """

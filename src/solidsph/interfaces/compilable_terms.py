@@ -1,8 +1,8 @@
-"""Conditions that declare what they depend on, so that an engine can carry them out by itself.
+"""Terms described by arrays and pointwise formulas.
 
-A condition may be any code that the time loop calls. One of these kinds is described by arrays and
-a pointwise formula instead; from that description follow both what the interface asks of it, here,
-and what an engine compiles into its own loop.
+A term may be any code that the time loop calls. A term of one of these kinds is described by arrays
+and a pointwise formula instead; what the interface asks of it follows here, and an engine can
+compile it into its own loop.
 """
 
 from __future__ import annotations
@@ -14,42 +14,37 @@ from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_array, kron
 
 from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassProducts
-from solidsph.interfaces.plan import Operations, Way, array_bytes
+from solidsph.interfaces.pair_table import PairTable
+from solidsph.interfaces.plan import Operations, SumMethod
 from solidsph.interfaces.subset import Subset
-from solidsph.interfaces.terms import (
-    Constraint,
-    GhostConstraint,
-    Load,
-    Observation,
-    StressTerm,
-    Term,
-)
+from solidsph.interfaces.terms import Constraint, GhostConstraint, Load, StressTerm
 from solidsph.maths.arrays import Array, Indices, Mask, Scalar, Vector
 
 
 class ScheduledConstraint(Constraint):
-    """Determines motion as a function of time alone."""
+    """A motion that is a function of time alone."""
 
     @property
     @abstractmethod
     def shape(self) -> tuple[int, ...]:
-        """(n, d) of all particles."""
+        """(n, d) for all particles."""
 
     @property
     @abstractmethod
     def entries(self) -> tuple[Indices, Indices]:
-        """Particle (m,) and axis (m,) of every degree of freedom that it determines."""
+        """Particle (m,) and axis (m,) of every degree of freedom that it prescribes."""
 
     @abstractmethod
     def schedule(self, times: Array, derivative: int, step: float = 0.0) -> Array:
-        """Values of these entries at `times` (t,) [s], (t, m); (1, m) if they are always the same.
+        """Values of these entries at `times` (t,) [s], (t, m), or (1, m) if they are constant.
 
-        Displacements for derivative 0, velocities for 1, accelerations for 2, which may be
-        differences over the time `step` [s] of the run.
+        Args:
+            times: [s].
+            derivative: 0 for displacements, 1 for velocities, 2 for accelerations.
+            step: time step of the run, over which derivatives may be differences [s].
         """
 
     @property
@@ -65,39 +60,40 @@ class ScheduledConstraint(Constraint):
         particles, axes = self.entries
         kept = np.flatnonzero((subset.places[particles] >= 0) & ~held[particles])
         entries = subset.places[particles[kept]], axes[kept]
-        return _PartOfConstraint(self, kept, entries, (len(subset.particles), self.shape[1]))
+        shape = len(subset.particles), self.shape[1]
+        return _PartOfConstraint(self.label, self, kept, entries, shape)
 
 
 class LinearExtension(GhostConstraint, StressTerm):
-    """Ghosts whose values are linear combinations of others', each component by itself.
+    """Ghosts whose values are linear combinations of those of others, component by component.
 
-    u_i = s_i A u_i and T_ik = s_i s_k B T_ik, with signs s that turn components over.
+    u_i = s_i A u_i and T_ik = s_i s_k B T_ik, with signs s that mirror components.
     """
 
     @property
     @abstractmethod
     def shape(self) -> tuple[int, ...]:
-        """(n, d) of all particles."""
+        """(n, d) for all particles."""
 
     @property
     @abstractmethod
     def ghosts(self) -> Indices:
-        """Those that follow, (k,)."""
+        """Ghosts that follow, (k,)."""
 
     @property
     @abstractmethod
     def displacement(self) -> csr_array:
-        """A, (k, n)."""
+        """Weights A of displacements, (k, n)."""
 
     @property
     @abstractmethod
     def stress(self) -> csr_array:
-        """B, (k, n)."""
+        """Weights B of stresses, (k, n)."""
 
     @property
     @abstractmethod
     def signs(self) -> Array:
-        """s, (k, d)."""
+        """Signs s, (k, d)."""
 
     @property
     def held(self) -> Mask:
@@ -126,26 +122,25 @@ class ScheduledLoad(Load):
 
     @abstractmethod
     def schedule(self, times: Array) -> Array:
-        """Forces on its particles at `times` (t,) [s], (t, k, d) [N]; (1, k, d) if they are always
-        the same."""
+        """Forces on its particles at `times` (t,) [s], (t, k, d) [N], or (1, k, d) if constant."""
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         forces: Array = self.schedule(np.array([time]))[0]
         return forces
 
     def part(self, subset: Subset) -> Load:
-        return _PartOfScheduled(self, *subset.kept(self.particles))
+        return _PartOfScheduled(self.label, self, *subset.kept(self.particles))
 
 
 class PointwiseLoad(Load):
-    """The force on a particle by its own position and velocity."""
+    """Forces on particles as a formula of their own position and velocity."""
 
     is_counted: ClassVar[bool] = True
 
     @property
     @abstractmethod
     def values(self) -> Array:
-        """(k, m) m numbers for each of its particles, which the formula is handed."""
+        """Numbers of each of its particles that the formula uses, (k, m)."""
 
     @staticmethod
     @abstractmethod
@@ -154,53 +149,22 @@ class PointwiseLoad(Load):
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         x, v = positions[self.particles], velocities[self.particles]
-        found = self.force(x.T, v.T, self.values.T)
-        return np.column_stack([np.broadcast_to(one, len(x)) for one in found])
+        components = self.force(x.T, v.T, self.values.T)
+        return np.column_stack([np.broadcast_to(c, len(x)) for c in components])
+
+    @property
+    def arrays(self) -> Mapping[str, int]:
+        return {"chosen particles": self.particles.nbytes, "values": self.values.nbytes}
 
     def part(self, subset: Subset) -> Load:
-        kept, own = subset.kept(self.particles)
-        return _PartOfPointwise(self.label, own, self.values[kept], self.force)
-
-
-@attrs.frozen(eq=False)
-class PairTable:
-    """Pairs of particles, each both ways, and numbers that belong to them."""
-
-    starts: Indices  # (n + 1,) those of particle p stand at starts[p] : starts[p + 1]
-    columns: NDArray[np.int32]  # (m,) q
-    values: Array  # (m, k) the same for (p, q) and (q, p)
-
-    @property
-    def rows(self) -> Indices:
-        """(m,) p."""
-        return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
-
-    @property
-    def bytes(self) -> int:
-        """Memory of its arrays."""
-        return array_bytes([self.starts, self.columns, self.values])
-
-    def part(self, subset: Subset) -> PairTable:
-        """The pairs both ends of which are in a subset."""
-        sizes = np.diff(self.starts)[subset.particles]
-        ends = np.cumsum(sizes)
-        taken = np.repeat(self.starts[subset.particles] - (ends - sizes), sizes)
-        taken = taken + np.arange(sizes.sum())
-        columns = subset.places[self.columns[taken]]
-        inside = columns >= 0
-        rows = np.repeat(np.arange(len(subset.particles)), sizes)[inside]
-        counts = np.bincount(rows, minlength=len(subset.particles))
-        return PairTable(
-            starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.intp),
-            columns=columns[inside].astype(np.int32),
-            values=self.values[taken[inside]],
-        )
+        kept, particles = subset.kept(self.particles)
+        return _PartOfPointwise(self.label, particles, self.values[kept], self.force)
 
 
 class PairLoad(Load):
     """Forces along the line between two particles, opposite at its ends.
 
-    They keep momentum and angular momentum to rounding whatever the formula is.
+    They conserve momentum and angular momentum to rounding, whatever the formula.
     """
 
     is_counted: ClassVar[bool] = True
@@ -208,17 +172,17 @@ class PairLoad(Load):
     @property
     @abstractmethod
     def pairs(self) -> PairTable:
-        """Which pairs, of all n particles."""
+        """Interacting pairs, in rows of all n particles."""
 
     @staticmethod
     @abstractmethod
     def pull(offset: Vector, velocity: Vector, values: Vector) -> Scalar:
-        """Force on p over the offset x_q - x_p that it is along [N/m]; pointwise.
+        """Force on p divided by the offset x_q - x_p, along which it acts [N/m]; pointwise.
 
         Args:
             offset: x_q - x_p [m].
             velocity: v_q - v_p [m/s].
-            values: the pair's numbers.
+            values: numbers of the pair.
         """
 
     @property
@@ -230,8 +194,7 @@ class PairLoad(Load):
         offsets = positions[q] - positions[p]
         pulls = self.pull(offsets.T, (velocities[q] - velocities[p]).T, self.pairs.values.T)
         count = len(positions)
-        along = (np.bincount(p, pulls * one, count) for one in offsets.T)
-        return np.column_stack(list(along))
+        return np.column_stack([np.bincount(p, pulls * along, count) for along in offsets.T])
 
     @property
     def arrays(self) -> Mapping[str, int]:
@@ -242,9 +205,9 @@ class PairLoad(Load):
         return len(self.pairs.columns)
 
     def operations(self, dimension: int, *, compiled: bool) -> Sequence[Operations]:
-        way = Way.PAIR_LOOPS if compiled else Way.PAIR_ARRAYS
+        method = SumMethod.PAIR_LOOPS if compiled else SumMethod.PAIR_ARRAYS
         n, kept = len(self.pairs.starts) - 1, self.pairs.bytes
-        return (Operations(way, self.pair_count, n, kept + 3 * 8 * n * dimension, kept),)
+        return (Operations(method, self.pair_count, n, kept + 3 * 8 * n * dimension, kept),)
 
     def part(self, subset: Subset) -> Load:
         return _PartOfPairs(self.label, self.pairs.part(subset), self.pull)
@@ -254,17 +217,17 @@ class HourglassLoad(Load):
     """Forces of the hourglass energy (`interfaces.hourglass_energy`), body by body."""
 
     is_counted: ClassVar[bool] = True
-    supports: ClassVar[float] = 4.0  # the gradients of partners of neighbours
+    supports: ClassVar[float] = 4.0  # the gradients of the partners of neighbours
 
     @property
     @abstractmethod
     def reference(self) -> Array:
-        """X, (n, d) [m]."""
+        """Reference positions X, (n, d) [m]."""
 
     @property
     @abstractmethod
     def operators(self) -> Sequence[HourglassOperator]:
-        """One for every body."""
+        """One operator per body."""
 
     @property
     def particles(self) -> Indices:
@@ -280,52 +243,45 @@ class HourglassLoad(Load):
 
     @property
     def arrays(self) -> Mapping[str, int]:
-        return {f"penalty of {one.pairs.body.name}": one.bytes for one in self.operators}
+        return {f"penalty of {o.pairs.body.name}": o.bytes for o in self.operators}
 
     @property
     def stiffness_rate(self) -> float:
-        return max(one.highest_frequency for one in self.operators)
+        return max(operator.highest_frequency for operator in self.operators)
 
     @property
     def pair_count(self) -> int:
-        return sum(one.operations(compiled=False).pairs for one in self.operators)
+        return sum(o.operations(compiled=False).pairs for o in self.operators)
 
     def operations(self, dimension: int, *, compiled: bool) -> Sequence[Operations]:
-        return tuple(one.operations(compiled=compiled) for one in self.operators)
+        return tuple(o.operations(compiled=compiled) for o in self.operators)
 
     def part(self, subset: Subset) -> Load:
-        operators = [one.part(subset.particles) for one in self.operators]
+        operators = [operator.part(subset.particles) for operator in self.operators]
         return _PartOfHourglass(self.label, self.reference[subset.particles], operators)
 
     @cached_property
     def matrix(self) -> csr_array:
-        """K (n, n) [N/m]: the force is -K u in every component; large in 3D."""
-        blocks = [HourglassProducts.of(one.pairs).matrix() for one in self.operators]
+        """Stiffness K (n, n) [N/m]: the force is -K u in every component. Large in 3D."""
+        blocks = [HourglassProducts.of(operator.pairs).matrix() for operator in self.operators]
         return csr_array(block_diag(blocks, format="csr"))
 
     def stiffness(self, displacements: Array, time: float) -> csr_array:
-        """Minus the derivative of the force, (d n, d n), particle by particle."""
+        """Minus the derivative of the forces, (d n, d n) [N/m], ordered by particle."""
         return csr_array(kron(self.matrix, np.eye(displacements.shape[1]), format="csr"))
 
 
-class _Part(Term):
-    """Of a load or constraint, what acts on a subset of the particles; reports are of the whole."""
-
-    def report(self, observation: Observation) -> Mapping[str, float]:
-        return {}
+# What acts on a subset of the particles; the whole term reports for it.
 
 
 @final
 @attrs.frozen(eq=False)
-class _PartOfConstraint(_Part, ScheduledConstraint):
+class _PartOfConstraint(ScheduledConstraint):
+    label: str
     whole: ScheduledConstraint
     kept: Indices  # among its entries
     entries: tuple[Indices, Indices]
     shape: tuple[int, ...]
-
-    @property
-    def label(self) -> str:
-        return self.whole.label
 
     def schedule(self, times: Array, derivative: int, step: float = 0.0) -> Array:
         return self.whole.schedule(times, derivative, step)[:, self.kept]
@@ -333,14 +289,11 @@ class _PartOfConstraint(_Part, ScheduledConstraint):
 
 @final
 @attrs.frozen(eq=False)
-class _PartOfScheduled(_Part, ScheduledLoad):
+class _PartOfScheduled(ScheduledLoad):
+    label: str
     whole: ScheduledLoad
     kept: Indices  # among its particles
     particles: Indices
-
-    @property
-    def label(self) -> str:
-        return self.whole.label
 
     def schedule(self, times: Array) -> Array:
         return self.whole.schedule(times)[:, self.kept]
@@ -348,7 +301,7 @@ class _PartOfScheduled(_Part, ScheduledLoad):
 
 @final
 @attrs.frozen(eq=False)
-class _PartOfPointwise(_Part, PointwiseLoad):
+class _PartOfPointwise(PointwiseLoad):
     label: str
     particles: Indices
     values: Array
@@ -357,7 +310,7 @@ class _PartOfPointwise(_Part, PointwiseLoad):
 
 @final
 @attrs.frozen(eq=False)
-class _PartOfPairs(_Part, PairLoad):
+class _PartOfPairs(PairLoad):
     label: str
     pairs: PairTable
     pull: Callable[..., Any]
@@ -365,7 +318,7 @@ class _PartOfPairs(_Part, PairLoad):
 
 @final
 @attrs.frozen(eq=False)
-class _PartOfHourglass(_Part, HourglassLoad):
+class _PartOfHourglass(HourglassLoad):
     label: str
     reference: Array
     operators: Sequence[HourglassOperator]

@@ -1,4 +1,4 @@
-"""DiscreteModel: what a part sees of the discrete problem when it is bound to it."""
+"""DiscreteModel: the discretised problem that boundary handlers and effects are bound to."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from solidsph.model.surface import Conditions, Pieces
 
 @attrs.frozen(eq=False)
 class DiscreteModel:
-    """The particles of all bodies, their masses, and the bodies themselves."""
+    """Bodies, the particles of all of them, and their masses."""
 
     particles: Particles
     masses: Array  # (n,) [kg], 0 for ghosts
     bodies: Sequence[Body]
-    end: float = inf  # of the scene's duration [s]; a formula of t may have no value beyond it
-    conditions: Conditions = attrs.field(factory=dict)  # of the tags that the scene adds
+    end: float = inf  # end of the duration [s]; formulas in t may have no value beyond it
+    conditions: Conditions = attrs.field(factory=dict)  # that define the scene's own tags
 
     def select(self, where: Where) -> Indices:
-        """Indices of the particles at `where`.
+        """Indices of the particles at `where`, (k,).
 
         Raises:
             SceneError: no particle is there, or `where` cannot be understood.
@@ -35,7 +35,7 @@ class DiscreteModel:
         return select(self.particles, where)
 
     def surface(self, where: Where) -> Face:
-        """The surface at `where`: of the faces that it names, or all that its particles own.
+        """The surface at `where`: the faces that it names, or all surface of its particles.
 
         Raises:
             SceneError: no surface is there, or `where` cannot be understood.
@@ -43,7 +43,7 @@ class DiscreteModel:
         pieces = self.pieces()
         chosen = pieces.at(where) & (pieces.areas > 0.0)
         if not chosen.any():
-            self.select(where)  # which says so where there is no particle either
+            self.select(where)  # raises if there is no particle either
             raise SceneError(
                 f"no particle at {described(where)} lies on the surface; name a face: "
                 f"{', '.join(pieces.names) or 'there is none'} ('or' joins two of them; no surface "
@@ -56,7 +56,7 @@ class DiscreteModel:
         return Pieces.of(self.particles, self.conditions)
 
     def smoothing_matrix(self) -> csr_array:
-        """W of the paper's eq. 8, sparse: its product with values gives their approximation."""
+        """Sparse matrix W of the paper's eq. 8, (n, n): its product with values smooths them."""
         return csr_array(block_diag([_smoothing(body) for body in self.bodies], format="csr"))
 
 

@@ -1,4 +1,4 @@
-"""Discretisation: how a shape becomes particles."""
+"""Discretisation: how a shape is divided into particles."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from solidsph.model.particles import Particles
 
 
 class Discretisation(Part):
-    """A shape and a spacing -> Particles.
+    """A rule that turns a shape and a spacing into particles.
 
-    Promises, whatever the arrangement: volumes add up to the shape's, area vectors of a closed
-    surface add up to zero, every named face of the shape becomes a tag, the same input gives the
-    same bits.
+    For every arrangement the volumes add up to that of the shape, the area vectors of a closed
+    surface add up to zero, every named face of the shape becomes a tag, and the same input gives
+    the same bits.
     """
 
     @abstractmethod
     def particles(self, shape: Shape, spacing: float) -> Particles:
-        """Discretise `shape` with particles about `spacing` [m] apart.
+        """Discretise `shape` into particles about `spacing` [m] apart.
 
         Raises:
             SceneError: no particle fits, or the arrangement cannot represent the shape.

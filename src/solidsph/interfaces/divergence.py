@@ -16,44 +16,43 @@ class Divergence(Part):
     """Weights d_pq of the discrete force, f_p = sum over q of T_q d_pq."""
 
     conserves_momentum: ClassVar[bool]
-    """Whether the forces of a free body add up to zero whatever the stresses are, provided that
-    the gradient of a constant is zero."""
+    """True if the forces of a free body add up to zero for any stresses, provided that the
+    gradient of a constant is zero."""
 
     adjoint: ClassVar[bool]
-    """Whether the weights are -V_q g_qp: an engine may then scatter with the gradient's own
-    weights and store no others."""
+    """True if the weights are -V_q g_qp. An engine may then scatter with the weights of the
+    gradient and store no others."""
 
     uses_ghost_stress: ClassVar[bool]
-    """Whether ghosts carry a stress of their own into the sums. Where they do not, the forces on
-    ghosts go back to the particles that the ghosts follow."""
+    """True if ghosts carry a stress of their own into the sums. Otherwise the forces on ghosts
+    are returned to the particles that the ghosts follow."""
 
     @abstractmethod
     def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:
-        """Weight vector of every pair, (m, d) [m^(d-1)].
+        """Weight vector d_pq of every pair, (m, d) [m^(d-1)].
 
         Args:
-            pairs: neighbours, each particle among its own.
-            gradient_weights: (m, d), those of the formulation's gradient [1/m].
-            volumes: (n,) [m^d].
+            pairs: neighbour pairs, self pairs included.
+            gradient_weights: g_pq of the formulation's gradient, (m, d) [1/m].
+            volumes: particle volumes, (n,) [m^d].
         """
 
 
 class PointwiseDivergence(Divergence):
-    """A divergence whose weight at a pair depends on the gradient's weights of that pair only.
+    """A divergence whose weight at a pair depends on the gradient weights of that pair only.
 
-    As with a pointwise gradient, its author writes formulas of one component, and the core or an
-    engine forms the weights from them.
+    The author writes formulas for one component; the core or an engine forms the weights.
     """
 
     @staticmethod
     @abstractmethod
     def pair_weight(there: Scalar, back: Scalar, volume: Scalar, other: Scalar) -> Scalar:
-        """A component of d_pq, p not q, from those of g_pq and g_qp and from V_p and V_q."""
+        """A component of d_pq for p not q, from those of g_pq and g_qp and from V_p and V_q."""
 
     @staticmethod
     @abstractmethod
     def own_weight(own: Scalar, volume: Scalar) -> Scalar:
-        """A component of d_pp from that of g_pp and from V_p."""
+        """A component of d_pp, from that of g_pp and from V_p."""
 
     @final
     def weights(self, pairs: Pairs, gradient_weights: Array, volumes: Array) -> Array:

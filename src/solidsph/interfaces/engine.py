@@ -1,21 +1,28 @@
-"""Engine: how the sums over neighbours are carried out. Nothing else loops over pairs."""
+"""Engine: evaluates the sums over neighbours. Nothing else loops over pairs."""
 
 from __future__ import annotations
 
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import ClassVar
 
 import attrs
 
-from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.law import Law
+from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.part import Part
-from solidsph.interfaces.plan import BodySize, Compilation, Operations, Piece, Plan, Way
+from solidsph.interfaces.plan import (
+    BodySize,
+    Compilation,
+    CompilationUnit,
+    Operations,
+    Plan,
+    SumMethod,
+)
 from solidsph.interfaces.terms import StressTerm
 from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.maths.arrays import Array, Indices
@@ -23,7 +30,7 @@ from solidsph.maths.arrays import Array, Indices
 
 @attrs.frozen(eq=False)
 class StressFields:
-    """What the material says at every particle; ghosts show F = I and no stress of their own."""
+    """Deformation, stress and energy of every particle; ghosts have F = I and no stress."""
 
     deformation_gradients: Array  # (n, d, d) F [-]
     stresses: Array  # (n, d, d) first Piola-Kirchhoff stress P [Pa]
@@ -32,15 +39,15 @@ class StressFields:
 
 
 class InternalForces(ABC):
-    """The forces that bodies exert on themselves, as a function of where their particles are."""
+    """Forces inside the bodies as a function of the displacements of their particles."""
 
     advances_histories: ClassVar[bool] = False
-    """Whether it asks materials that remember itself."""
+    """True if it advances the internal variables of materials itself."""
 
     @property
     @abstractmethod
     def pair_count(self) -> int:
-        """Ordered pairs of neighbours that one evaluation sums over, self pairs included."""
+        """Ordered pairs that one evaluation sums over, self pairs included."""
 
     @abstractmethod
     def forces(self, time: float, displacements: Array) -> Array:
@@ -48,11 +55,11 @@ class InternalForces(ABC):
 
     @abstractmethod
     def fields(self, displacements: Array) -> StressFields:
-        """Deformation, stress and energy at the same displacements, for reports and records."""
+        """Deformation, stress and energy at displacements (n, d) [m], for reports and records."""
 
     @abstractmethod
     def gradients(self, displacements: Array) -> Array:
-        """H = Grad u of displacements, or of any vector field (n, d), (n, d, d).
+        """Displacement gradients H = Grad u, (n, d, d), of displacements (n, d) [m].
 
         This and `spread` are the two passes of `forces`, for a law that comes between them.
         """
@@ -61,120 +68,109 @@ class InternalForces(ABC):
     def spread(self, displacements: Array, stress: Array) -> Array:
         """Forces (n, d) [N] of a stress (d, d, n) [Pa] at these displacements.
 
-        `stress` is the formulation's flux; it may be written on.
+        `stress` is the formulation's flux; it may be overwritten.
         """
 
     def law(self, body: Body) -> Law | None:
-        """How the material of a body is asked for its stress between the two passes; None: by
-        arrays."""
+        """The engine's own form of a body's law, to be used between the two passes.
+
+        None, the default, to evaluate the law by arrays.
+        """
         return None
 
-    def check_parts(self) -> None:
-        """Raise SceneError unless the forces of some particles can be formed alone, by `part`."""
-        raise SceneError(
-            f"sleep: {type(self).__name__} cannot form the forces of some particles alone; use one "
-            "body of the total Lagrangian form whose material remembers nothing, without ghosts, "
-            "or leave [sleep] out"
-        )
+    def part(self, chosen: Indices) -> InternalForces | None:
+        """Forces on a subset of the particles, renumbered in order.
 
-    def part(self, chosen: Indices) -> InternalForces:
-        """The same forces of the chosen particles alone, which are numbered in their order.
-
-        Right for those of them whose neighbours, and the neighbours of those, are all chosen.
+        Exact where all neighbours and their neighbours are in the subset. None, the default, if
+        the forces cannot be formed on a subset.
 
         Args:
-            chosen: particles in rising order, (k,).
+            chosen: particles in ascending order, (k,).
         """
-        raise AssertionError("`check_parts` has refused it")
+        return None
 
     def advance(
-        self, time: float, step: float, displacements: Array, memory: Mapping[str, Array]
-    ) -> tuple[Array, Mapping[str, Array]]:
-        """The forces at the end of a step, and what the bodies remember of it.
+        self, time: float, step: float, displacements: Array, memory: Memory
+    ) -> tuple[Array, Memory]:
+        """Forces (n, d) [N] at the end of a step, and what the bodies remember of it.
 
         Args:
-            time: at its end [s].
-            step: its length [s]; 0 if none is made.
+            time: end of the step [s].
+            step: length of the step [s]; 0 if no step is made.
             displacements: at its end, (n, d) [m].
             memory: `State.memory` at its beginning.
         """
         return self.forces(time, displacements), {}
 
-    def observed(self, displacements: Array, memory: Mapping[str, Array]) -> StressFields:
-        """The fields of a state that has this memory."""
+    def observed(self, displacements: Array, memory: Memory) -> StressFields:
+        """The fields of a state with this memory."""
         return self.fields(displacements)
 
     @property
     def operations(self) -> Sequence[Operations]:
-        """What one evaluation passes over.
-
-        An engine that does not say is taken for one that keeps nothing but its pairs' indices.
-        """
+        """Operations of one evaluation; by default those of an engine that stores pair indices."""
         own = 8 * self.pair_count
-        return (Operations(Way.UNKNOWN, self.pair_count, 0, own, own),)
+        return (Operations(SumMethod.UNKNOWN, self.pair_count, 0, own, own),)
 
     @property
     def compilations(self) -> frozenset[Compilation]:
-        """What has to be compiled for one evaluation."""
+        """What must be compiled for one evaluation."""
         return frozenset()
 
     @property
     def precision(self) -> float:
-        """Of the numbers that forces are sums of: the least that makes a difference beside 1."""
+        """Machine epsilon of the numbers that are summed."""
         return sys.float_info.epsilon
 
     @property
     def bytes(self) -> int:
-        """Memory of the arrays kept between evaluations."""
+        """Memory of the arrays kept between evaluations [bytes]."""
         return sum(part.held for part in self.operations)
 
     def plan(self, equation: EquationOfMotion, integrator: Integrator) -> Plan:
-        """How a run would be carried out, as far as the kinds of the parts tell.
+        """How a run would be carried out, as far as the types of the parts determine it.
 
-        Nothing is compiled to say so; costs, `explain` and the time loop all ask here.
+        Nothing is compiled to answer. Costs, `explain` and the time loop all ask here.
         """
         d = equation.particles.dimension
         operations = [o for load in equation.loads for o in load.operations(d, compiled=False)]
+        threaded = any(o.threaded for o in (*self.operations, *operations))
         sweeps = {
-            Compilation(Piece.SWEEPS, d, any(o.threaded for o in (*self.operations, *operations)))
+            Compilation(CompilationUnit.SWEEPS, d, threaded)
             for o in operations
-            if o.way is Way.HOURGLASS_SWEEPS
+            if o.method is SumMethod.HOURGLASS_SWEEPS
         }
         return Plan(False, self.operations, operations, self.compilations | sweeps)
 
     def time_loop(self, equation: EquationOfMotion, integrator: Integrator) -> TimeLoop | None:
-        """The engine's own loop over steps under these forces, or None."""
+        """The engine's own time loop under these forces; None, the default, to step by step."""
         return None
 
 
 class Engine(Part):
-    """Prepares bodies for fast evaluation; owns whatever arrays that takes."""
+    """Prepares bodies for fast evaluation of their internal forces."""
 
     @abstractmethod
     def prepare(
-        self,
-        bodies: Sequence[Body],
-        conditions: Sequence[StressTerm],
-        evaluations: int = 1,
+        self, bodies: Sequence[Body], conditions: Sequence[StressTerm], evaluations: int = 1
     ) -> InternalForces:
         """The internal forces of `bodies`, which together hold all particles, in order.
 
         Args:
-            bodies: what exerts the forces.
-            conditions: what changes the stress before they are formed.
-            evaluations: about how often the forces will be asked for, which preparation should
-                be in proportion to.
+            bodies: the bodies.
+            conditions: terms that change the stress before forces are formed.
+            evaluations: expected number of evaluations, which preparation should pay off within.
 
         Raises:
             BuildError: a formulation's operators cannot be formed on these particles.
         """
 
     def expected(self, sizes: Sequence[BodySize], evaluations: int) -> Plan:
-        """The plan for bodies that are not built, from their sizes; loads are left out.
+        """The plan for bodies that are not built yet, without loads.
 
         Args:
-            sizes: of every body.
-            evaluations: about how often the forces will be asked for.
+            sizes: size of every body.
+            evaluations: expected number of evaluations.
         """
         pairs = round(sum(size.pairs for size in sizes))
-        return Plan(False, (Operations(Way.UNKNOWN, pairs, 0, 8 * pairs, 8 * pairs),))
+        return Plan(False, (Operations(SumMethod.UNKNOWN, pairs, 0, 8 * pairs, 8 * pairs),))

@@ -1,32 +1,30 @@
-"""Equation of motion: what an integrator asks of a scene, m a = f(t, x, v)."""
+"""EquationOfMotion: m a = f(t, x, v), as an integrator sees a scene."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 
 import attrs
 
+from solidsph.interfaces.memory import NOTHING, Memory
 from solidsph.interfaces.terms import Constraint, Load
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import Particles
 
-NOTHING: Mapping[str, Array] = MappingProxyType({})
-
 
 @attrs.frozen(eq=False)
 class Response:
-    """What the scene answers to positions and velocities."""
+    """Accelerations and forces at given positions and velocities."""
 
     accelerations: Array  # (n, d) [m/s^2]
     applied: Mapping[str, Array]  # by account: force that it exerts on every particle, (n, d) [N]
-    memory: Mapping[str, Array]  # what parts remember of the step, by names of theirs
+    memory: Memory  # what parts remember of the step
 
 
 @attrs.frozen(eq=False)
 class EquationOfMotion(ABC):
-    """The masses of a scene and what acts on them, besides the forces inside the bodies."""
+    """Masses, constraints and loads of a scene; the internal forces of its bodies come on top."""
 
     particles: Particles
     masses: Array  # (n,) [kg]
@@ -36,11 +34,11 @@ class EquationOfMotion(ABC):
 
     @abstractmethod
     def place(self, time: float, positions: Array) -> Array:
-        """Positions (n, d) with every imposed motion applied at `time` [s]."""
+        """Positions (n, d) [m] with every imposed motion applied at `time` [s]."""
 
     @abstractmethod
     def carry(self, time: float, velocities: Array) -> Array:
-        """Velocities (n, d) with every imposed motion applied at `time` [s]."""
+        """Velocities (n, d) [m/s] with every imposed motion applied at `time` [s]."""
 
     @abstractmethod
     def respond(
@@ -49,16 +47,16 @@ class EquationOfMotion(ABC):
         positions: Array,
         velocities: Array,
         step: float = 0.0,
-        memory: Mapping[str, Array] = NOTHING,
+        memory: Memory = NOTHING,
     ) -> Response:
-        """Accelerations, and the force that each imposed part exerts on every particle.
+        """Accelerations, and the force that each account exerts on every particle.
 
-        Call it once a step, at its end. Store `response.memory` in the state after the step.
+        Call it once per step, at its end. Store `response.memory` in the state after the step.
 
         Args:
-            time: at the end of the step [s].
-            positions: there, (n, d) [m].
-            velocities: there, (n, d) [m/s].
-            step: its length [s].
+            time: end of the step [s].
+            positions: at that time, (n, d) [m].
+            velocities: at that time, (n, d) [m/s].
+            step: length of the step [s]; 0 if no step is made.
             memory: `State.memory` before the step.
         """

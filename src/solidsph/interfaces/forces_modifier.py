@@ -1,4 +1,4 @@
-"""ForcesModifier: a term that changes how bodies act on themselves."""
+"""ForcesModifier: a term that changes the internal forces of bodies."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from solidsph.interfaces.terms import StressTerm, Term
 
 
 class ForcesModifier(Term):
-    """Replaces the internal forces, as fracture does."""
+    """A term that replaces the internal forces, as fracture does."""
 
     @abstractmethod
     def modified(
@@ -19,9 +19,9 @@ class ForcesModifier(Term):
         """The internal forces with this term.
 
         Args:
-            internal: by the scene's engine, or by a modifier before this one.
-            stress_terms: what changes the stress before forces are formed.
+            internal: forces by the scene's engine, or by the modifier before this one.
+            stress_terms: terms that change the stress before forces are formed.
 
         Raises:
-            SceneError: it does not go with the modifier before it.
+            SceneError: it cannot be combined with the modifier before it.
         """

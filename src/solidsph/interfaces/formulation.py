@@ -1,4 +1,4 @@
-"""Formulation: in which configuration the sums over neighbours are taken, and of what."""
+"""Formulation: the configuration in which the sums over neighbours are taken, and their fluxes."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ from solidsph.maths.arrays import Tensor
 
 
 class Configuration(Enum):
-    """Where the neighbours are looked for and the kernel is evaluated."""
+    """Configuration in which neighbours are searched and the kernel is evaluated."""
 
     REFERENCE = "reference"  # once, at X: the weights are constant
     CURRENT = "current"  # at every step, at x
 
 
 class Formulation(Part):
-    """From displacement to force in four lines, the same for every formulation:
+    """The steps from displacement to force.
 
-    the gradient H of the displacement in the formulation's own configuration, the deformation
-    gradient F(H), the material's stress P(F), the divergence of flux(F, P).
+    They are the same in every formulation: the gradient H of the displacement in its
+    `configuration`, the deformation gradient F(H), the material's stress P(F), and the divergence
+    of flux(F, P).
     """
 
     configuration: ClassVar[Configuration]
@@ -31,12 +32,12 @@ class Formulation(Part):
     @property
     @abstractmethod
     def gradient(self) -> Gradient:
-        """How H is formed."""
+        """Gradient operator that gives H."""
 
     @property
     @abstractmethod
     def divergence(self) -> Divergence:
-        """How the force is formed."""
+        """Divergence operator that gives the force."""
 
     @staticmethod
     @abstractmethod

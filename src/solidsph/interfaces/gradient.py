@@ -1,4 +1,4 @@
-"""Gradient: how the derivative of a field is formed from its values at the neighbours."""
+"""Gradient: how the gradient of a field is formed from its values at the neighbours."""
 
 from __future__ import annotations
 
@@ -23,17 +23,19 @@ class Gradient(Part):
     @property
     @abstractmethod
     def exact_degree(self) -> int:
-        """Highest degree of a polynomial whose gradient is exact at every particle, on any
-        arrangement and at free surfaces; -1 if not even a constant has gradient zero."""
+        """Highest degree of polynomials whose gradient is exact at every particle.
+
+        For any arrangement and at free surfaces; -1 if not even a constant has gradient zero.
+        """
 
     @abstractmethod
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
-        """Weight vector of every pair, (m, d) [1/m].
+        """Weight vector g_pq of every pair, (m, d) [1/m].
 
         Args:
-            pairs: neighbours, each particle among its own.
-            kernel_gradients: (m, d), derivative of W(x_p - x_q) by x_p [m^-(d+1)].
-            volumes: (n,) [m^d].
+            pairs: neighbour pairs, self pairs included.
+            kernel_gradients: derivatives of W(x_p - x_q) by x_p, (m, d) [m^-(d+1)].
+            volumes: particle volumes, (n,) [m^d].
 
         Raises:
             BuildError: the neighbours of a particle do not determine a gradient.
@@ -48,42 +50,43 @@ class Gradient(Part):
         *,
         moving: bool,
     ) -> Gradient:
-        """Specialise to a body; returns self unless the weights depend on the body as a whole.
+        """Specialise to a body; return self, the default, unless the weights depend on all of it.
 
         Args:
-            body: its name.
-            particles: its own.
+            body: name of the body.
+            particles: its particles.
             smoothing: the kernel with the body's support radius.
-            pairs: finds its neighbours.
+            pairs: searches its neighbour pairs.
             moving: True if the sums are taken in the current configuration.
 
         Raises:
-            BuildError: it cannot be formed on this body.
+            BuildError: the gradient cannot be formed on this body.
         """
         return self
 
 
 class PointwiseGradient(Gradient):
-    """A gradient whose weights are K_p dW/dx_p V_q, with one matrix K_p for every particle.
+    """A gradient whose weights are K_p dW/dx_p V_q, with one matrix K_p per particle.
 
-    Its author writes K_p and nothing else. The core forms the weights, for arrays of pairs here,
-    and an engine in its own loops from the same formula.
+    The author writes K_p only. The core forms the weights for arrays of pairs, and an engine may
+    use the same formula in its own loops.
     """
 
     of_differences: ClassVar[bool]
-    """Whether it acts on f_q - f_p: the weight at q = p is then minus the sum of the others."""
+    """True if it acts on f_q - f_p: the weight at q = p is then minus the sum of the others."""
 
     @staticmethod
     def correction(moment: Tensor) -> Tensor | None:
         """K_p from the moment M_p = sum over q of (x_q - x_p) (x) dW/dx_p V_q [-]; pointwise.
 
-        Not finite where the neighbours do not determine a gradient. Without it K_p is I.
+        It must not be finite where the neighbours do not determine a gradient. None, the default,
+        for K_p = I.
         """
         return None
 
     @property
     def is_corrected(self) -> bool:
-        """Whether there is a K_p."""
+        """True if K_p is not the identity."""
         return self.correction(((1.0,),)) is not None
 
     @final
@@ -95,7 +98,7 @@ class PointwiseGradient(Gradient):
         return pairs.of_differences(weights) if self.of_differences else weights
 
     def _corrections(self, pairs: Pairs, plain: Array) -> Array:
-        """K_p of every particle, (n, d, d)."""
+        """K_p of every particle, (n, d, d); `plain` are the weights without it, (m, d)."""
         moments = pairs.row_sums(pairs.offsets[:, :, None] * plain[:, None, :])
         with np.errstate(all="ignore"):  # a moment without an inverse is reported below
             K = particles_first(self.correction(components_first(moments)), pairs.row_count)

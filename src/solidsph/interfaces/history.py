@@ -1,4 +1,4 @@
-"""Materials that remember: the stress depends on what has been, not on F alone."""
+"""HistoryMaterial: a material with internal variables."""
 
 from __future__ import annotations
 
@@ -14,44 +14,46 @@ History = tuple[Scalar, ...]
 
 
 class HistoryMaterial(Material):
-    """A law with internal variables h, which advance once a step and live in `State.memory`.
+    """A law with internal variables h, which advance once per step and live in `State.memory`.
 
-    The stored energy psi(F, h) gives the stress P = dpsi/dF at fixed h, and `advance` carries h
-    over a step to the F at its end: an implicit update of plastic flow, the exact decay of a
-    viscous strain. What that dissipates is one of the variables, so that the ledger closes.
+    The stored energy psi(F, h) gives the stress P = dpsi/dF at fixed h. `advance` integrates h over
+    a step, given F at its end: an implicit update of plastic flow, the exact decay of a viscous
+    strain. The energy dissipated so far is one of the variables, so that the energy balance closes.
 
-    All are pure pointwise functions in the words of `solidsph.maths.tensors`; h is a tuple of
-    scalars. What `Material` asks for is the law of the virgin state: `energy`, `first_piola` and
-    `tangent` are those at the h of `initial_history`, and `lame_parameters` those of a sudden small
-    strain.
+    All functions are pure and pointwise, in terms of `solidsph.maths.tensors`; h is a tuple of
+    scalars. `energy`, `first_piola` and `tangent` are those of the virgin state, at the h of
+    `initial_history`; `lame_parameters` are those of a sudden small strain.
     """
 
     shown: ClassVar[Sequence[str]] = ()
-    """Names among the internal variables that records keep as fields."""
+    """Names of the internal variables that are recorded as fields."""
 
     rate_dependent: ClassVar[bool] = False
-    """Whether the length of a step matters, not only where it leads."""
+    """True if the result of a step depends on its length, not on the strain alone."""
 
     @abstractmethod
     def initial_history(self, dimension: int) -> Mapping[str, float]:
-        """Internal variables "quantity [unit]" in the virgin state, in the order of h."""
+        """Internal variables "quantity [unit]" of the virgin state, in the order of h."""
 
     @staticmethod
     @abstractmethod
     def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
-        """h at the end of a step of `step` [s] that ends at F; at least as much is dissipated."""
+        """h at the end of a step of length `step` [s] that ends at F.
+
+        The dissipated energy must not decrease.
+        """
 
     @staticmethod
     @abstractmethod
     def stored(F: Tensor, history: History, params: tuple[float, ...]) -> Scalar:
-        """psi(F, h) per reference volume [J/m^3]; `energy` is that of the virgin state."""
+        """Stored energy psi(F, h) per reference volume [J/m^3]."""
 
     @staticmethod
     @abstractmethod
     def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:
-        """P = dpsi/dF at fixed h [Pa]."""
+        """First Piola-Kirchhoff stress P = dpsi/dF at fixed h [Pa]."""
 
     @staticmethod
     @abstractmethod
     def dissipated(history: History) -> Scalar:
-        """What has been dissipated since the virgin state, per reference volume [J/m^3]."""
+        """Energy dissipated since the virgin state, per reference volume [J/m^3]."""

@@ -1,4 +1,4 @@
-"""Hourglass energy: of what the deformation gradients at both ends of a pair do not explain.
+"""Hourglass energy: the energy of motions that the deformation gradients of a pair do not explain.
 
 With H the gradient of the displacement u, X_ab = X_b - X_a and symmetric weights c_ab,
 
@@ -6,6 +6,7 @@ With H the gradient of the displacement u, X_ab = X_b - X_a and symmetric weight
 
 Its exact derivative needs no neighbours of neighbours: a pair force -c_ab e_ab, opposite at b, and
 a stress S_a = 1/2 sum over b of c_ab e_ab (x) X_ab that acts through the transpose of the gradient.
+The error vector e_ab is that of Ganzenmueller (2015).
 """
 
 from __future__ import annotations
@@ -17,61 +18,53 @@ from typing import final
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, eye_array, hstack, vstack
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from solidsph.interfaces.body import Body, part_of
-from solidsph.interfaces.plan import Operations, Way, vectors
+from solidsph.interfaces.pair_table import PairTable
+from solidsph.interfaces.plan import Operations, SumMethod, array_bytes, vectors
+from solidsph.interfaces.subset import Subset
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.neighbours import Pairs
 
-# Of the largest eigenvalue of K over the masses, the square of a frequency.
+# Relative tolerance of the largest eigenvalue of K over the masses, the square of a frequency.
 _TOLERANCE = 0.02
 
-# Up to this size a dense matrix is as cheap.
+# Largest number of unknowns for which a dense matrix is as cheap.
 _SMALL = 40
 
 
 @attrs.frozen(eq=False)
 class HourglassPairs:
-    """The pairs of one body whose error vector costs energy, each both ways."""
+    """Pairs of one body whose error vector costs energy."""
 
     body: Body
-    starts: Indices  # (n + 1,) those of particle a stand at starts[a] : starts[a + 1]
-    columns: NDArray[np.int32]  # (k,) b
-    weights: Array  # (k,) c_ab > 0 [N/m]
+    table: PairTable  # with c_ab > 0 [N/m], (k, 1)
 
     @classmethod
     def of(cls, body: Body, pairs: Pairs, weights: Array) -> HourglassPairs:
-        """Of all `pairs` of a body, those with weights (m,) that are not zero."""
+        """The `pairs` of a body whose weights (m,) are not zero."""
         kept = weights > 0.0
-        counts = np.bincount(pairs.rows[kept], minlength=pairs.row_count)
-        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
-        return cls(body, starts, pairs.columns[kept].astype(np.int32), weights[kept])
+        rows, columns, values = pairs.rows[kept], pairs.columns[kept], weights[kept, None]
+        return cls(body, PairTable.of(rows, columns, values, pairs.row_count))
 
     def part(self, chosen: Indices) -> HourglassPairs:
-        """That of the chosen particles (m,) alone, by the pairs both ends of which are chosen."""
-        n = self.body.particles.count
-        places = np.full(n, -1, dtype=np.intp)
-        places[chosen] = np.arange(len(chosen))
-        rows, columns = places[self.rows], places[self.columns]
-        kept = (rows >= 0) & (columns >= 0)
-        counts = np.bincount(rows[kept], minlength=len(chosen))
-        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
-        body = part_of(self.body, chosen)
-        return HourglassPairs(body, starts, columns[kept].astype(np.int32), self.weights[kept])
+        """The pairs with both ends among the chosen particles (m,), renumbered in order."""
+        subset = Subset.of(chosen, self.body.particles.count)
+        return HourglassPairs(part_of(self.body, chosen), self.table.part(subset))
 
     @property
-    def rows(self) -> Indices:
-        """(k,) a."""
-        return np.repeat(np.arange(self.body.particles.count), np.diff(self.starts))
+    def weights(self) -> Array:
+        """c_ab, (k,) [N/m]."""
+        weights: Array = self.table.values[:, 0]
+        return weights
 
     @property
     def offsets(self) -> Array:
-        """(k, d) X_ab [m]."""
+        """X_ab, (k, d) [m]."""
         X = self.body.particles.positions
-        offsets: Array = X[self.columns] - X[self.rows]
+        offsets: Array = X[self.table.columns] - X[self.table.rows]
         return offsets
 
     @cached_property
@@ -80,38 +73,33 @@ class HourglassPairs:
         return self._row_sums(self.weights * np.sum(self.offsets**2, axis=1))
 
     def squares(self, displacements: Array, gradients: Array) -> Array:
-        """Sum over b of c_ab |e_ab|^2, (n,) [J], of displacements (n, d) with H (n, d, d)."""
-        a, b = self.rows, self.columns
+        """Sum over b of c_ab |e_ab|^2, (n,) [J], for displacements (n, d) with H (n, d, d)."""
+        a, b = self.table.rows, self.table.columns
         mean = 0.5 * (gradients[a] + gradients[b])
         errors = np.einsum("mij,mj->mi", mean, self.offsets) - (displacements[b] - displacements[a])
         return self._row_sums(self.weights * np.sum(errors**2, axis=1))
 
     def _row_sums(self, values: Array) -> Array:
         count = self.body.particles.count
-        return np.bincount(self.rows, weights=values, minlength=count).astype(np.float64)
-
-    @property
-    def bytes(self) -> int:
-        """Memory of its arrays."""
-        return self.starts.nbytes + self.columns.nbytes + self.weights.nbytes
+        return np.bincount(self.table.rows, weights=values, minlength=count).astype(np.float64)
 
 
 class HourglassOperator(ABC):
-    """The hourglass forces of one body, linear in its displacements: -K u, by components."""
+    """Hourglass forces of one body, linear in its displacements: -K u in every component."""
 
     @property
     @abstractmethod
     def pairs(self) -> HourglassPairs:
-        """What exerts them."""
+        """Pairs that exert the forces."""
 
     @property
     @abstractmethod
     def bytes(self) -> int:
-        """Memory of the arrays kept."""
+        """Memory of the arrays kept [bytes]."""
 
     @abstractmethod
     def operations(self, *, compiled: bool) -> Operations:
-        """What an evaluation passes over, where whole steps are compiled or not."""
+        """Operations of one evaluation, if whole steps are `compiled` or not."""
 
     @abstractmethod
     def forces(self, displacements: Array) -> Array:
@@ -119,18 +107,18 @@ class HourglassOperator(ABC):
 
     @abstractmethod
     def part(self, chosen: Indices) -> HourglassOperator:
-        """Those of the chosen particles (m,) alone, numbered in their order.
+        """The operator of the chosen particles (m,) alone, renumbered in order.
 
-        Right for those that stand deep enough among the chosen: the gradients of a particle's
-        partners, and of the partners of its neighbours, need all of their own neighbours.
+        Exact for a particle if the partners of its neighbours, and its own partners, have all their
+        neighbours among the chosen.
         """
 
     @cached_property
     def highest_frequency(self) -> float:
-        """At most by 1 % above the largest angular frequency of these forces alone [rad/s].
+        """Largest angular frequency of these forces alone, at most 1 % too high [rad/s].
 
-        By Lanczos' iteration. A bound from sums of weights alone would be up to three times the
-        frequency, since gradients lean on small differences of large weights.
+        By Lanczos iteration. A bound from sums of weights would be up to three times the frequency,
+        since gradients rely on small differences of large weights.
         """
         masses, d = self.pairs.body.masses, self.pairs.body.particles.dimension
         moving = np.flatnonzero(masses > 0.0)
@@ -154,14 +142,14 @@ class HourglassOperator(ABC):
                 v0=np.random.default_rng(0).standard_normal(size),
                 return_eigenvectors=False,
             )
-        # The residual of the vector found bounds the error of its value by the tolerance.
+        # The residual of the eigenvector bounds the error of the eigenvalue by the tolerance.
         return sqrt(max(0.0, float(squares.max())) * (1.0 + _TOLERANCE))
 
 
 @final
 @attrs.frozen(eq=False)
 class HourglassProducts(HourglassOperator):
-    """As products of sparse matrices, K = J^T Z J: for bodies of few particles."""
+    """Hourglass forces as products of sparse matrices, K = J^T Z J, for bodies of few particles."""
 
     pairs: HourglassPairs
     jet: csr_array  # J, ((1 + d) n, n): u, then its derivative along each axis
@@ -174,17 +162,17 @@ class HourglassProducts(HourglassOperator):
 
     @property
     def bytes(self) -> int:
-        own = [m.data.nbytes + m.indices.nbytes + m.indptr.nbytes for m in (self.jet, self.pull)]
-        return sum(own) + self.pairs.bytes
+        matrices = (a for m in (self.jet, self.pull) for a in (m.data, m.indices, m.indptr))
+        return array_bytes(matrices) + self.pairs.table.bytes
 
     def operations(self, *, compiled: bool) -> Operations:
         n, d = self.pairs.body.particles.positions.shape
-        # J stands twice, d times with the gradient's pairs; Z is of jets. The compiled loop makes
-        # sweeps of it: H, near pairs, and the stress in return.
-        way = Way.HOURGLASS_SWEEPS if compiled else Way.HOURGLASS_PRODUCTS
-        near = len(self.pairs.columns) if compiled else self.pull.nnz // (1 + d)
+        # J occurs twice, with the gradient's pairs d times; Z acts on jets. The compiled loop uses
+        # sweeps instead: H, near pairs, and the stress in return.
+        method = SumMethod.HOURGLASS_SWEEPS if compiled else SumMethod.HOURGLASS_PRODUCTS
+        near = len(self.pairs.table.columns) if compiled else self.pull.nnz // (1 + d)
         pairs = 2 * ((self.jet.nnz - n) // d) + near
-        return Operations(way, pairs, n, self.bytes + vectors(n, d), self.bytes)
+        return Operations(method, pairs, n, self.bytes + vectors(n, d), self.bytes)
 
     def forces(self, displacements: Array) -> Array:
         forces: Array = -(self.jet.T @ (self.pull @ (self.jet @ displacements)))
@@ -198,12 +186,12 @@ class HourglassProducts(HourglassOperator):
         return HourglassProducts(pairs, jet, _pull(pairs))
 
     def matrix(self) -> csr_array:
-        """K (n, n) [N/m], with neighbours of neighbours of neighbours: in 3D, large."""
+        """K (n, n) [N/m], which couples third neighbours and is large in 3D."""
         return csr_array(self.jet.T @ (self.pull @ self.jet))
 
 
 def _jet(body: Body) -> csr_array:
-    """J, ((1 + d) n, n): from a field to itself and its derivatives along each axis."""
+    """J, ((1 + d) n, n): a field, then its derivative along each axis."""
     pairs, particles = body.pairs(), body.particles
     kernel_gradients = body.smoothing.gradient(pairs.offsets, pairs.distances)
     weights = body.formulation.gradient.weights(pairs, kernel_gradients, particles.cells)
@@ -213,8 +201,9 @@ def _jet(body: Body) -> csr_array:
 
 def _pull(pairs: HourglassPairs) -> csr_array:
     """Z, ((1 + d) n, (1 + d) n) [N/m, N, N m]: the energy of jets q is q Z q / 2."""
-    once = np.flatnonzero(pairs.rows < pairs.columns)  # e_ba = -e_ab
-    a, b, X = pairs.rows[once], pairs.columns[once], pairs.offsets[once]
+    rows, columns = pairs.table.rows, pairs.table.columns
+    once = np.flatnonzero(rows < columns)  # e_ba = -e_ab
+    a, b, X = rows[once], columns[once], pairs.offsets[once]
     count, n = len(once), pairs.body.particles.count
     take_a, take_b = (
         csr_array((np.ones(count), (np.arange(count), end)), shape=(count, n)) for end in (a, b)

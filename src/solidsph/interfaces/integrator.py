@@ -1,4 +1,4 @@
-"""Integrator: how State advances over one time step."""
+"""Integrator: how the state advances over one time step."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from solidsph.maths.arrays import Scalar
 from solidsph.model.particles import State
 
 MEAN_VELOCITY = "mean velocity of the step"
-"""What a pointwise integrator keeps in `memory`: (u_n - u_n-1) / dt of every particle [m/s]."""
+"""Name in `memory` of the velocities (u_n - u_n-1) / dt of a pointwise integrator, (n, d) [m/s]."""
 
 
 class Integrator(Part):
-    """An explicit scheme with one evaluation of the forces a step."""
+    """An explicit scheme with one evaluation of the forces per step."""
 
     order: ClassVar[int]
     """Order of accuracy in the time step: halving it divides the error by 2^order."""
@@ -25,7 +25,7 @@ class Integrator(Part):
 
     @abstractmethod
     def start(self, state: State, dynamics: EquationOfMotion, step_size: float) -> State:
-        """The first state, with accelerations and whatever the scheme keeps in `memory`."""
+        """The first state, with accelerations and what the scheme keeps in `memory`."""
 
     @abstractmethod
     def advance(self, state: State, dynamics: EquationOfMotion, step_size: float) -> State:
@@ -33,28 +33,37 @@ class Integrator(Part):
 
 
 class PointwiseIntegrator(Integrator):
-    """A scheme that is two formulas for each component of each particle's motion.
+    """A scheme given by two formulas for each component of the motion of a particle.
 
-    A step moves every particle by dt h with a mean velocity h, finds the accelerations where it
-    arrives, and from both the velocity there. The formulas are pure pointwise functions of numbers
-    or arrays, so an engine can carry out whole steps by itself.
+    A step moves every particle by dt h with a mean velocity h, evaluates the accelerations at the
+    new positions, and obtains the new velocity from both. The formulas are pure pointwise functions
+    of numbers or arrays, so that an engine can carry out whole steps by itself.
     """
 
     @staticmethod
     @abstractmethod
-    def leap(velocity: Scalar, acceleration: Scalar, last: Scalar, step_size: float) -> Scalar:
-        """h, from what holds before the step; `last` is the h of the step before [m/s]."""
+    def mean_velocity(
+        velocity: Scalar, acceleration: Scalar, last: Scalar, step_size: float
+    ) -> Scalar:
+        """Mean velocity h of a step [m/s], from the state at its beginning.
+
+        Args:
+            velocity: [m/s].
+            acceleration: [m/s^2].
+            last: mean velocity of the step before [m/s].
+            step_size: dt [s].
+        """
 
     @staticmethod
     @abstractmethod
-    def arrive(mean_velocity: Scalar, acceleration: Scalar, step_size: float) -> Scalar:
-        """Velocity at the end of the step [m/s], from h and the acceleration there.
+    def end_velocity(mean_velocity: Scalar, acceleration: Scalar, step_size: float) -> Scalar:
+        """Velocity at the end of a step [m/s], from h and the acceleration at its end.
 
-        With the acceleration before the step it is the velocity that forces see.
+        With the acceleration at its beginning it predicts the velocity that the forces depend on.
         """
 
     def start(self, state: State, dynamics: EquationOfMotion, step_size: float) -> State:
-        """The first state: the step before it is one that would have led to its velocity."""
+        """The first state; the mean velocity before it is the one that leads to its velocity."""
         response = dynamics.respond(state.time, state.positions, state.velocities)
         a = response.accelerations
         return state.begun(
@@ -67,17 +76,19 @@ class PointwiseIntegrator(Integrator):
         """The state one time step [s] later."""
         time = state.time + step_size
         a = state.accelerations
-        h = self.leap(state.velocities, a, state.memory[MEAN_VELOCITY], step_size)
+        h = self.mean_velocity(state.velocities, a, state.memory[MEAN_VELOCITY], step_size)
         free = state.positions + step_size * h
         positions = dynamics.place(time, free)
-        # Only what was imposed: the difference of positions would bring their rounding back.
+        # Only what was imposed: a difference of positions would carry their rounding.
         h = h + (positions - free) / step_size
-        predicted = dynamics.carry(time, self.arrive(h, a, step_size))
+        predicted = dynamics.carry(time, self.end_velocity(h, a, step_size))
         response = dynamics.respond(time, positions, predicted, step_size, state.memory)
         return state.advanced(
             time=time,
             positions=positions,
-            velocities=dynamics.carry(time, self.arrive(h, response.accelerations, step_size)),
+            velocities=dynamics.carry(
+                time, self.end_velocity(h, response.accelerations, step_size)
+            ),
             accelerations=response.accelerations,
             applied=response.applied,
             memory={**state.memory, **response.memory, MEAN_VELOCITY: h},

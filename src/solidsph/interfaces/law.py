@@ -1,34 +1,34 @@
-"""Law: how a body's material is asked for its stress, between the two passes over its pairs."""
+"""Law: the constitutive law of one body, evaluated between the two passes over its pairs."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 
 import numpy as np
 
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.history import HistoryMaterial
+from solidsph.interfaces.memory import Memory
 from solidsph.maths.arrays import Array
 
 
 class Law(ABC):
-    """What one body answers to the gradients of its displacements."""
+    """Stress and history of one body as functions of the displacement gradient."""
 
     body: Body
 
     @abstractmethod
     def flux(self, H: Array, history: Array, step: float) -> tuple[Array, Array]:
-        """What the divergence is taken of, (d, d, n) [Pa], and the history (n, k) after the step.
+        """The formulation's flux (d, d, n) [Pa], and the history (n, k) after the step.
 
         Args:
-            H: gradient of the displacements, (n, d, d).
-            history: internal variables at its beginning, (n, k); they are not written on.
-            step: its length [s]; 0 leaves the history as it is.
+            H: displacement gradients at the end of the step, (n, d, d).
+            history: internal variables at its beginning, (n, k); must not be changed.
+            step: length of the step [s]; 0 leaves the history as it is.
         """
 
-    def history_of(self, memory: Mapping[str, Array]) -> Array:
-        """The internal variables, (n, k): those remembered, or the virgin state's."""
+    def history_of(self, memory: Memory) -> Array:
+        """Internal variables (n, k) in `memory`, or those of the virgin state."""
         name = memory_name(self.body)
         if name in memory:
             return memory[name]
@@ -39,5 +39,5 @@ class Law(ABC):
 
 
 def memory_name(body: Body) -> str:
-    """Where the history of a body is in `State.memory`."""
+    """Name of the internal variables of a body in `State.memory`."""
     return f"history of {body.name}"

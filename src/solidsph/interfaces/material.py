@@ -13,20 +13,20 @@ from solidsph.maths.arrays import Scalar, Tensor
 class Material(Part):
     """A hyperelastic law.
 
-    `energy`, `first_piola` and `tangent` are pure pointwise functions written in the words of
-    `solidsph.maths.tensors`: F is d x d with components first, in 1D for uniaxial strain, in 2D for
-    plane strain. An implementation is a frozen attrs class with a `density` field.
+    `energy`, `first_piola` and `tangent` are pure pointwise functions written in terms of
+    `solidsph.maths.tensors`. F is d x d with components first: uniaxial strain in 1D, plane strain
+    in 2D. An implementation is a frozen attrs class with a `density` field.
     """
 
     objective: ClassVar[bool] = True
-    """Whether a rigid rotation leaves the energy alone. A law of small strains says False."""
+    """True if a rigid rotation leaves the energy unchanged. False for a small-strain law."""
 
     isotropic: ClassVar[bool] = True
-    """Whether all directions are alike at small strain. A law with fibres says False; its Lame
-    parameters are then those of an isotropic one that is nowhere less stiff."""
+    """True if all directions are alike at small strain. False for a law with fibres, whose Lame
+    parameters are then those of an isotropic law that is nowhere less stiff."""
 
     smooth: ClassVar[bool] = True
-    """Whether the tangent is continuous. A law of fibres that go slack says False."""
+    """True if the tangent is continuous. False for a law with fibres that go slack."""
 
     @property
     @abstractmethod
@@ -41,7 +41,7 @@ class Material(Part):
     @property
     @abstractmethod
     def lame_parameters(self) -> tuple[float, float]:
-        """Moduli (lambda, mu) of the linear law that holds at small strain [Pa], or bounds it."""
+        """Moduli (lambda, mu) of the linear law at small strain, or of one that bounds it [Pa]."""
 
     @staticmethod
     @abstractmethod
@@ -56,7 +56,7 @@ class Material(Part):
     @staticmethod
     @abstractmethod
     def tangent(F: Tensor, dF: Tensor, params: tuple[float, ...]) -> Tensor:
-        """Change of stress dP = (dP/dF) : dF along a change dF [Pa]."""
+        """Change of stress dP = (dP/dF) : dF for a change dF [Pa]."""
 
     @property
     def wave_speed(self) -> float:

@@ -1,6 +1,6 @@
-"""Plan: how an engine would carry out a run, for those who count and price it.
+"""Plan: how an engine would carry out a run, in counts from which its cost is predicted.
 
-Nothing in it depends on the speed of the machine.
+The counts do not depend on the speed of the machine.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Way(Enum):
-    """How sums over neighbours are carried out; what a pair costs depends on it."""
+class SumMethod(Enum):
+    """How sums over neighbours are evaluated, on which the cost of a pair depends."""
 
     PRODUCTS = "products of sparse matrices"
     PRODUCTS_ANEW = "products of sparse matrices, formed anew at every evaluation"
@@ -26,24 +26,24 @@ class Way(Enum):
     PAIR_LOOPS = "forces of pairs, compiled"
     HOURGLASS_PRODUCTS = "hourglass forces, as products of sparse matrices"
     HOURGLASS_SWEEPS = "hourglass forces, compiled"
-    UNKNOWN = "of a way that is not known here"
+    UNKNOWN = "by a method that is not known here"
 
 
 @attrs.frozen
 class Operations:
-    """One part of what an evaluation passes over. Nothing in it depends on the machine's speed."""
+    """One part of the work of an evaluation."""
 
-    way: Way
-    pairs: int  # ordered, that are visited
+    method: SumMethod
+    pairs: int  # ordered pairs visited
     particles: int
-    touched: int  # bytes that must be moved once at least
+    touched: int  # bytes moved at least once
     held: int  # bytes of the arrays kept between evaluations
-    precision: int = 8  # bytes of a number in the sums
-    threaded: bool = False  # whether threads share them
+    precision: int = 8  # bytes per number in the sums
+    threaded: bool = False  # True if several threads share the work
 
 
-class Piece(Enum):
-    """What may have to be compiled; each once a process and kind."""
+class CompilationUnit(Enum):
+    """Code that may have to be compiled, once per process and key."""
 
     ENGINE = "the engine, laws and the layout of rows"
     MOVING_ENGINE = "the engine, laws and the search for neighbours"
@@ -61,12 +61,12 @@ class Piece(Enum):
 
 @attrs.frozen
 class Compilation:
-    """Something to compile; two that are equal are compiled once."""
+    """One compilation; equal ones are compiled once."""
 
-    piece: Piece
+    unit: CompilationUnit
     dimension: int
     threaded: bool
-    key: object = None  # what tells those of one piece apart
+    key: object = None  # distinguishes variants of one unit
 
 
 @attrs.frozen
@@ -74,24 +74,24 @@ class Plan:
     """How a run is carried out."""
 
     compiles_steps: bool  # True if whole steps are one compiled function
-    engine: Sequence[Operations]  # of the internal forces, in an evaluation
-    loads: Sequence[Operations] = ()  # of all else
+    engine: Sequence[Operations]  # of the internal forces, per evaluation
+    loads: Sequence[Operations] = ()  # of everything else, per evaluation
     compilations: frozenset[Compilation] = frozenset()
 
 
 @attrs.frozen
 class BodySize:
-    """What an engine plans by before a body is built."""
+    """The size of a body that need not be built yet."""
 
     dimension: int
     particles: float
     pairs: float  # ordered pairs within the support, self pairs included
     moving: bool  # True if neighbours are those of the current configuration
-    lattice: bool = False  # True if it is on the default arrangement
+    lattice: bool = False  # True if its particles are on the default arrangement
 
 
 def array_bytes(arrays: Iterable[NDArray[np.generic]]) -> int:
-    """Memory of these arrays."""
+    """Memory of these arrays [bytes]."""
     return sum(array.nbytes for array in arrays)
 
 

@@ -12,18 +12,18 @@ from solidsph.maths.arrays import Array
 
 @attrs.frozen(eq=False)
 class Surface:
-    """Samples of a boundary: together their area vectors integrate over it."""
+    """Samples of a boundary whose area vectors add up to its integral."""
 
     points: Array  # (m, d) [m]
     area_vectors: Array  # (m, d) outward normal times the area of the sample [m^(d-1)]
-    faces: tuple[str, ...]  # (m,) the named face that each sample lies on
+    faces: tuple[str, ...]  # (m,) the named face of each sample
 
 
 class Shape(Part):
     """A closed region in 1, 2 or 3 dimensions.
 
-    An implementation is a frozen attrs class whose fields are the TOML keys of the shape.
-    Faces normal to an axis are called left/right (x), bottom/top (y), front/back (z).
+    An implementation is a frozen attrs class whose fields are the TOML keys of the shape. Faces
+    normal to an axis are called left/right (x), bottom/top (y), front/back (z).
     """
 
     @property
@@ -33,21 +33,21 @@ class Shape(Part):
 
     @abstractmethod
     def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper corner of a box that holds the shape, each (d,) [m]."""
+        """Lower and upper corner of a box that contains the shape, each (d,) [m]."""
 
     @abstractmethod
     def signed_distance(self, points: Array) -> Array:
-        """Distance to the boundary of each of `points` (n, d), negative inside, (n,) [m].
+        """Signed distance to the boundary of `points` (n, d), negative inside, (n,) [m].
 
-        Exact in sign everywhere, and in value near the boundary away from corners; elsewhere no
-        more than the distance, so that a point is inside as far around as its depth.
+        Its sign is exact everywhere, its value near the boundary away from corners. Elsewhere it
+        does not exceed the distance, so that a ball of that radius around an inner point is inside.
         """
 
     @property
     def convex(self) -> bool:
-        """Whether every straight line between two points of the shape stays inside it.
+        """True if every straight line between two points of the shape is inside it.
 
-        Where it does, no lines between neighbours need be followed. False if not known.
+        Lines of sight between neighbours are then not checked. False if it is not known.
         """
         return False
 
@@ -57,4 +57,4 @@ class Shape(Part):
 
     @abstractmethod
     def volume(self) -> float | None:
-        """Length, area or volume [m^d]; None where no closed form is known."""
+        """Length, area or volume [m^d]; None if no closed form is known."""

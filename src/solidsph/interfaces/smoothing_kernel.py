@@ -1,4 +1,4 @@
-"""A kernel made ready for use: normalised in one dimension, cut at its support radius."""
+"""SmoothingKernel: a kernel normalised in one dimension and cut off at its support radius."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from solidsph.errors import PluginError
 from solidsph.interfaces.kernel import Kernel
 from solidsph.maths.arrays import Array
 
-# Surface of the unit sphere in 1, 2 and 3 dimensions.
 UNIT_SPHERE = {1: 2.0, 2: 2.0 * pi, 3: 4.0 * pi}
+"""Surface of the unit sphere, by dimension."""
 
-# The edge value that rounding may leave of a profile that is zero there by formula.
+# Largest value at the edge, relative to the maximum, that rounding may leave of a zero.
 _EDGE_TOLERANCE = 1e-12
 
 COMPLEX_STEP = 1e-40
-"""Along the imaginary axis: far below any q, so that its square is nothing, and no difference
-is taken that could cancel."""
+"""Step along the imaginary axis: so far below any q that its square vanishes; no difference
+that could cancel is taken."""
 
 
 @attrs.frozen(eq=False)
 class SmoothingKernel:
-    """W(r) = sigma_d / H^d w(r / H), zero from r = H on."""
+    """W(r) = sigma_d / H^d w(r / H), zero for r >= H."""
 
     kernel: Kernel
     dimension: int
@@ -33,14 +33,14 @@ class SmoothingKernel:
     normalisation: float  # sigma_d [-]
 
     def value(self, distances: Array) -> Array:
-        """W(r) for r (m,) [m^-d]."""
+        """W(r) at distances r (m,) [m], (m,) [m^-d]."""
         q = np.asarray(distances) / self.support_radius
         inside = q < 1.0
         w = self.kernel.profile(np.where(inside, q, 0.0), self.kernel.params)
         return np.where(inside, w, 0.0) * (self.normalisation / self.support_radius**self.dimension)
 
     def slope(self, distances: Array) -> Array:
-        """dW/dr for r (m,) [m^-(d+1)]."""
+        """dW/dr at distances r (m,) [m], (m,) [m^-(d+1)]."""
         q = np.asarray(distances) / self.support_radius
         inside = q < 1.0
         dw = profile_slope(self.kernel, np.where(inside, q, 0.0))
@@ -48,18 +48,17 @@ class SmoothingKernel:
         return np.where(inside, dw, 0.0) * factor
 
     def gradient(self, offsets: Array, distances: Array) -> Array:
-        """Derivative of W(x_p - x_q) by x_p, (m, d), from offsets x_q - x_p (m, d)."""
+        """Derivative of W(x_p - x_q) by x_p, (m, d) [m^-(d+1)], from offsets x_q - x_p [m]."""
         return -self.slope_by_distance(distances)[:, None] * offsets
 
     def slope_by_distance(self, distances: Array) -> Array:
-        """dW/dr / r for r (m,) [m^-(d+2)], and 0 at r = 0, where a direction has no meaning."""
-        # The slope of a smooth kernel vanishes there.
+        """dW/dr / r at distances r (m,) [m], (m,) [m^-(d+2)]; 0 at r = 0."""
         safe = np.where(distances > 0.0, distances, 1.0)
         return np.where(distances > 0.0, self.slope(distances) / safe, 0.0)
 
 
 def profile_slope(kernel: Kernel, q: Array) -> Array:
-    """dw/dq of a kernel's profile: its author's formula, or a complex step through `profile`."""
+    """dw/dq of a kernel: the author's formula, or a complex step through `profile`."""
     slope = kernel.slope(q, kernel.params)
     if slope is not None:
         return np.asarray(slope, dtype=np.float64)
@@ -68,7 +67,11 @@ def profile_slope(kernel: Kernel, q: Array) -> Array:
 
 
 def profile_mass(kernel: Kernel, dimension: int) -> float:
-    """Integral of the profile over the unit ball, by Gauss-Legendre panels between the knots."""
+    """Integral of the profile over the unit ball, by Gauss-Legendre panels between the knots.
+
+    Raises:
+        PluginError: two numbers of panels give different values.
+    """
     ends = np.array([0.0, *sorted(kernel.knots), 1.0])
     masses = [_panel_mass(kernel, dimension, ends, panels) for panels in (32, 64)]
     if not isclose(*masses, rel_tol=1e-13, abs_tol=0.0):
@@ -94,8 +97,8 @@ def _panel_mass(kernel: Kernel, dimension: int, ends: Array, panels: int) -> flo
 
 
 def check_profile(kernel: Kernel) -> None:
-    """Raise PluginError if the profile is not a weight: infinite, negative, or cut at its edge."""
-    name = type(kernel).__name__
+    """Raise PluginError unless the profile is finite, not negative and zero at its edge."""
+    name = f"kernel {type(kernel).__name__}"
     q = np.linspace(0.0, 1.0, 2001)[:-1]
     try:
         with np.errstate(all="ignore"):
@@ -103,60 +106,58 @@ def check_profile(kernel: Kernel) -> None:
             edge = float(kernel.profile(np.array([1.0 - 1e-12]), kernel.params)[0])
     except Exception as cause:  # a plugin's formula may fail in any way
         raise PluginError(
-            f"kernel {name}: profile(q, params) failed on an array: {type(cause).__name__}: "
-            f"{cause}; use NumPy functions and np.maximum or np.where in place of `if`"
+            f"{name}: profile(q, params) failed on an array: {type(cause).__name__}: {cause}; use "
+            "NumPy functions and np.maximum or np.where in place of `if`"
         ) from cause
     if w.shape != q.shape:
         raise PluginError(
-            f"kernel {name}: profile gave shape {w.shape} for q of shape {q.shape}; it must give "
-            "one value for each"
+            f"{name}: profile gave shape {w.shape} for q of shape {q.shape}; it must give one "
+            "value for each"
         )
     if not np.all(np.isfinite(w)):
         bad = q[~np.isfinite(w)][0]
         raise PluginError(
-            f"kernel {name}: profile({bad:.6g}) is not finite; it must be finite on 0 <= q < 1"
+            f"{name}: profile({bad:.6g}) is not finite; it must be finite on 0 <= q < 1"
         )
     if np.any(w < 0.0):
         bad = q[w < 0.0][0]
         raise PluginError(
-            f"kernel {name}: profile({bad:.6g}) = {w[w < 0.0][0]:.6g} is negative; a weight must "
-            "not be negative on 0 <= q < 1"
+            f"{name}: profile({bad:.6g}) = {w[w < 0.0][0]:.6g} is negative; a weight must not be "
+            "negative on 0 <= q < 1"
         )
     if not np.any(w > 0.0):
-        raise PluginError(f"kernel {name}: profile is zero everywhere; it must have a mass")
+        raise PluginError(f"{name}: profile is zero everywhere; it must have a mass")
     lost = [kernel.lost_mass(d) for d in (1, 2, 3)]
     if not all(0.0 <= loss < 1.0 for loss in lost):
-        raise PluginError(
-            f"kernel {name}: lost_mass must be in [0, 1) in every dimension, got {lost}"
-        )
+        raise PluginError(f"{name}: lost_mass must be in [0, 1) in every dimension, got {lost}")
     if not all(0.0 < knot < 1.0 for knot in kernel.knots):
-        raise PluginError(f"kernel {name}: knots must lie between 0 and 1, got {kernel.knots}")
-    _check_slope(kernel, q, w)
+        raise PluginError(f"{name}: knots must lie between 0 and 1, got {kernel.knots}")
+    _check_slope(kernel, name, q, w)
     if edge > _EDGE_TOLERANCE * w.max() and min(lost) <= 0.0:
         raise PluginError(
-            f"kernel {name}: profile is {edge:.6g} at q = 1, where it must be zero; let it vanish "
-            "there, or declare the mass that the cut loses in `lost_mass`"
+            f"{name}: profile is {edge:.6g} at q = 1, where it must be zero; let it vanish there, "
+            "or declare the mass that the cut loses in `lost_mass`"
         )
 
 
-def _check_slope(kernel: Kernel, q: Array, w: Array) -> None:
-    """The slope must be that of the profile: its trapezoidal integral is the profile's change."""
+def _check_slope(kernel: Kernel, name: str, q: Array, w: Array) -> None:
+    """Raise PluginError unless the trapezoidal integral of the slope is the profile's change."""
     try:
         with np.errstate(all="ignore"):
             slope = profile_slope(kernel, q)
     except Exception as cause:  # a plugin's formula may fail in any way
         raise PluginError(
-            f"kernel {type(kernel).__name__}: its slope failed on an array: "
-            f"{type(cause).__name__}: {cause}; use NumPy functions"
+            f"{name}: its slope failed on an array: {type(cause).__name__}: {cause}; use NumPy "
+            "functions"
         ) from cause
     change = 0.5 * (slope[1:] + slope[:-1]) * np.diff(q)
     wrong = np.abs(change - np.diff(w))
-    # Steps of 1/2000: the rule's own error is some 1e-10 of a smooth profile, 1e-6 at a kink.
+    # In steps of 1/2000 the error of the rule is about 1e-10 for a smooth profile, 1e-6 at a kink.
     if not np.all(wrong < 1e-5 * w.max()):
         worst = q[int(np.argmax(np.where(np.isfinite(wrong), wrong, np.inf)))]
         raise PluginError(
-            f"kernel {type(kernel).__name__}: slope is not the derivative of profile near q = "
-            f"{worst:.4g}; correct it, or leave it out if profile is a formula without abs"
+            f"{name}: slope is not the derivative of profile near q = {worst:.4g}; correct it, or "
+            "leave it out if profile is a formula without abs"
         )
 
 

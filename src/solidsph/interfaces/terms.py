@@ -1,8 +1,8 @@
-"""Conditions: boundary handlers and effects once they are bound to particles.
+"""Terms: boundary handlers and effects once they are bound to particles.
 
-A handler or an effect is a frozen set of parameters; bound to a model it becomes one or more
-conditions that hold arrays. What a condition can do is its type: determine motion, change the
-stress, add forces, or show fields. A run calls only those that are there.
+A handler or an effect is a frozen set of parameters. Bound to a model it becomes one or more terms,
+which hold arrays. The type of a term is what it does: prescribe motion, change the stress, add
+forces, store energy, or show fields. A run calls only the terms that are there.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-from solidsph.interfaces.plan import Operations, Way
+from solidsph.interfaces.memory import Memory
+from solidsph.interfaces.plan import Operations, SumMethod
 from solidsph.interfaces.subset import Subset
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.particles import Particles, State
@@ -22,7 +23,7 @@ from solidsph.model.particles import Particles, State
 
 @attrs.frozen(eq=False)
 class Observation:
-    """A state with the fields that belong to it, as reports and records see it."""
+    """A state with the fields derived from it, as reports and records see it."""
 
     state: State
     particles: Particles
@@ -31,70 +32,70 @@ class Observation:
     stresses: Array  # (n, d, d) first Piola-Kirchhoff stress P [Pa]
     energy_densities: Array  # (n,) psi [J/m^3]
     dissipated_densities: Array | None = None  # (n,) by materials so far [J/m^3]
-    # What several listeners need, made once by keys of theirs.
+    # Cache of quantities that several observers need; keys are unique to their owners.
     made: dict[object, Any] = attrs.field(factory=dict, init=False, repr=False)
 
     @property
     def volume_ratios(self) -> Array:
-        """J = det F of every particle, (n,)."""
+        """J = det F of every particle, (n,) [-]."""
         if "J" not in self.made:
             with np.errstate(all="ignore"):
                 self.made["J"] = np.linalg.det(self.deformation_gradients)
-        found: Array = self.made["J"]
-        return found
+        ratios: Array = self.made["J"]
+        return ratios
 
     @property
     def squared_speeds(self) -> Array:
         """v^2 of every particle, (n,) [m^2/s^2]."""
         if "v^2" not in self.made:
             self.made["v^2"] = np.sum(self.state.velocities**2, axis=1)
-        found: Array = self.made["v^2"]
-        return found
+        squares: Array = self.made["v^2"]
+        return squares
 
 
 class Term(ABC):
-    """Something imposed on some of the particles."""
+    """Something that acts on some of the particles."""
 
     @property
     @abstractmethod
     def label(self) -> str:
         """Name of its account in energies, reports and errors."""
 
-    @abstractmethod
     def report(self, observation: Observation) -> Mapping[str, float]:
-        """What was asked for and what was achieved: columns "quantity [unit]" of numbers."""
+        """Numbers "quantity [unit]" for the report, such as what was asked for and achieved."""
+        return {}
 
 
 class EnergyTerm(Term):
-    """Stores energy beside that of the strain."""
+    """A term that stores energy besides the strain energy."""
 
     @abstractmethod
     def energies(self, observation: Observation) -> Array:
-        """What it stores of every particle, (n,) [J]: minus its work, from where it was zero."""
+        """Energy stored per particle, (n,) [J]: minus the work done since it was zero."""
 
 
 class FieldTerm(Term):
-    """Has something to show of every particle."""
+    """A term with fields for the record."""
 
     @abstractmethod
     def fields(self, observation: Observation) -> Mapping[str, Array]:
-        """Fields "quantity [unit]" for the record, of all particles, ghosts among them.
+        """Fields "quantity [unit]" of all particles, ghosts included.
 
-        Each is (n,), (n, d) or (n, d, d), and the same ones are there in every observation.
+        Each is (n,), (n, d) or (n, d, d), and every observation has the same ones.
         """
 
 
 class Constraint(Term):
-    """Determines the motion of some degrees of freedom."""
+    """A term that prescribes the motion of some degrees of freedom."""
 
     @property
     @abstractmethod
     def held(self) -> Mask:
-        """Degrees of freedom that this condition determines, (n, d)."""
+        """True for the degrees of freedom that it prescribes, (n, d)."""
 
     @abstractmethod
     def impose(self, time: float, derivative: int, values: Array, step: float = 0.0) -> None:
-        """Overwrite the held entries of `values` (n, d) in place.
+        """Overwrite the held entries of `values` in place.
 
         Args:
             time: [s].
@@ -105,24 +106,29 @@ class Constraint(Term):
         """
 
     def part(self, subset: Subset, held: Mask) -> Constraint | None:
-        """The same for a subset of the particles, without those that are `held` (n,) otherwise;
-        None if it cannot act on some particles alone."""
+        """The constraint on a subset, without the particles that are `held` (n,) otherwise.
+
+        None, the default, if it cannot act on a subset.
+        """
         return None
 
 
 class GhostConstraint(Constraint):
-    """Makes ghosts follow other particles, linearly: u_ghost = E u."""
+    """A constraint that makes ghosts follow other particles linearly, u_ghost = E u."""
 
     @abstractmethod
     def return_forces(self, forces: Array) -> None:
-        """Move the forces (n, d) on the ghosts to those they follow, in place: f += E^T f_ghost.
+        """Move the forces on ghosts to the particles they follow, in place: f += E^T f_ghost.
 
-        The transpose makes the forces the derivative of the energy by the free motion alone.
+        With the transpose the forces are the derivative of the energy by the free motion alone.
+
+        Args:
+            forces: on all particles, (n, d) [N].
         """
 
 
 class StressTerm(Term):
-    """Determines the stress of some particles, ghosts among them."""
+    """A term that prescribes the stress of some particles, ghosts included."""
 
     @abstractmethod
     def impose_stress(self, time: float, stress: Array) -> None:
@@ -130,31 +136,31 @@ class StressTerm(Term):
 
 
 class Load(Term):
-    """Adds forces to some particles."""
+    """A term that adds forces to some particles."""
 
     supports: ClassVar[float] = 2.0
-    """How far away, in support radii, the particles are on which its forces depend."""
+    """Distance, in support radii, of the particles on which its forces depend."""
 
     @property
     @abstractmethod
     def particles(self) -> Indices:
-        """Those that it acts on, (k,)."""
+        """Particles on which it acts, (k,)."""
 
     @abstractmethod
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         """Forces on these particles, (k, d) [N], from positions and velocities (n, d) of all."""
 
     is_counted: ClassVar[bool] = False
-    """True if `operations` say all that an evaluation costs; other loads are timed."""
+    """True if `operations` is the complete cost of an evaluation; other loads are timed."""
 
     @property
     def stiffness_rate(self) -> float:
-        """Angular frequency that its stiffness adds at most [rad/s]; for the stable step."""
+        """Highest angular frequency that its stiffness adds [rad/s]; for the stable step."""
         return 0.0
 
     @property
     def damping_rate(self) -> float:
-        """Largest rate at which it damps velocities [1/s]; for the stable step."""
+        """Highest rate at which it damps velocities [1/s]; for the stable step."""
         return 0.0
 
     @property
@@ -164,11 +170,11 @@ class Load(Term):
 
     @property
     def pair_count(self) -> int:
-        """Pairs of particles that an evaluation of its forces visits."""
+        """Number of pairs that one evaluation of its forces visits."""
         return 0
 
     def operations(self, dimension: int, *, compiled: bool) -> Sequence[Operations]:
-        """What an evaluation passes over, for those who count and price it.
+        """Operations of one evaluation, from which its cost is predicted.
 
         Args:
             dimension: of the scene.
@@ -177,33 +183,33 @@ class Load(Term):
         count = len(self.particles)
         kept = sum(self.arrays.values()) or 8 * count * dimension
         touched = kept + 3 * 8 * count * dimension
-        return (Operations(Way.UNKNOWN, self.pair_count, count, touched, kept),)
+        return (Operations(SumMethod.UNKNOWN, self.pair_count, count, touched, kept),)
 
     def part(self, subset: Subset) -> Load | None:
-        """The same load on a subset of the particles; None if it cannot act on some alone."""
+        """The load on a subset of the particles; None, the default, if it cannot act on one."""
         return None
 
     def advance(
-        self,
-        time: float,
-        step: float,
-        positions: Array,
-        velocities: Array,
-        memory: Mapping[str, Array],
-    ) -> tuple[Array, Mapping[str, Array]]:
-        """The forces at the end of a step, and what is to be remembered of it.
+        self, time: float, step: float, positions: Array, velocities: Array, memory: Memory
+    ) -> tuple[Array, Memory]:
+        """Forces (k, d) [N] at the end of a step, and what is to be remembered of it.
 
-        What remembers overrides this: it reads `memory`, that of the state before the step, under
-        names that begin with its label, and returns under them what the next step will read. Where
-        nothing is there yet, the run begins. `step` is the length of the step [s]; 0 if none is
-        made, and then nothing may change.
+        A load with memory overrides this. It reads and returns entries whose names begin with its
+        label; where it finds none, the run begins.
+
+        Args:
+            time: end of the step [s].
+            step: length of the step [s]; 0 if no step is made, and then memory must not change.
+            positions: at its end, of all particles, (n, d) [m].
+            velocities: at its end, (n, d) [m/s].
+            memory: `State.memory` at its beginning.
         """
         return self.forces(time, positions, velocities), {}
 
 
 class SurfaceLoad(Load):
-    """Forces that are the weak form's natural condition of a surface.
+    """A load that is the natural boundary condition of the weak form on a surface.
 
-    They do not go with ghosts that continue the stress beyond that surface: the two together
+    It cannot be combined with ghosts that continue the stress beyond that surface: together they
     would leave nothing to balance the load.
     """

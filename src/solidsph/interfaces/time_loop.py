@@ -1,4 +1,4 @@
-"""TimeLoop: how steps between two outputs are carried out."""
+"""TimeLoop: the steps between two outputs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NOT_FINITE = "the acceleration is not finite"
 
 
 class StepError(PortableError):
-    """A step that cannot be gone on from; for whoever runs the loop, who knows what to say."""
+    """A step after which the run cannot continue; the caller of the loop reports it."""
 
     def __init__(self, state: State, cause: str) -> None:
         self.state = state
@@ -22,17 +22,17 @@ class StepError(PortableError):
 
 
 class TimeLoop(ABC):
-    """Steps of one scene."""
+    """Carries out the steps of one scene."""
 
     @property
     def effort(self) -> Mapping[str, Any]:
-        """What the loop has to tell of its steps: "quantity [unit]" -> a number."""
+        """Statistics of the steps carried out, "quantity [unit]" -> number."""
         return {}
 
     @abstractmethod
     def advance(self, state: State, stop: int) -> State:
-        """The state after `stop` steps in all.
+        """The state when `stop` steps have been made in all, those before `state` included.
 
         Raises:
-            StepError: an acceleration is not finite, or the forces cannot be formed any more.
+            StepError: an acceleration is not finite, or the forces can no longer be formed.
         """

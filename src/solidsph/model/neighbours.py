@@ -121,3 +121,14 @@ def neighbour_pairs(positions: Array, radius: float, hidden: Hidden | None = Non
         offsets=offsets,
         distances=np.linalg.norm(offsets, axis=1),
     )
+
+
+def row_starts(counts: Indices) -> Indices:
+    """First entry of each row and the end of the last, (n + 1,), from entries per row (n,)."""
+    return np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+
+
+def ranges(begin: Indices, sizes: Indices) -> Indices:
+    """The integers begin, begin + 1, ... of several groups (k,), one group after the other."""
+    ends = np.cumsum(sizes)
+    return np.asarray(np.repeat(begin - (ends - sizes), sizes) + np.arange(sizes.sum()))

@@ -12,8 +12,12 @@ import attrs
 import numpy as np
 
 from solidsph.interfaces.engine import InternalForces
-from solidsph.interfaces.equation_of_motion import NOTHING, EquationOfMotion, Response
-from solidsph.interfaces.terms import GhostConstraint, Observation
+from solidsph.interfaces.equation_of_motion import EquationOfMotion, Response
+from solidsph.interfaces.memory import NOTHING
+from solidsph.interfaces.terms import (
+    GhostConstraint,
+    Observation,
+)
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.particles import Particles, State, locked
 

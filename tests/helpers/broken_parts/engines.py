@@ -10,7 +10,7 @@ import attrs
 from solidsph.engines.matrix import MatrixEngine, MatrixForces
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import Engine, InternalForces, StressFields
-from solidsph.interfaces.plan import BodySize, Operations, Plan, Way
+from solidsph.interfaces.plan import BodySize, Operations, Plan, SumMethod
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array
 
@@ -94,7 +94,7 @@ class DeafToStressTerms(GoodEngine):
 
 class PlansLessThanNothing(GoodEngine):
     def expected(self, sizes: Sequence[BodySize], evaluations: int) -> Plan:
-        return Plan(False, (Operations(Way.UNKNOWN, -1, 0, 0, 0),))
+        return Plan(False, (Operations(SumMethod.UNKNOWN, -1, 0, 0, 0),))
 
 
 ENGINES = [

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from solidsph.costs.count import count_work
-from solidsph.engines.compiled.loop import CompiledLoop
-from solidsph.interfaces.plan import Way
+from solidsph.engines.compiled.time_loop.loop import CompiledLoop
+from solidsph.interfaces.plan import SumMethod
 from solidsph.run.step_by_step import StepByStep
 from solidsph.scene.scene_builder import SceneBuilder
 from tests.helpers.guides import Guide
@@ -39,7 +39,7 @@ def test_whole_steps_are_compiled_with_it(springs: None) -> None:
 def test_its_pairs_are_counted(springs: None) -> None:
     simulation = moving().engine("compiled").build()
     own = count_work(simulation).operations[-1]
-    assert own.way is Way.PAIR_LOOPS
+    assert own.method is SumMethod.PAIR_LOOPS
     assert own.pairs == simulation.dynamics.internal.pair_count - simulation.particles.count
 
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from solidsph import Record, Simulation, resume
-from solidsph.engines.history import ArrayLaw, HistoryForces
+from solidsph.engines.array_law import ArrayLaw
+from solidsph.engines.history import HistoryForces
 from solidsph.errors import BuildError
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.law import memory_name

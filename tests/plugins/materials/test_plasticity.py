@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solidsph import Simulation
-from solidsph.engines.compiled.history import CompiledLaw
+from solidsph.engines.compiled.history_law import CompiledLaw
 from solidsph.engines.history import HistoryForces
 from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.history import History, HistoryMaterial

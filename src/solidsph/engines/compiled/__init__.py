@@ -1,1 +1,1 @@
-"""The compiled engine. Importing it brings the compiler, so only what uses it does."""
+"""The compiled engine; only `constants` and `expected` can be imported without the compiler."""

@@ -1,62 +1,64 @@
-"""What the compiled engine has to compile, each piece once a process and kind."""
+"""What the compiled engine has to compile, each unit once per process and key."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from solidsph.engines.compiled.compiled_body import CompiledBody
-from solidsph.engines.compiled.loads import pass_of
-from solidsph.engines.compiled.moving import MovingBody
+from solidsph.engines.compiled.moving.body import MovingBody
+from solidsph.engines.compiled.reference.body import ReferenceBody
+from solidsph.engines.compiled.time_loop.loads import kind_of
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import Integrator
-from solidsph.interfaces.plan import Compilation, Piece
+from solidsph.interfaces.plan import Compilation, CompilationUnit
 from solidsph.interfaces.terms import GhostConstraint, StressTerm
 
 
 def of_forces(
-    parts: Sequence[CompiledBody | MovingBody], stress_terms: Sequence[StressTerm]
+    parts: Sequence[ReferenceBody | MovingBody], stress_terms: Sequence[StressTerm]
 ) -> Iterator[Compilation]:
-    """For one evaluation of the internal forces."""
+    """Compilations for one evaluation of the internal forces."""
     operations = [o for part in parts for o in part.operations]
     threaded = any(o.threaded for o in operations)
     d = parts[0].body.particles.dimension
-    fixed = [part for part in parts if isinstance(part, CompiledBody)]
+    fixed = [part for part in parts if isinstance(part, ReferenceBody)]
     if fixed:
-        yield Compilation(Piece.ENGINE, 0, False)
+        yield Compilation(CompilationUnit.ENGINE, 0, False)
         staged = bool(stress_terms) or any(
             not part.body.formulation.divergence.adjoint for part in parts
         )
         for law in {_law(part) for part in fixed}:
-            yield Compilation(Piece.STAGED if staged else Piece.FORCES, d, threaded, law)
-        yield Compilation(Piece.FIELDS, d, threaded, _precision(fixed))
+            yield Compilation(
+                CompilationUnit.STAGED if staged else CompilationUnit.FORCES, d, threaded, law
+            )
+        yield Compilation(CompilationUnit.FIELDS, d, threaded, _precision(fixed))
     if len(fixed) < len(parts):
-        yield Compilation(Piece.MOVING_ENGINE, d, False)
+        yield Compilation(CompilationUnit.MOVING_ENGINE, d, False)
         for law in {_law(part) for part in parts if isinstance(part, MovingBody)}:
-            yield Compilation(Piece.MOVING, d, threaded, law)
+            yield Compilation(CompilationUnit.MOVING, d, threaded, law)
 
 
 def of_steps(
-    parts: Sequence[CompiledBody], equation: EquationOfMotion, integrator: Integrator
+    parts: Sequence[ReferenceBody], equation: EquationOfMotion, integrator: Integrator
 ) -> Iterator[Compilation]:
-    """For whole steps, besides."""
+    """Additional compilations for whole steps."""
     d = equation.particles.dimension
     threaded = any(o.threaded for part in parts for o in part.operations)
-    kinds = tuple(sorted(type(one).__name__ for one in (*equation.constraints, *equation.loads)))
+    kinds = tuple(sorted(type(term).__name__ for term in (*equation.constraints, *equation.loads)))
     laws = frozenset(_law(part) for part in parts)
-    yield Compilation(Piece.STEPS, d, threaded, (type(integrator), laws, kinds))
+    yield Compilation(CompilationUnit.STEPS, d, threaded, (type(integrator), laws, kinds))
     for load in equation.loads:
-        piece = pass_of(load).piece
-        key = None if piece is Piece.LOAD and not pass_of(load).formula else type(load)
-        yield Compilation(piece, d, threaded, key)
-    if any(isinstance(one, GhostConstraint) for one in equation.constraints):
-        yield Compilation(Piece.EXTENSION, d, threaded)
+        unit = kind_of(load).unit
+        key = None if unit is CompilationUnit.LOAD and not kind_of(load).formula else type(load)
+        yield Compilation(unit, d, threaded, key)
+    if any(isinstance(term, GhostConstraint) for term in equation.constraints):
+        yield Compilation(CompilationUnit.EXTENSION, d, threaded)
 
 
-def _law(part: CompiledBody | MovingBody) -> object:
+def _law(part: ReferenceBody | MovingBody) -> object:
     body = part.body
-    precision = _precision([part]) if isinstance(part, CompiledBody) else None
+    precision = _precision([part]) if isinstance(part, ReferenceBody) else None
     return type(body.material), type(body.formulation), precision
 
 
-def _precision(parts: Sequence[CompiledBody]) -> int:
+def _precision(parts: Sequence[ReferenceBody]) -> int:
     return min(o.precision for part in parts for o in part.operations)

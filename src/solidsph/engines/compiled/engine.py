@@ -1,31 +1,23 @@
-"""The compiled engine: fused sweeps over stencils and rows, compiled for the parts in use."""
+"""The compiled engine: sums by loops that are compiled for the parts in use."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, final
 
 import attrs
 import numpy as np
 
-from solidsph.engines.compiled.blocks import STRIDE, group
+from solidsph.engines.array_law import stress_fields
 from solidsph.engines.compiled.compilations import of_forces, of_steps
-from solidsph.engines.compiled.compiled_body import CompiledBody, compiled_body
 from solidsph.engines.compiled.expected import expected_plan
-from solidsph.engines.compiled.history import CompiledLaw
-from solidsph.engines.compiled.loop import are_compilable, compiled_loop
-from solidsph.engines.compiled.moving import MovingBody, moving_body
-from solidsph.engines.compiled.part import part_of_rows
-from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux, no_law
-from solidsph.engines.compiled.shares import (
-    aligned,
-    passes,
-    shared,
-    spread_pass,
-    thread_count,
-)
+from solidsph.engines.compiled.history_law import CompiledLaw
+from solidsph.engines.compiled.moving.body import MovingBody, moving_body
+from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux
+from solidsph.engines.compiled.reference.body import ReferenceBody, reference_body
+from solidsph.engines.compiled.time_loop.loop import are_compilable, compiled_loop
 from solidsph.engines.matrix import MatrixEngine
-from solidsph.interfaces.body import Body, part_of
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import Engine, InternalForces, StressFields
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.formulation import Configuration
@@ -35,10 +27,6 @@ from solidsph.interfaces.plan import BodySize, Compilation, Operations, Plan
 from solidsph.interfaces.terms import StressTerm
 from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.maths.arrays import Array, Indices
-from solidsph.maths.tensors import components_first, particles_first
-
-# Particles whose stress is found at once for reports and records.
-_AT_ONCE = 4096
 
 
 @final
@@ -46,13 +34,13 @@ _AT_ONCE = 4096
 class CompiledEngine(Engine):
     """Sums over rows of weights, with the parts' pointwise functions compiled into the loops.
 
-    Where a material or a formulation cannot be compiled, the matrix engine does the work: for all
-    bodies, because conditions see the stress of all at once.
+    If a material or a formulation cannot be compiled, the matrix engine takes all bodies, because
+    conditions see the stress of all at once.
 
-    The sums themselves are kept in `precision`, if they are taken in the reference configuration:
-    what moves is summed in double precision. Displacements, and not positions, go into them, so
-    that single precision is precision of strain, as long as a body does not move by many times its
-    spacing; F, the stress and what the seam hands out are in double precision.
+    Sums in the reference configuration are in `precision`, those over moving neighbours in double
+    precision. The sums are of displacements, not of positions, so that single precision is the
+    precision of strain as long as a body does not move by many times its spacing. F, the stress and
+    the results are in double precision.
     """
 
     precision: str = attrs.field(
@@ -60,10 +48,7 @@ class CompiledEngine(Engine):
     )
 
     def prepare(
-        self,
-        bodies: Sequence[Body],
-        conditions: Sequence[StressTerm],
-        evaluations: int = 1,
+        self, bodies: Sequence[Body], conditions: Sequence[StressTerm], evaluations: int = 1
     ) -> InternalForces:
         try:
             laws = [compiled_flux(b.formulation, b.material, b.smoothing.dimension) for b in bodies]
@@ -75,9 +60,9 @@ class CompiledEngine(Engine):
     def expected(self, sizes: Sequence[BodySize], evaluations: int) -> Plan:
         return expected_plan(sizes, 4 if self.precision == "float32" else 8)
 
-    def _part(self, body: Body, law: Any) -> CompiledBody | MovingBody:
+    def _part(self, body: Body, law: Any) -> ReferenceBody | MovingBody:
         if body.formulation.configuration is Configuration.REFERENCE:
-            return compiled_body(body, law, self.precision)
+            return reference_body(body, law, self.precision)
         return moving_body(body, law)
 
 
@@ -98,9 +83,9 @@ class SinglePrecisionEngine(Engine):
 @final
 @attrs.frozen(eq=False)
 class CompiledForces(InternalForces):
-    """Internal forces by compiled sweeps."""
+    """Internal forces by compiled loops."""
 
-    parts: Sequence[CompiledBody | MovingBody]
+    parts: Sequence[ReferenceBody | MovingBody]
     conditions: Sequence[StressTerm]
 
     @property
@@ -109,7 +94,7 @@ class CompiledForces(InternalForces):
 
     @property
     def operations(self) -> Sequence[Operations]:
-        return tuple(own for part in self.parts for own in part.operations)
+        return tuple(o for part in self.parts for o in part.operations)
 
     @property
     def precision(self) -> float:
@@ -127,19 +112,19 @@ class CompiledForces(InternalForces):
             return super().plan(equation, integrator)
         d = equation.particles.dimension
         loads = [o for load in equation.loads for o in load.operations(d, compiled=True)]
-        pieces = {*self.compilations, *of_steps(fixed, equation, integrator)}
-        return Plan(True, self.operations, loads, frozenset(pieces))
+        units = {*self.compilations, *of_steps(fixed, equation, integrator)}
+        return Plan(True, self.operations, loads, frozenset(units))
 
     @property
-    def _fixed(self) -> Sequence[CompiledBody]:
-        return [part for part in self.parts if isinstance(part, CompiledBody)]
+    def _fixed(self) -> Sequence[ReferenceBody]:
+        return [part for part in self.parts if isinstance(part, ReferenceBody)]
 
     def time_loop(self, equation: EquationOfMotion, integrator: Integrator) -> TimeLoop | None:
         if not self.plan(equation, integrator).compiles_steps:
             return None
         try:
             return compiled_loop(self._fixed, self.conditions, self, equation, integrator)
-        except NotCompilableError:  # a formula does not compile, as its kind did not tell
+        except NotCompilableError:  # a formula whose kind is known, but which does not compile
             return None
 
     def forces(self, time: float, displacements: Array) -> Array:
@@ -175,42 +160,13 @@ class CompiledForces(InternalForces):
             part.spread(stress[:, :, part.body.extent], forces[part.body.extent])
         return forces
 
-    def check_parts(self) -> None:
-        if self._whole is None:
-            super().check_parts()
-
-    def part(self, chosen: Indices) -> InternalForces:
-        whole = self._whole
-        if whole is None:
-            return super().part(chosen)
-        d, dtype = whole.body.particles.dimension, whole.u.dtype.name
-        rows = part_of_rows(whole.gradient, chosen, whole.body.particles.count)
-        count = rows.run_pairs + rows.row_pairs
-        threads = thread_count(count)
-        shares = shared(rows, d, dtype, threads)
-        own = attrs.evolve(
-            whole,
-            body=part_of(whole.body, chosen),
-            gradient=rows,
-            force=rows,
-            factors=whole.factors[chosen],
-            gradient_shares=shares,
-            force_shares=shares,
-            u=aligned((len(chosen) + group(d, dtype)) * STRIDE[d], dtype),
-            passes=passes(d, dtype, whole.law, threads > 1),
-            gradients=passes(d, dtype, no_law, threads > 1),
-            spread_pass=spread_pass(d, dtype, threads > 1),
-            pair_count=count,
-        )
-        return CompiledForces((own,), ())
-
-    @property
-    def _whole(self) -> CompiledBody | None:
-        """The only body, if its forces may be formed in parts."""
-        if self.conditions or len(self.parts) > 1 or not isinstance(self.parts[0], CompiledBody):
-            return None
+    def part(self, chosen: Indices) -> InternalForces | None:
         only = self.parts[0]
-        return only if only.fused and not only.body.particles.ghosts.any() else None
+        if self.conditions or len(self.parts) > 1 or not isinstance(only, ReferenceBody):
+            return None
+        if not only.fused or only.body.particles.ghosts.any():
+            return None
+        return CompiledForces((only.part(chosen),), ())
 
     def law(self, body: Body) -> Law | None:
         try:
@@ -219,37 +175,4 @@ class CompiledForces(InternalForces):
             return None
 
     def fields(self, displacements: Array) -> StressFields:
-        n, d = displacements.shape
-        fields = StressFields(np.empty((n, d, d)), np.zeros((n, d, d)), np.zeros(n))
-        for part in self.parts:
-            extent = part.body.extent
-            F, P = fields.deformation_gradients[extent], fields.stresses[extent]
-            energy = fields.energy_densities[extent]
-            part.gradient_of(displacements[extent], F)
-            for some in _portions(part.body.particles.count):
-                F[some] = _deformation(part.body, F[some])
-            F[part.body.particles.ghosts] = np.eye(d)
-            for some in _portions(part.body.particles.count):
-                P[some], energy[some] = _stress_and_energy(part.body, F[some])
-        return fields
-
-
-def _portions(count: int) -> Iterator[slice]:
-    """Particles 0 to `count`, some at a time: what the law needs between stays in cache."""
-    return (slice(first, first + _AT_ONCE) for first in range(0, count, _AT_ONCE))
-
-
-def _deformation(body: Body, H: Array) -> Array:
-    """F (k, d, d) from H (k, d, d)."""
-    with np.errstate(all="ignore"):  # as in the matrix engine
-        F = body.formulation.deformation_gradient(components_first(H))
-    return particles_first(F, len(H))
-
-
-def _stress_and_energy(body: Body, F: Array) -> tuple[Array, Array]:
-    """P (k, d, d) and psi (k,) from F (k, d, d)."""
-    components = components_first(F)
-    with np.errstate(all="ignore"):  # as in the matrix engine
-        P = body.material.first_piola(components, body.material.params)
-        energy = body.material.energy(components, body.material.params)
-    return particles_first(P, len(F)), energy
+        return stress_fields([part.body for part in self.parts], self.gradients(displacements))

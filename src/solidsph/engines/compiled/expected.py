@@ -1,35 +1,37 @@
-"""The compiled engine's plan for bodies that are not built."""
+"""The plan of the compiled engine for bodies that are not built yet."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from solidsph.engines.compiled.constants import STRIDE, WORTH_A_THREAD
 from solidsph.interfaces.plan import (
     BodySize,
     Compilation,
+    CompilationUnit,
     Operations,
-    Piece,
     Plan,
-    Way,
+    SumMethod,
     vectors,
 )
 
-# Numbers kept for a vector, by dimension; and from so many pairs on, threads share a sum. As in the
-# engine itself, which brings the compiler with it.
-_STRIDE = {1: 1, 2: 2, 3: 4}
-_THREADED = 200_000
-
 
 def expected_plan(sizes: Sequence[BodySize], precision: int = 8) -> Plan:
-    """The plan for bodies of these sizes; `precision` is that of the sums [bytes of a number]."""
+    """The plan for bodies of these sizes; `precision` is that of the sums [bytes per number]."""
     d, moving = sizes[0].dimension, any(size.moving for size in sizes)
     if moving:
-        pieces = [Compilation(piece, d, False) for piece in (Piece.MOVING_ENGINE, Piece.MOVING)]
+        units = [
+            Compilation(unit, d, False)
+            for unit in (CompilationUnit.MOVING_ENGINE, CompilationUnit.MOVING)
+        ]
     else:
-        own = (Piece.FORCES, Piece.FIELDS, Piece.STEPS)
-        pieces = [Compilation(Piece.ENGINE, 0, False), *(Compilation(p, d, True) for p in own)]
+        own = (CompilationUnit.FORCES, CompilationUnit.FIELDS, CompilationUnit.STEPS)
+        units = [
+            Compilation(CompilationUnit.ENGINE, 0, False),
+            *(Compilation(p, d, True) for p in own),
+        ]
     operations = tuple(o for size in sizes for o in _operations(size, precision))
-    return Plan(not moving, operations, (), frozenset(pieces))
+    return Plan(not moving, operations, (), frozenset(units))
 
 
 def _operations(size: BodySize, precision: int) -> Iterator[Operations]:
@@ -37,14 +39,14 @@ def _operations(size: BodySize, precision: int) -> Iterator[Operations]:
     both = vectors(n, d)
     if size.moving:
         held = 36 * m + 8 * n * (d * d + 2)  # the list, its rows, kernel values and slopes
-        yield Operations(Way.FORMULAS, m, n, held + both, held)
+        yield Operations(SumMethod.FORMULAS, m, n, held + both, held)
         return
     # Factors, flat displacements, and buffers for the forces.
-    own = precision * n * (1 + 2 * _STRIDE[d])
-    threaded = m > _THREADED
+    own = precision * n * (1 + 2 * STRIDE[d])
+    threaded = m > WORTH_A_THREAD
     if size.lattice:
-        yield Operations(Way.STENCILS, m, n, own + both, own, precision, threaded)
+        yield Operations(SumMethod.STENCILS, m, n, own + both, own, precision, threaded)
         return
     rows = m * (d * precision + 4) + 16 * n
-    yield Operations(Way.STENCILS, 0, 0, own + both, own, precision, threaded)
-    yield Operations(Way.ROWS, m, n, rows, rows, precision, threaded)
+    yield Operations(SumMethod.STENCILS, 0, 0, own + both, own, precision, threaded)
+    yield Operations(SumMethod.ROWS, m, n, rows, rows, precision, threaded)

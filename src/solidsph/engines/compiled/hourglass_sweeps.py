@@ -1,4 +1,4 @@
-"""Hourglass forces as compiled sweeps over pairs, and within the compiled loop."""
+"""Hourglass forces as compiled sweeps over pairs."""
 
 from __future__ import annotations
 
@@ -8,36 +8,44 @@ from typing import Any, NamedTuple, final
 import attrs
 import numpy as np
 from numba import njit, prange
+from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.blocks import STRIDE, group
-from solidsph.engines.compiled.chunks import weighted_chunks
-from solidsph.engines.compiled.part import part_of_rows
 from solidsph.engines.compiled.pointwise import no_law
-from solidsph.engines.compiled.rows import Rows, compressed
-from solidsph.engines.compiled.shares import aligned, passes, shared, spread_pass, thread_count
+from solidsph.engines.compiled.reference.blocks import group
+from solidsph.engines.compiled.reference.chunks import weighted_chunks
+from solidsph.engines.compiled.reference.partition import (
+    flat_field,
+    partitioned,
+    passes,
+    spread_pass,
+    thread_count,
+)
+from solidsph.engines.compiled.reference.rows import Rows, compressed
+from solidsph.engines.compiled.reference.subset_rows import part_of_rows
 from solidsph.engines.compiled.threads import check_alive
+from solidsph.engines.compiled.vectors import ROW, moved
 from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassPairs
-from solidsph.interfaces.plan import Operations, Way, vectors
+from solidsph.interfaces.plan import Operations, SumMethod, array_bytes, vectors
 from solidsph.maths.arrays import Array, Indices
 
 _DTYPE = "float64"
 
 
-class Sweeps(NamedTuple):
+class HourglassArrays(NamedTuple):
     """Arrays of the sweeps of one body."""
 
-    extent: tuple[int, int]  # its first particle among all, and the one after the last
-    table: Indices  # of the threads
-    rows: Rows  # the gradient's
-    flat: NDArray[Any]  # displacements for the loops over rows
+    extent: tuple[int, int]  # its first particle among all and the end of its particles
+    table: Indices  # partition among threads
+    rows: Rows  # of the gradient
+    flat: NDArray[Any]  # displacements for loops over rows
     factors: Array  # (n,) minus the volumes
     buffers: NDArray[Any]
-    starts: Indices  # near pairs
+    starts: Indices  # of the near pairs of each particle
     columns: NDArray[np.int32]
-    weights: Array
+    weights: Array  # (k,)
     positions: Array  # (n, d) X
-    jets: Array  # (n, d, 1 + d) displacement and half its gradient
+    jets: Array  # (n, d, 1 + d) displacement and half of its gradient
     tensors: Array  # (d, d, n) H, then S
     pulls: Array  # (n, d) sums of pair forces
 
@@ -45,13 +53,13 @@ class Sweeps(NamedTuple):
 @final
 @attrs.frozen(eq=False)
 class HourglassSweeps(HourglassOperator):
-    """Three sweeps: gather H, pull the near pairs together, scatter the stress that they make.
+    """Hourglass forces in three sweeps: gather H, sum over near pairs, scatter the stress.
 
-    The first and the last are loops over rows that a lattice shares between particles.
+    The first and the last are loops over rows, which particles on a lattice share.
     """
 
     pairs: HourglassPairs
-    arrays: Sweeps
+    arrays: HourglassArrays
     sweep: Any  # compiled (arrays, displacements (n, d), forces (n, d))
 
     @classmethod
@@ -68,21 +76,21 @@ class HourglassSweeps(HourglassOperator):
 
     @classmethod
     def _by_rows(cls, pairs: HourglassPairs, rows: Rows) -> HourglassSweeps:
-        """By rows of the gradient's weights."""
+        """The operator with these rows of the gradient's weights."""
         body = pairs.body
         n, d = body.particles.positions.shape
-        # Beside the near pairs there are those of the gradient, twice.
-        threads = thread_count(3 * len(pairs.columns))
-        shares = shared(rows, d, _DTYPE, threads)
-        arrays = Sweeps(
+        # Besides the near pairs there are those of the gradient, twice.
+        threads = thread_count(3 * len(pairs.table.columns))
+        partition = partitioned(rows, d, _DTYPE, threads)
+        arrays = HourglassArrays(
             extent=(body.extent.start, body.extent.stop),
-            table=shares.table,
+            table=partition.table,
             rows=rows,
-            flat=aligned((n + group(d, _DTYPE)) * STRIDE[d], _DTYPE),
+            flat=flat_field(n, d, _DTYPE),
             factors=-body.particles.volumes,
-            buffers=shares.buffers,
-            starts=pairs.starts,
-            columns=pairs.columns,
+            buffers=partition.buffers,
+            starts=pairs.table.starts,
+            columns=pairs.table.columns,
             weights=pairs.weights,
             positions=body.particles.positions,
             jets=np.empty((n, d, 1 + d)),
@@ -93,17 +101,19 @@ class HourglassSweeps(HourglassOperator):
 
     @property
     def bytes(self) -> int:
-        own = [a.nbytes for a in self.arrays if isinstance(a, np.ndarray)]
-        return sum(own) + self.arrays.rows.bytes
+        arrays = (a for a in self.arrays if isinstance(a, np.ndarray))
+        return array_bytes(arrays) + self.arrays.rows.bytes
 
     def operations(self, *, compiled: bool) -> Operations:
         n, d = self.arrays.positions.shape
         rows = self.arrays.rows
-        # Once to gather H, once to scatter the stress, and the near pairs between.
+        # Once to gather H, once to scatter the stress, and the near pairs in between.
         pairs = 2 * (rows.run_pairs + rows.row_pairs) + len(self.arrays.columns)
         threaded = len(self.arrays.table) > 1
         touched = self.bytes + vectors(n, d)
-        return Operations(Way.HOURGLASS_SWEEPS, pairs, n, touched, self.bytes, threaded=threaded)
+        return Operations(
+            SumMethod.HOURGLASS_SWEEPS, pairs, n, touched, self.bytes, threaded=threaded
+        )
 
     def forces(self, displacements: Array) -> Array:
         if len(self.arrays.table) > 1:
@@ -119,7 +129,7 @@ def hourglass_sweep(dimension: int, threaded: bool) -> Any:
     d = dimension
     gather = passes(d, _DTYPE, no_law, threaded).stress
     scatter = spread_pass(d, _DTYPE, threaded)
-    zeros, offset, row, error, more = _words(d)
+    row, nothing, size = ROW[d], (0.0,) * (1 + d), 1 + d
 
     @njit(parallel=threaded)
     def place(displacements, tensors, jets):
@@ -129,31 +139,30 @@ def hourglass_sweep(dimension: int, threaded: bool) -> Any:
                 for k in range(d):
                     jets[a, i, 1 + k] = 0.5 * tensors[i, k, a]
 
-    # A particle without volume makes what is undefined show as such, and no error.
+    # A particle without volume gives undefined values, and no error.
     @njit(parallel=threaded, error_model="numpy")
     def pull(starts, columns, weights, X, factors, jets, pulls, tensors):
         for a in prange(len(pulls)):
             # Force and products of each component; those of missing dimensions are not used.
-            nothing = zeros()
             sums_x, sums_y, sums_z = nothing, nothing, nothing
-            own_x = row(jets, a, 0)
+            X_a, own_x = row(X, a), to_fixed_tuple(jets[a, 0], size)
             if d > 1:
-                own_y = row(jets, a, 1)
+                own_y = to_fixed_tuple(jets[a, 1], size)
             if d > 2:
-                own_z = row(jets, a, 2)
+                own_z = to_fixed_tuple(jets[a, 2], size)
             for k in range(starts[a], starts[a + 1]):
                 b, c = columns[k], weights[k]
-                o = offset(X, a, b)
-                sums_x = more(sums_x, c * error(own_x, jets, b, 0, o), o)
+                X_ab = moved(row(X, b), -1.0, X_a)
+                sums_x = _with(sums_x, c * _error(own_x, jets, b, 0, X_ab), X_ab)
                 if d > 1:
-                    sums_y = more(sums_y, c * error(own_y, jets, b, 1, o), o)
+                    sums_y = _with(sums_y, c * _error(own_y, jets, b, 1, X_ab), X_ab)
                 if d > 2:
-                    sums_z = more(sums_z, c * error(own_z, jets, b, 2, o), o)
+                    sums_z = _with(sums_z, c * _error(own_z, jets, b, 2, X_ab), X_ab)
             sums = (sums_x, sums_y, sums_z)
             for i in range(d):
                 pulls[a, i] = -sums[i][0]
                 for k in range(d):
-                    # Over the volume, which the scatter multiplies by.
+                    # Divided by the volume, which the scatter multiplies by.
                     tensors[i, k, a] = -0.5 * sums[i][1 + k] / factors[a]
 
     @njit
@@ -178,7 +187,7 @@ def hourglass_sweep(dimension: int, threaded: bool) -> Any:
 
 @cache
 def body_sweep(sweep: Any) -> Any:
-    """Compiled (arrays, u (n, d), forces (n, d)) as `sweep`, of one body among all particles."""
+    """Compiled (arrays, u (n, d), forces (n, d)): `sweep` of one body among all particles."""
 
     @njit
     def own(arrays, u, forces):
@@ -188,82 +197,23 @@ def body_sweep(sweep: Any) -> Any:
     return own
 
 
-def _words(dimension: int) -> tuple[Any, Any, Any, Any, Any]:
-    """Compiled: empty sums, offset of b from a, a row of a jet, its e_ab, and sums with one more.
+@njit
+def _error(own, jets, b, i, X_ab):
+    """Component i of e_ab, from its row `own` of the jet of a; exactly minus that of e_ba."""
+    along = (own[1] + jets[b, i, 1]) * X_ab[0]
+    if len(X_ab) > 1:
+        along += (own[2] + jets[b, i, 2]) * X_ab[1]
+    error = own[0] - jets[b, i, 0] + along
+    if len(X_ab) > 2:
+        error += (own[3] + jets[b, i, 3]) * X_ab[2]
+    return error
 
-    e_ba is minus e_ab to the last bit, so that the forces on the two cancel.
-    """
-    if dimension == 1:
 
-        @njit
-        def zeros():
-            return 0.0, 0.0
-
-        @njit
-        def offset(X, a, b):
-            return (X[b, 0] - X[a, 0],)
-
-        @njit
-        def row(jets, a, i):
-            return jets[a, i, 0], jets[a, i, 1]
-
-        @njit
-        def error(own, jets, b, i, o):
-            return own[0] - jets[b, i, 0] + (own[1] + jets[b, i, 1]) * o[0]
-
-        @njit
-        def more(sums, e, o):
-            return sums[0] + e, sums[1] + e * o[0]
-
-    elif dimension == 2:
-
-        @njit
-        def zeros():
-            return 0.0, 0.0, 0.0
-
-        @njit
-        def offset(X, a, b):
-            return X[b, 0] - X[a, 0], X[b, 1] - X[a, 1]
-
-        @njit
-        def row(jets, a, i):
-            return jets[a, i, 0], jets[a, i, 1], jets[a, i, 2]
-
-        @njit
-        def error(own, jets, b, i, o):
-            along = (own[1] + jets[b, i, 1]) * o[0] + (own[2] + jets[b, i, 2]) * o[1]
-            return own[0] - jets[b, i, 0] + along
-
-        @njit
-        def more(sums, e, o):
-            return sums[0] + e, sums[1] + e * o[0], sums[2] + e * o[1]
-
-    else:
-
-        @njit
-        def zeros():
-            return 0.0, 0.0, 0.0, 0.0
-
-        @njit
-        def offset(X, a, b):
-            return X[b, 0] - X[a, 0], X[b, 1] - X[a, 1], X[b, 2] - X[a, 2]
-
-        @njit
-        def row(jets, a, i):
-            return (
-                jets[a, i, 0],
-                jets[a, i, 1],
-                jets[a, i, 2],
-                jets[a, i, 3],
-            )
-
-        @njit
-        def error(own, jets, b, i, o):
-            along = (own[1] + jets[b, i, 1]) * o[0] + (own[2] + jets[b, i, 2]) * o[1]
-            return own[0] - jets[b, i, 0] + along + (own[3] + jets[b, i, 3]) * o[2]
-
-        @njit
-        def more(sums, e, o):
-            return sums[0] + e, sums[1] + e * o[0], sums[2] + e * o[1], sums[3] + e * o[2]
-
-    return zeros, offset, row, error, more
+@njit
+def _with(sums, e, X_ab):
+    """Sums of e and of e X_ab, with one pair more."""
+    if len(X_ab) == 1:
+        return sums[0] + e, sums[1] + e * X_ab[0]
+    if len(X_ab) == 2:
+        return sums[0] + e, sums[1] + e * X_ab[0], sums[2] + e * X_ab[1]
+    return sums[0] + e, sums[1] + e * X_ab[0], sums[2] + e * X_ab[1], sums[3] + e * X_ab[2]

@@ -1,6 +1,7 @@
-"""Pointwise functions of parts, made ready for the compiler.
+"""Pointwise functions of parts, compiled.
 
-A part imports no compiler: its functions and the helpers that they call are registered from here.
+Parts do not import the compiler: their functions and the helpers that these call are registered
+here.
 """
 
 from __future__ import annotations
@@ -19,26 +20,26 @@ from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.material import Material
 from solidsph.maths.arrays import Tensor
 
-_DEEPEST = 20  # calls within calls; more is taken for a recursion
+_DEEPEST = 20  # nested calls; more is taken for a recursion
 
 
 class NotCompilableError(PortableError):
-    """A pointwise function is outside what the compiler understands."""
+    """A part cannot be compiled; the caller falls back to arrays."""
 
 
 def compiled_flux(formulation: Formulation, material: Material, dimension: int) -> Any:
-    """Compiled (H, params) -> flux(F(H), P(F)) at one point, of these two parts.
+    """Compiled (H, params) -> flux(F(H), P(F)) at one point.
 
     Raises:
         NotCompilableError: one of their functions cannot be compiled.
     """
-    law = _flux(dimension, formulation.deformation_gradient, material.first_piola, formulation.flux)
+    law = _flux(formulation.deformation_gradient, material.first_piola, formulation.flux)
     _try(law, tensor_type(dimension), numbers_type(len(material.params)))
     return law
 
 
 def compiled_function(function: Callable[..., Any], *arguments: Any) -> Any:
-    """A pointwise function for use in compiled loops, tried on arguments of these types.
+    """A compiled pointwise function, for arguments of these types.
 
     Raises:
         NotCompilableError: it cannot be compiled.
@@ -72,18 +73,30 @@ def _call(function: Callable[..., Any]) -> Any:
 
 @njit
 def no_law(H: Tensor, params: tuple[float, ...]) -> Tensor:
-    """H itself, where the gradient alone is wanted."""
+    """H itself, if only the gradient is needed."""
     return H
 
 
-# By the identity of the functions: a process compiles each combination once.
+@njit
+def numbers(T: Tensor) -> Tensor:
+    """The tensor with all components as floats: a constant component may be of another type."""
+    if len(T) == 1:
+        return ((float(T[0][0]),),)
+    if len(T) == 2:
+        return ((float(T[0][0]), float(T[0][1])), (float(T[1][0]), float(T[1][1])))
+    return (
+        (float(T[0][0]), float(T[0][1]), float(T[0][2])),
+        (float(T[1][0]), float(T[1][1]), float(T[1][2])),
+        (float(T[2][0]), float(T[2][1]), float(T[2][2])),
+    )
+
+
+# Cached by the identity of the functions: a process compiles each combination once.
 @cache
-def _flux(dimension: int, deformation_gradient: Any, first_piola: Any, flux: Any) -> Any:
+def _flux(deformation_gradient: Any, first_piola: Any, flux: Any) -> Any:
     F_of, P_of, T_of = (registered(f) for f in (deformation_gradient, first_piola, flux))
 
-    numbers = NUMBERS[dimension]
-
-    # What divides by zero is infinite or undefined, as it is for arrays, and no error.
+    # Division by zero is infinite or undefined, as for arrays, and no error.
     @njit(error_model="numpy")
     def law(H: Tensor, params: tuple[float, ...]) -> Tensor:
         F = F_of(H)
@@ -92,36 +105,12 @@ def _flux(dimension: int, deformation_gradient: Any, first_piola: Any, flux: Any
     return law
 
 
-# A constant component may be of another type; loops need one for all.
-@njit
-def _numbers_1(T: Tensor) -> Tensor:
-    return ((float(T[0][0]),),)
-
-
-@njit
-def _numbers_2(T: Tensor) -> Tensor:
-    return ((float(T[0][0]), float(T[0][1])), (float(T[1][0]), float(T[1][1])))
-
-
-@njit
-def _numbers_3(T: Tensor) -> Tensor:
-    return (
-        (float(T[0][0]), float(T[0][1]), float(T[0][2])),
-        (float(T[1][0]), float(T[1][1]), float(T[1][2])),
-        (float(T[2][0]), float(T[2][1]), float(T[2][2])),
-    )
-
-
-NUMBERS = {1: _numbers_1, 2: _numbers_2, 3: _numbers_3}
-"""Compiled tensor -> the same, all components of one type; by dimension."""
-
-
 @cache
 def registered(function: Callable[..., Any], depth: int = 0) -> Any:
-    """The same function, known to the compiler with every plain function that it calls.
+    """The function, registered with the compiler along with every plain function that it calls.
 
     Raises:
-        NotCompilableError: it is no plain function, or calls itself.
+        NotCompilableError: it is not a plain function, or calls itself.
     """
     if not isinstance(function, FunctionType):
         raise NotCompilableError(f"{function!r} is not a plain function")
@@ -133,20 +122,20 @@ def registered(function: Callable[..., Any], depth: int = 0) -> Any:
 
 
 def _called(function: FunctionType) -> Iterator[FunctionType]:
-    """Plain functions that the names in a function's code stand for, modules looked through."""
+    """Plain functions that a function refers to by name, also in modules."""
     names = set(_names(function.__code__))
     known = [function.__globals__[name] for name in names if name in function.__globals__]
     known += [cell.cell_contents for cell in function.__closure__ or ()]
     for value in known:
         if isinstance(value, FunctionType):
             yield value
-        # NumPy's functions are the compiler's own business.
+        # The compiler knows NumPy's functions.
         elif isinstance(value, ModuleType) and value.__name__.split(".")[0] not in (
             "numpy",
             "math",
         ):
             inside = (vars(value).get(name) for name in names)
-            yield from (one for one in inside if isinstance(one, FunctionType))
+            yield from (inner for inner in inside if isinstance(inner, FunctionType))
 
 
 def _names(code: CodeType) -> Iterator[str]:

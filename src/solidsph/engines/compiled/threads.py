@@ -1,4 +1,4 @@
-"""Threads that share compiled loops. A fork of the process that started them has none of them."""
+"""Threads of compiled loops, which do not exist in a fork of the process that started them."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from numba import get_num_threads
 
 from solidsph.errors import ForkError
 
-# The process in which they were started; none if they were not.
+# Id of the process in which they were started; empty if they were not.
 _started_in: list[int] = []
 
 
 def started() -> int:
-    """How many there are; they are started if they were not.
+    """Number of threads, which are started if necessary.
 
     Raises:
-        ForkError: this process is a fork of the one that they were started in.
+        ForkError: this process is a fork of the one that started them.
     """
     check_alive()
     count = int(get_num_threads())
@@ -26,10 +26,10 @@ def started() -> int:
 
 
 def check_alive() -> None:
-    """That a loop that several threads share can be run: it would never end without them.
+    """Check that threads can run; a loop would otherwise wait for them forever.
 
     Raises:
-        ForkError: it cannot, in a fork.
+        ForkError: this process is a fork of the one that started them.
     """
     if _started_in and _started_in[0] != os.getpid():
         raise ForkError(

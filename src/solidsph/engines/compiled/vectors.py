@@ -1,4 +1,4 @@
-"""Vectors and tensors as nested tuples of numbers, which compiled loops keep in registers."""
+"""Vectors and tensors as nested tuples, which compiled loops keep in registers."""
 
 from __future__ import annotations
 

@@ -43,8 +43,13 @@ _LARGEST = "sleep: largest speed"
 def check_sleep(simulation: BuiltScene) -> None:
     """Raise SceneError if a part of the scene cannot sleep."""
     dynamics = simulation.dynamics
-    dynamics.internal.check_parts()
     count = dynamics.particles.count
+    if dynamics.internal.part(np.empty(0, dtype=np.intp)) is None:
+        raise SceneError(
+            f"sleep: {type(dynamics.internal).__name__} cannot form the forces of some particles "
+            "alone; use one body of the total Lagrangian form whose material has no history, "
+            "without ghosts, or leave [sleep] out"
+        )
     empty, awake = Subset.of(np.empty(0, dtype=np.intp), count), np.zeros(count, bool)
     constraints = [(term, term.part(empty, awake)) for term in dynamics.constraints]
     for term, part in (*constraints, *((load, load.part(empty)) for load in dynamics.loads)):
@@ -183,6 +188,7 @@ class SleepingLoop(TimeLoop):
         asleep = ~awake[slabs.of]
         moving = np.flatnonzero(~asleep[chosen.particles])
         internal = whole.internal.part(chosen.particles)
+        assert internal is not None, "`check_sleep` has refused it"
         still = np.flatnonzero(asleep[chosen.particles])
         u = full.positions[chosen.particles] - whole.particles.positions[chosen.particles]
         constraints = [term.part(chosen, asleep) for term in whole.constraints]

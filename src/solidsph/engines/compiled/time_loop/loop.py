@@ -1,4 +1,4 @@
-"""The compiled time loop: whole steps without Python between two outputs."""
+"""The compiled time loop: whole steps between two outputs as one compiled function."""
 
 from __future__ import annotations
 
@@ -10,23 +10,25 @@ import attrs
 import numpy as np
 from numba import njit, prange, types
 
-from solidsph.engines.compiled.chain import chain
-from solidsph.engines.compiled.internal import Internal, internal_forces
-from solidsph.engines.compiled.loads import PASSES, LoadData, LoadPass, load_pass
-from solidsph.engines.compiled.motions import (
-    Following,
-    MotionWords,
-    Scheduled,
-    motion_data,
-    motion_words,
-)
+from solidsph.engines.compiled.constants import PER_PARTICLE
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function
-from solidsph.engines.compiled.shares import thread_count
-from solidsph.interfaces.compilable_terms import (
-    LinearExtension,
-    ScheduledConstraint,
-    ScheduledLoad,
+from solidsph.engines.compiled.reference.partition import thread_count
+from solidsph.engines.compiled.time_loop.call_each import call_each
+from solidsph.engines.compiled.time_loop.constraints import (
+    ConstraintCalls,
+    FollowingGhosts,
+    ScheduledMotion,
+    constraint_calls,
+    constraint_data,
 )
+from solidsph.engines.compiled.time_loop.internal_forces import Internal, internal_forces
+from solidsph.engines.compiled.time_loop.loads import (
+    LOAD_KINDS,
+    CompiledLoad,
+    LoadData,
+    compiled_load,
+)
+from solidsph.interfaces.compilable_terms import LinearExtension, ScheduledConstraint, ScheduledLoad
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
@@ -36,15 +38,12 @@ from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 
 if TYPE_CHECKING:
-    from solidsph.engines.compiled.compiled_body import CompiledBody
+    from solidsph.engines.compiled.reference.body import ReferenceBody
 
-# Operations for every particle in a step, beside those for pairs.
-_PER_PARTICLE = 10
-
-# Numbers in the tables of what varies in time, for the steps that go together.
+# Largest number of entries in the tables of scheduled values, for the steps that go together.
 _TABLE = 1 << 18
 
-# Operations of about a nanosecond in these steps: an interruption waits for so long.
+# Largest number of operations of about a nanosecond in these steps: interruptions wait for them.
 _AT_ONCE = 3e8
 
 
@@ -55,66 +54,66 @@ class _Moving(NamedTuple):
     v: Array  # velocity [m/s]
     a: Array  # acceleration [m/s^2]
     h: Array  # mean velocity of the last step [m/s]
-    path: Array  # way of the last step [m]
+    path: Array  # displacement in the last step [m]
     total: Array  # force [N]
 
 
 def are_compilable(
-    bodies: Sequence[CompiledBody],
+    bodies: Sequence[ReferenceBody],
     conditions: Sequence[StressTerm],
     equation: EquationOfMotion,
     integrator: Integrator,
 ) -> bool:
-    """Whether everything in a step is of a kind that this loop knows; then only a formula that
-    does not compile can be in its way."""
-    kinds = tuple(one.kind for one in PASSES)
+    """True if everything in a step is of a compilable kind, though a formula may still fail."""
+    kinds = tuple(kind.kind for kind in LOAD_KINDS)
     labels = [c.label for c in (*equation.loads, *equation.constraints)]
     fused = not conditions and all(body.fused for body in bodies)
-    alone = len(bodies) == 1 and all(isinstance(one, LinearExtension) for one in conditions)
+    alone = len(bodies) == 1 and all(isinstance(term, LinearExtension) for term in conditions)
     return (
         isinstance(integrator, PointwiseIntegrator)
         and (fused or alone)
         and all(isinstance(load, kinds) for load in equation.loads)
         and all(labels.count(load.label) == 1 for load in equation.loads)
         and all(
-            isinstance(one, (ScheduledConstraint, LinearExtension)) for one in equation.constraints
+            isinstance(term, (ScheduledConstraint, LinearExtension))
+            for term in equation.constraints
         )
     )
 
 
 def compiled_loop(
-    bodies: Sequence[CompiledBody],
+    bodies: Sequence[ReferenceBody],
     conditions: Sequence[StressTerm],
     sums: InternalForces,
     equation: EquationOfMotion,
     integrator: Integrator,
 ) -> TimeLoop:
-    """The loop for these prepared bodies, conditions on their stress, and the scene's equation.
+    """The time loop for prepared bodies, conditions on their stress, and an equation of motion.
 
     `sums` are the forces of the same bodies, one evaluation at a time.
 
     Raises:
-        NotCompilableError: one of the parts is not of a declared kind, or does not compile.
+        NotCompilableError: a part is not of a compilable kind, or does not compile.
     """
     if not isinstance(integrator, PointwiseIntegrator):
         raise NotCompilableError(f"integrator {type(integrator).__name__} is not pointwise")
     particles = equation.particles
     d = particles.dimension
-    threads = thread_count(_PER_PARTICLE * particles.count)  # of what is done particle by particle
+    threads = thread_count(PER_PARTICLE * particles.count)  # for loops over particles
     for body in bodies:
-        body.gradient_shares.check()
+        body.gradient_partition.check()
     internal = internal_forces(bodies, conditions)
-    loads = [load_pass(load, particles.positions, threads > 1) for load in equation.loads]
-    words = [motion_words(motion, d) for motion in equation.constraints]
-    by_word = [tuple(one[k] for one in words) for k in range(len(MotionWords._fields))]
+    loads = [compiled_load(load, particles.positions, threads > 1) for load in equation.loads]
+    calls = [constraint_calls(motion, d) for motion in equation.constraints]
+    by_call = [tuple(call[k] for call in calls) for k in range(len(ConstraintCalls._fields))]
     steps = _steps(
         d,
         threads > 1,
-        compiled_function(integrator.leap, *[types.float64] * 4),
-        compiled_function(integrator.arrive, *[types.float64] * 3),
+        compiled_function(integrator.mean_velocity, *[types.float64] * 4),
+        compiled_function(integrator.end_velocity, *[types.float64] * 3),
         internal.forces,
-        chain(tuple(one.apply for one in loads)),
-        MotionWords(*(chain(functions) for functions in by_word)),
+        call_each(tuple(load.apply for load in loads)),
+        ConstraintCalls(*(call_each(functions) for functions in by_call)),
     )
     return CompiledLoop(sums, equation, internal, loads, steps, threads)
 
@@ -127,10 +126,10 @@ class CompiledLoop(TimeLoop):
     sums: InternalForces
     equation: EquationOfMotion
     internal: Internal
-    loads: Sequence[LoadPass]
+    loads: Sequence[CompiledLoad]
     steps: Any  # compiled
     threads: int
-    most_steps: int = attrs.field(init=False)  # for which tables are made at once
+    most_steps: int = attrs.field(init=False)  # that share one set of tables
 
     @most_steps.default
     def _within_memory(self) -> int:
@@ -142,7 +141,7 @@ class CompiledLoop(TimeLoop):
             for k in range(3)
         ]
         width = sum(int(part[0].size) for part in parts if len(part) > 1)
-        work = _PER_PARTICLE * self.equation.particles.count + 2 * self.sums.pair_count
+        work = PER_PARTICLE * self.equation.particles.count + 2 * self.sums.pair_count
         return max(1, min(_TABLE // max(1, width), int(_AT_ONCE / work)))
 
     @property
@@ -207,20 +206,20 @@ class CompiledLoop(TimeLoop):
 
 @attrs.define(eq=False)
 class _Accounts:
-    """Forces and work of every load and motion, between the loop's arrays and those of State."""
+    """Forces and work of every load and constraint, between the loop's arrays and a state's."""
 
     sums: InternalForces
     equation: EquationOfMotion
     work: dict[str, float]  # by account [J]
     load_forces: list[Array]  # (k, d) of each load, on its particles [N]
-    reactions: list[Array]  # (m,) of each motion [N]; nothing of one that ghosts follow by
+    reactions: list[Array]  # (m,) of each constraint [N]; empty for ghosts that follow
 
     @classmethod
     def of(cls, sums: InternalForces, equation: EquationOfMotion, state: State) -> _Accounts:
-        """The accounts as a state holds them."""
+        """The accounts of a state."""
         u = state.positions - equation.particles.positions
         loads = [state.applied[load.label][load.particles] for load in equation.loads]
-        # An account may hold more than the reaction: what ghosts of the same handler hand on.
+        # An account also holds the forces that ghosts of the same handler return.
         handed = _handed_on(sums, equation, state.time, u, loads)
         reactions = [
             (state.applied[motion.label] - handed.get(motion.label, 0.0))[motion.entries]
@@ -231,28 +230,30 @@ class _Accounts:
         return cls(sums, equation, dict(state.work), loads, reactions)
 
     def loads(self, own: Sequence[Any], threads: int) -> tuple[LoadData, ...]:
-        """What the loop holds of the loads, with what each kind needs."""
+        """The data of the loads, with the `own` data of each."""
         each = zip(self.equation.loads, self.load_forces, own, strict=True)
         return tuple(
             LoadData(load.particles, before, np.zeros(threads), one) for load, before, one in each
         )
 
-    def motions(self, times: Array) -> tuple[Scheduled | Following, ...]:
-        """What the loop holds of the motions."""
+    def motions(self, times: Array) -> tuple[ScheduledMotion | FollowingGhosts, ...]:
+        """The data of the constraints."""
         pairs = zip(self.equation.constraints, self.reactions, strict=True)
         return tuple(
-            motion_data(motion, times, before, self.equation.step_size) for motion, before in pairs
+            constraint_data(motion, times, before, self.equation.step_size)
+            for motion, before in pairs
         )
 
-    def settle(self, loads: Sequence[LoadData], motions: Sequence[Scheduled | Following]) -> None:
-        """Take back what the loop has done with them."""
+    def settle(
+        self, loads: Sequence[LoadData], motions: Sequence[ScheduledMotion | FollowingGhosts]
+    ) -> None:
+        """Add the work done in the loop; it has updated the forces in place."""
         conditions = (*self.equation.loads, *self.equation.constraints)
         for condition, part in zip(conditions, (*loads, *motions), strict=True):
             self.work[condition.label] += float(part.work.sum())
-        # The arrays `before` are the ones handed out: the loop has written on them.
 
     def applied(self, time: float, u: Array) -> Mapping[str, Array]:
-        """Force of every account on every particle, (n, d) [N], at displacements u (n, d)."""
+        """Force of every account on every particle, (n, d) [N], at displacements u (n, d) [m]."""
         equation = self.equation
         applied = {c.label: np.zeros_like(u) for c in (*equation.loads, *equation.constraints)}
         for load, force in zip(equation.loads, self.load_forces, strict=True):
@@ -272,7 +273,7 @@ def _handed_on(
     u: Array,
     load_forces: Sequence[Array],
 ) -> Mapping[str, Array]:
-    """What ghosts take from themselves and give to those they follow, (n, d) [N] by account."""
+    """Forces that ghosts return to the particles they follow, (n, d) [N] by account."""
     extensions = [c for c in equation.constraints if isinstance(c, GhostConstraint)]
     if not extensions:
         return {}
@@ -292,11 +293,11 @@ def _handed_on(
 def _steps(
     dimension: int,
     threaded: bool,
-    leap: Any,
-    arrive: Any,
+    mean_velocity: Any,
+    end_velocity: Any,
     internal: Any,
     loads: Any,
-    motion: MotionWords,
+    motion: ConstraintCalls,
 ) -> Any:
     move, hand_on, react = motion
 
@@ -307,11 +308,11 @@ def _steps(
         for t in prange(threads):
             for p in range(t * n // threads, (t + 1) * n // threads):
                 for i in range(dimension):
-                    mean = leap(v[p, i], a[p, i], h[p, i], dt)
+                    mean = mean_velocity(v[p, i], a[p, i], h[p, i], dt)
                     h[p, i] = mean
                     path[p, i] = dt * mean
                     u[p, i] += dt * mean
-                    v[p, i] = arrive(mean, a[p, i], dt)
+                    v[p, i] = end_velocity(mean, a[p, i], dt)
 
     @njit(parallel=threaded)
     def kick(threads, dt, moving, inverse_masses):
@@ -321,7 +322,7 @@ def _steps(
             for p in range(t * n // threads, (t + 1) * n // threads):
                 for i in range(dimension):
                     a[p, i] = total[p, i] * inverse_masses[p]
-                    v[p, i] = arrive(h[p, i], a[p, i], dt)
+                    v[p, i] = end_velocity(h[p, i], a[p, i], dt)
 
     @njit
     def steps(count, dt, threads, moving, masses, inverse_masses, bodies, load_parts, motion_parts):

@@ -1,4 +1,4 @@
-"""Loads in the compiled loop: their forces, and the work that they do."""
+"""Loads in the compiled loop: their forces and their work."""
 
 from __future__ import annotations
 
@@ -11,13 +11,9 @@ from numba import njit, prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.chain import chain
-from solidsph.engines.compiled.hourglass_sweeps import HourglassSweeps, Sweeps, body_sweep
-from solidsph.engines.compiled.pointwise import (
-    NotCompilableError,
-    compiled_function,
-    numbers_type,
-)
+from solidsph.engines.compiled.hourglass_sweeps import HourglassArrays, HourglassSweeps, body_sweep
+from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function, numbers_type
+from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.vectors import ROW, moved
 from solidsph.interfaces.compilable_terms import (
     HourglassLoad,
@@ -25,35 +21,34 @@ from solidsph.interfaces.compilable_terms import (
     PointwiseLoad,
     ScheduledLoad,
 )
-from solidsph.interfaces.hourglass_energy import HourglassOperator
-from solidsph.interfaces.plan import Piece
+from solidsph.interfaces.plan import CompilationUnit
 from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array, Indices
 
 
 class LoadData(NamedTuple):
-    """What the loop holds of one load; `own` is what its kind needs."""
+    """The data of one load; `own` is specific to its kind."""
 
     particles: Indices  # (k,)
     before: Array  # (k, d) force at the end of the last step [N]
-    work: Array  # (threads,) done so far, by thread [J]
+    work: Array  # (threads,) so far, by thread [J]
     own: Any
 
 
-class Scheduled(NamedTuple):
+class ScheduledForces(NamedTuple):
     """Forces known ahead."""
 
     table: Array  # (t, k, d) for the steps to come, or (1, k, d) for all of them [N]
 
 
-class Pointwise(NamedTuple):
-    """Forces by a formula."""
+class PointwiseData(NamedTuple):
+    """Forces by a formula of each particle."""
 
     reference: Array  # (n, d) X [m]
     values: Array  # (k, m)
 
 
-class Paired(NamedTuple):
+class PairData(NamedTuple):
     """Forces by a formula of pairs."""
 
     reference: Array  # (n, d) X [m]
@@ -65,93 +60,98 @@ class Paired(NamedTuple):
 class HourglassData(NamedTuple):
     """Hourglass forces."""
 
-    bodies: tuple[Sweeps, ...]
-    now: Scheduled  # those of the step in hand
+    bodies: tuple[HourglassArrays, ...]
+    now: ScheduledForces  # of the current step
 
 
-class LoadPass(NamedTuple):
-    """A load made ready for the loop."""
+class CompiledLoad(NamedTuple):
+    """A load prepared for the loop."""
 
     apply: Any  # compiled (load, step, u, v, path, total): total += force, work += that along path
-    own: Callable[[Array], Any]  # times (t,) at which the steps to come end -> what its kind needs
+    own: Callable[[Array], Any]  # times (t,) at which the steps to come end -> `LoadData.own`
 
 
-class Pass(NamedTuple):
-    """How loads of one kind become part of the loop."""
+class LoadKind(NamedTuple):
+    """How loads of one kind are compiled into the loop."""
 
     kind: Any  # a class of loads
-    prepare: Callable[[Any, Array, bool], LoadPass]  # (load, X (n, d), threaded)
-    piece: Piece
-    formula: bool = True  # whether each class of the kind compiles anew
+    prepare: Callable[[Any, Array, bool], CompiledLoad]  # (load, X (n, d), threaded)
+    unit: CompilationUnit
+    formula: bool = True  # True if each class of the kind is compiled separately
 
 
-def pass_of(load: Load) -> Pass:
-    """The pass of a load's kind.
+def kind_of(load: Load) -> LoadKind:
+    """The kind of a load.
 
     Raises:
-        NotCompilableError: the loop knows no such kind.
+        NotCompilableError: the loop does not know its kind.
     """
-    for known in PASSES:
+    for known in LOAD_KINDS:
         if isinstance(load, known.kind):
             return known
-    raise NotCompilableError(f"load {load.label!r} is not of a kind that the loop knows")
+    raise NotCompilableError(f"load {load.label!r} is not of a compilable kind")
 
 
-def load_pass(load: Load, reference: Array, threaded: bool) -> LoadPass:
-    """A load on particles whose X is `reference` (n, d) [m], made ready.
+def compiled_load(load: Load, reference: Array, threaded: bool) -> CompiledLoad:
+    """A load on particles with reference positions (n, d) [m], prepared.
 
     Raises:
-        NotCompilableError: the loop knows no such kind, or its formula does not compile.
+        NotCompilableError: the loop does not know its kind, or its formula does not compile.
     """
-    return pass_of(load).prepare(load, reference, threaded)
+    return kind_of(load).prepare(load, reference, threaded)
 
 
-def _prepare_scheduled(load: ScheduledLoad, reference: Array, threaded: bool) -> LoadPass:
+def _prepare_scheduled(load: ScheduledLoad, reference: Array, threaded: bool) -> CompiledLoad:
     d = reference.shape[1]
-    return LoadPass(
+    return CompiledLoad(
         _accounted(_scheduled(d), d, threaded),
-        lambda times: Scheduled(np.ascontiguousarray(load.schedule(times))),
+        lambda times: ScheduledForces(np.ascontiguousarray(load.schedule(times))),
     )
 
 
-def _prepare_hourglass(load: HourglassLoad, reference: Array, threaded: bool) -> LoadPass:
+def _prepare_hourglass(load: HourglassLoad, reference: Array, threaded: bool) -> CompiledLoad:
     d = reference.shape[1]
-    sweeps = [_sweeps(operator) for operator in load.operators]
+    sweeps = [
+        operator if isinstance(operator, HourglassSweeps) else HourglassSweeps.of(operator.pairs)
+        for operator in load.operators
+    ]
     own = HourglassData(
-        tuple(one.arrays for one in sweeps), Scheduled(np.zeros((1, *reference.shape)))
+        tuple(sweep.arrays for sweep in sweeps), ScheduledForces(np.zeros((1, *reference.shape)))
     )
-    each = chain(tuple(body_sweep(one.sweep) for one in sweeps))
-    return LoadPass(_hourglass(each, _accounted(_scheduled(d), d, threaded)), lambda times: own)
+    each = call_each(tuple(body_sweep(sweep.sweep) for sweep in sweeps))
+    return CompiledLoad(_hourglass(each, _accounted(_scheduled(d), d, threaded)), lambda times: own)
 
 
-def _prepare_pairs(load: PairLoad, reference: Array, threaded: bool) -> LoadPass:
+def _prepare_pairs(load: PairLoad, reference: Array, threaded: bool) -> CompiledLoad:
     d, table = reference.shape[1], load.pairs
     count, vector = table.values.shape[1], numbers_type(d)
     pull = compiled_function(load.pull, vector, vector, numbers_type(count))
-    paired = Paired(reference, table.starts, table.columns, table.values)
-    return LoadPass(_accounted(_paired(pull, d, count), d, threaded), lambda times: paired)
+    paired = PairData(reference, table.starts, table.columns, table.values)
+    return CompiledLoad(_accounted(_paired(pull, d, count), d, threaded), lambda times: paired)
 
 
-def _prepare_pointwise(load: PointwiseLoad, reference: Array, threaded: bool) -> LoadPass:
+def _prepare_pointwise(load: PointwiseLoad, reference: Array, threaded: bool) -> CompiledLoad:
     d, values = reference.shape[1], np.ascontiguousarray(load.values)
     count, vector = values.shape[1], numbers_type(d)
     force = compiled_function(load.force, vector, vector, numbers_type(count))
-    pointwise = Pointwise(reference, values)
-    return LoadPass(_accounted(_pointwise(force, d, count), d, threaded), lambda times: pointwise)
+    pointwise = PointwiseData(reference, values)
+    return CompiledLoad(
+        _accounted(_pointwise(force, d, count), d, threaded), lambda times: pointwise
+    )
 
 
-PASSES = (
-    Pass(ScheduledLoad, _prepare_scheduled, Piece.LOAD, formula=False),
-    Pass(HourglassLoad, _prepare_hourglass, Piece.HOURGLASS_LOAD),
-    Pass(PairLoad, _prepare_pairs, Piece.PAIR_LOAD),
-    Pass(PointwiseLoad, _prepare_pointwise, Piece.LOAD),
+LOAD_KINDS = (
+    LoadKind(ScheduledLoad, _prepare_scheduled, CompilationUnit.LOAD, formula=False),
+    LoadKind(HourglassLoad, _prepare_hourglass, CompilationUnit.HOURGLASS_LOAD),
+    LoadKind(PairLoad, _prepare_pairs, CompilationUnit.PAIR_LOAD),
+    LoadKind(PointwiseLoad, _prepare_pointwise, CompilationUnit.LOAD),
 )
-"""Kinds of load that the loop knows."""
+"""The kinds of load that the loop can compile."""
 
 
 @cache
 def _accounted(fill: Any, dimension: int, threaded: bool) -> Any:
-    # Threads are handed arrays, or arguments that are tuples of them, but no tuple within a tuple.
+    # Threads can take arrays or tuples of arrays as arguments, but no nested tuples.
     @njit(parallel=threaded)
     def add(particles, before, works, own, step, u, v, path, total):
         threads, count = len(works), len(particles)
@@ -206,7 +206,7 @@ def _paired(pull: Any, dimension: int, count: int) -> Any:
         force[:] = 0.0
         for k in range(own.starts[p], own.starts[p + 1]):
             q = own.columns[k]
-            # Differences first: the offset of q from p is then minus that of p from q to the bit.
+            # Differences first, so that the offset of q from p is exactly minus that of p from q.
             apart = moved(row(own.reference, q), -1.0, X_p)
             offset = moved(apart, 1.0, moved(row(u, q), -1.0, u_p))
             velocity = moved(row(v, q), -1.0, v_p)
@@ -215,12 +215,6 @@ def _paired(pull: Any, dimension: int, count: int) -> Any:
                 force[i] += s * offset[i]
 
     return fill
-
-
-def _sweeps(operator: HourglassOperator) -> HourglassSweeps:
-    if isinstance(operator, HourglassSweeps):
-        return operator
-    return HourglassSweeps.of(operator.pairs)
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Internal forces within the compiled loop: one call for all bodies."""
+"""Internal forces in the compiled loop: one call for all bodies."""
 
 from __future__ import annotations
 
@@ -10,82 +10,64 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.chain import chain
 from solidsph.engines.compiled.pointwise import NotCompilableError
-from solidsph.engines.compiled.rows import Rows
+from solidsph.engines.compiled.reference.rows import Rows
+from solidsph.engines.compiled.time_loop.call_each import call_each
+from solidsph.engines.compiled.time_loop.constraints import following
 from solidsph.interfaces.compilable_terms import LinearExtension
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Indices
 
 if TYPE_CHECKING:
-    from solidsph.engines.compiled.compiled_body import CompiledBody
+    from solidsph.engines.compiled.reference.body import ReferenceBody
 
 
-class Fused(NamedTuple):
-    """A body whose stress goes from one pass to the other at once."""
+class BodyData(NamedTuple):
+    """The arrays of one body; those from `force_table` on serve two separate passes."""
 
-    extent: tuple[int, int]  # its first particle, and the one after the last
-    table: Indices
+    extent: tuple[int, int]  # its first particle and the end of its particles
+    table: Indices  # partition of the gathering pass
     rows: Rows
     u: NDArray[Any]  # flat
     params: tuple[float, ...]
     factors: NDArray[Any]
-    buffers: NDArray[Any]
-
-
-class Staged(NamedTuple):
-    """A body whose stress is seen by conditions in between."""
-
-    table: Indices  # of the gathering pass
-    rows: Rows
-    u: NDArray[Any]  # flat
-    params: tuple[float, ...]
-    force_table: Indices  # of the scattering pass
+    buffers: NDArray[Any]  # of the scattering pass
+    force_table: Indices  # partition of the scattering pass
     force_rows: Rows
-    factors: NDArray[Any]
-    buffers: NDArray[Any]
-    stress: Array  # (d, d, n) its own
+    stress: Array  # (d, d, n)
     ghosts: Indices  # (g,)
 
 
-class StressFollowing(NamedTuple):
-    """Ghosts whose stress follows that of others."""
-
-    ghosts: Indices  # (k,)
-    signs: Array  # (k, d)
-    starts: NDArray[np.int32]
-    columns: NDArray[np.int32]
-    weights: Array
-
-
 class Internal(NamedTuple):
-    """Compiled internal forces, and the data that they take."""
+    """Compiled internal forces, and their data."""
 
     forces: Any  # (data, u (n, d), total (n, d)): total = internal forces of all bodies
     data: Any
 
 
-def internal_forces(parts: Sequence[CompiledBody], conditions: Sequence[StressTerm]) -> Internal:
+def internal_forces(parts: Sequence[ReferenceBody], conditions: Sequence[StressTerm]) -> Internal:
     """The internal forces of prepared bodies under these conditions.
 
     Raises:
-        NotCompilableError: a condition is not of a declared kind, or sees several bodies.
+        NotCompilableError: a condition is not of a compilable kind, or there are several bodies.
     """
     if all(part.fused for part in parts) and not conditions:
         functions = tuple(_fused(part.passes.forces) for part in parts)
-        return Internal(chain(functions), tuple(_fused_data(part) for part in parts))
+        return Internal(call_each(functions), tuple(_data(part, staged=False) for part in parts))
     if len(parts) > 1:
         raise NotCompilableError("conditions on the stress of several bodies")
     (part,) = parts
     for condition in conditions:
         if not isinstance(condition, LinearExtension):
-            raise NotCompilableError(f"condition {condition.label!r} is not of a declared kind")
+            raise NotCompilableError(f"condition {condition.label!r} is not of a compilable kind")
     d = part.body.particles.dimension
-    imposed = chain(tuple(_stress_following(d) for _ in conditions))
+    imposed = call_each(tuple(_stress_following(d) for _ in conditions))
     acts = part.body.formulation.divergence.uses_ghost_stress
     forces = _staged(part.passes.stress, imposed, part.spread_pass, acts)
-    followed = tuple(_followed(c) for c in conditions if isinstance(c, LinearExtension))
-    return Internal(forces, (_staged_data(part), followed))
+    extensions = [c for c in conditions if isinstance(c, LinearExtension)]
+    return Internal(
+        forces, (_data(part, staged=True), tuple(following(c, c.stress) for c in extensions))
+    )
 
 
 @cache
@@ -107,19 +89,6 @@ def _fused(forces: Any) -> Any:
     return fused
 
 
-def _fused_data(part: CompiledBody) -> Fused:
-    extent, shares = part.body.extent, part.gradient_shares
-    return Fused(
-        extent=(extent.start, extent.stop),
-        table=shares.table,
-        rows=part.gradient,
-        u=part.u,
-        params=part.body.material.params,
-        factors=part.factors,
-        buffers=shares.buffers,
-    )
-
-
 @cache
 def _staged(stress_pass: Any, imposed: Any, spread: Any, ghosts_act: bool) -> Any:
     @njit
@@ -129,31 +98,33 @@ def _staged(stress_pass: Any, imposed: Any, spread: Any, ghosts_act: bool) -> An
         for p in body.ghosts:
             body.stress[:, :, p] = 0.0
         imposed(followed, body.stress)
-        if not ghosts_act:  # known when this compiles
+        if not ghosts_act:  # a constant of the compilation
             for p in body.ghosts:
                 body.stress[:, :, p] = 0.0
         spread(body.force_table, body.force_rows, body.stress, body.factors, body.buffers, total)
         if ghosts_act:
-            # Ghosts have acted through their stress; nothing acts on them.
+            # Ghosts have acted through their stress; no force acts on them.
             for p in body.ghosts:
                 total[p] = 0.0
 
     return forces
 
 
-def _staged_data(part: CompiledBody) -> Staged:
-    d = part.body.particles.dimension
-    return Staged(
-        table=part.gradient_shares.table,
+def _data(part: ReferenceBody, *, staged: bool) -> BodyData:
+    extent, ghosts = part.body.extent, part.body.particles.ghosts
+    n, d = part.body.particles.positions.shape
+    return BodyData(
+        extent=(extent.start, extent.stop),
+        table=part.gradient_partition.table,
         rows=part.gradient,
         u=part.u,
         params=part.body.material.params,
-        force_table=part.force_shares.table,
-        force_rows=part.force,
         factors=part.factors,
-        buffers=part.force_shares.buffers,
-        stress=np.zeros((d, d, part.body.particles.count)),
-        ghosts=np.flatnonzero(part.body.particles.ghosts),
+        buffers=part.force_partition.buffers,
+        force_table=part.force_partition.table,
+        force_rows=part.force,
+        stress=np.zeros((d, d, n if staged else 0)),
+        ghosts=np.flatnonzero(ghosts),
     )
 
 
@@ -171,8 +142,3 @@ def _stress_following(dimension: int) -> Any:
                     stress[i, j, following.ghosts[k]] = sign * total
 
     return impose
-
-
-def _followed(condition: LinearExtension) -> StressFollowing:
-    B = condition.stress
-    return StressFollowing(condition.ghosts, condition.signs, B.indptr, B.indices, B.data)

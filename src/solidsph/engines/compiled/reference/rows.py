@@ -1,55 +1,77 @@
-"""Rows of weights in little memory: particles with the same stencil share it.
+"""Compressed rows of weights: particles with the same stencil share it.
 
-Particles made by a lattice stand in long runs p, p + 1, ... whose neighbours have the same index
-offsets and the same weights. A run keeps one stencil. The rest is treated row by row, but there too
-many have the row of another, as the first particles of all lines do: each row is kept once.
+On a lattice, long runs of particles p, p + 1, ... have neighbours with the same index offsets and
+weights: a run stores one stencil. The other particles have rows of their own; equal rows, such as
+those of the first particles of all lines, are stored once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.growing import Growing
+from solidsph.engines.compiled.reference.growing import Growing
 from solidsph.maths.arrays import Array, Indices, Mask
-from solidsph.model.neighbours import Pairs
+from solidsph.model.neighbours import Pairs, row_starts
 
-# Relative to the largest weight of a row: below the first a weight is rounding, and below the
-# second so is the difference of two. Positions of a lattice are rounded to 1e-16 of the body's
-# size, so their differences to some 1e-14 of the spacing.
+# Relative to the largest weight of a row: a weight below the first is rounding, and so is a
+# difference of two below the second. Positions on a lattice are rounded to 1e-16 of the body's
+# size, so their differences to about 1e-14 of the spacing.
 _NOTHING = 1e-15
 _SAME = 1e-13
 
-# How many rows are remembered to be compared with those that come. A lattice has as many different
-# ones as there are places within reach of surfaces: some 6 along an axis, some hundreds in all.
+# Number of rows that new rows are compared with. A lattice has as many different rows as there are
+# positions within reach of surfaces: about 6 along an axis, some hundreds in all.
 _KNOWN = 4096
 
-RUN = 128  # most particles of a run that are treated at once, so that their tensors stay in cache
-ROWS = 16  # the same for rows, which have weights of their own
+RUN = 128  # largest block of a run, so that its tensors stay in cache
+ROWS = 16  # largest block of particles with rows of their own
 BAND = 16  # widest band
 
 
 class Rows(NamedTuple):
-    """Weight vectors g_pq of rows p, laid out for the loops over them."""
+    """Weight vectors g_pq of rows p, laid out for loops over blocks."""
 
-    # (b, 3) consecutive particles that are treated at once: the first, how many, and the number
-    # of their stencil, or -1 - k where their own rows begin with row k
+    # (b, 3) blocks of consecutive particles: the first, their number, and their stencil, or -1 - k
+    # if they have rows of their own beginning with row k
     blocks: Indices
-    # (s + 1,), (s + 1,) where each stencil's members, and its bands, begin
-    members: Indices
-    stencils: Indices
+    members: Indices  # (s + 1,) first member of each stencil
+    stencils: Indices  # (s + 1,) first band of each stencil
     offsets: Indices  # (k,) q - p of every member of a stencil, rising
     stencil_weights: Array  # (k, d) [1/m]
-    bands: Indices  # (c, 3) members whose offsets follow each other: first member, offset, width
-    # (r, 2), (m,), (m, d) rows of those that are in no run: where the members of each begin and
-    # end, their q - p, rising, and their weights [1/m]; several may have the same members
-    spans: Indices
-    row_offsets: NDArray[np.int32]
-    row_weights: Array
+    bands: Indices  # (c, 3) members with consecutive offsets: first member, offset, width
+    spans: Indices  # (r, 2) begin and end of each own row; several rows may share their members
+    row_offsets: NDArray[np.int32]  # (m,) q - p of every member of an own row, rising
+    row_weights: Array  # (m, d) [1/m]
+
+    @classmethod
+    def of(
+        cls,
+        blocks: Indices,
+        stencils: Sequence[tuple[Indices, Array]],
+        spans: Indices,
+        row_offsets: NDArray[np.int32],
+        row_weights: Array,
+    ) -> Rows:
+        """Rows of blocks in any order, with the offsets and the weights of each stencil."""
+        members = row_starts(np.array([len(own) for own, _ in stencils], dtype=np.intp))
+        banded = [_bands(own[0], k) for own, k in zip(stencils, members[:-1], strict=True)]
+        weights = [own.astype(row_weights.dtype) for _, own in stencils]
+        return cls(
+            blocks=np.ascontiguousarray(blocks[np.argsort(blocks[:, 0])]),
+            members=members,
+            stencils=row_starts(np.array([len(own) for own in banded], dtype=np.intp)),
+            offsets=np.concatenate([np.empty(0, dtype=np.intp), *(own for own, _ in stencils)]),
+            stencil_weights=np.concatenate([row_weights[:0], *weights]),
+            bands=np.concatenate([np.empty((0, 3), dtype=np.intp), *banded]),
+            spans=spans,
+            row_offsets=row_offsets,
+            row_weights=row_weights,
+        )
 
     @property
     def run_particles(self) -> int:
@@ -58,44 +80,44 @@ class Rows(NamedTuple):
 
     @property
     def run_pairs(self) -> int:
-        """Pairs that are visited by stencils."""
+        """Pairs visited by stencils."""
         _, count, where = self.blocks.T
         run = where >= 0
         return int(count[run] @ np.diff(self.members)[where[run]])
 
     @property
     def row_pairs(self) -> int:
-        """Pairs that are visited by rows, those of members that several share each time."""
+        """Pairs visited by own rows, shared members counted each time."""
         return int((self.spans[:, 1] - self.spans[:, 0]).sum())
 
     @property
     def row_bytes(self) -> int:
-        """Memory of what belongs to rows alone."""
+        """Memory of the own rows [bytes]."""
         return self.spans.nbytes + self.row_offsets.nbytes + self.row_weights.nbytes
 
     @property
     def bytes(self) -> int:
-        """Memory of all arrays."""
+        """Memory of all arrays [bytes]."""
         return sum(array.nbytes for array in self)
 
     def costs(self) -> Array:
-        """Pairs of each block, those of a run counted by what they cost beside a row's, (b,)."""
+        """Cost of each block, (b,), in pairs of own rows; a pair of a run costs 0.4 of one."""
         _, count, where = self.blocks.T
         costs = np.empty(len(self.blocks))
         run = where >= 0
         sizes = np.diff(self.members)
         costs[run] = 0.4 * count[run] * sizes[where[run]]
-        starts = starts_of(self.spans[:, 1] - self.spans[:, 0])
+        starts = row_starts(self.spans[:, 1] - self.spans[:, 0])
         row = -1 - where[~run]
         costs[~run] = starts[row + count[~run]] - starts[row]
         return costs
 
 
 class _Compressor:
-    """Takes chunks of rows and keeps what is new in them."""
+    """Collects chunks of rows and stores what is new in them."""
 
     def __init__(self, dimension: int, dtype: str, shortest_run: int) -> None:
-        self._dtype, self._shortest_run = dtype, shortest_run
+        self._shortest_run = shortest_run
         self._stencils: list[tuple[Indices, Array]] = []
         self._blocks = Growing(3, dtype=np.intp)
         self._spans = Growing(2, dtype=np.intp)
@@ -105,20 +127,20 @@ class _Compressor:
         self._row_count = 0
 
     def add(self, first: int, counts: Indices, columns: Indices, weights: Array) -> None:
-        """Rows `first`, ... with so many pairs each (k,), columns (m,) and weights (m, d)."""
-        starts = np.concatenate([[0], np.cumsum(counts)])
+        """Add rows `first`, ... with `counts` pairs each (k,), columns (m,) and weights (m, d)."""
+        starts = row_starts(counts)
         rows = np.repeat(np.arange(first, first + len(counts)), counts)
         heads = _run_heads(starts, columns - rows, weights, _SAME)
         begin = np.flatnonzero(heads == np.arange(len(heads)))
         length = np.diff([*begin, len(heads)])
-        shared = length >= self._shortest_run
-        for a, n in zip(begin[shared], length[shared], strict=True):
+        partitioned = length >= self._shortest_run
+        for a, n in zip(begin[partitioned], length[partitioned], strict=True):
             own = slice(starts[a], starts[a + 1])
             stencil = self._stencil(columns[own] - (first + a), weights[own])
             parts = -(-n // RUN)
             edges = a + np.arange(parts + 1) * n // parts
             self._add_blocks(first + edges[:-1], np.diff(edges), np.full(parts, stencil))
-        single = np.repeat(~shared, length)
+        single = np.repeat(~partitioned, length)
         self._add_rows(first, single)
         kept = np.repeat(single, counts)
         before = len(self._offsets.so_far())
@@ -133,44 +155,26 @@ class _Compressor:
         self._row_count += len(spans)
 
     def rows(self) -> Rows:
-        """All that was added."""
-        blocks = self._blocks.array()
-        offsets = [one[0] for one in self._stencils]
-        members = starts_of(np.array([len(one) for one in offsets], dtype=np.intp))
-        banded = [bands(one, start) for one, start in zip(offsets, members[:-1], strict=True)]
-        weights = self._weights.array()
-        stencil_weights = [one[1].astype(self._dtype) for one in self._stencils]
-        return Rows(
-            blocks=np.ascontiguousarray(blocks[np.argsort(blocks[:, 0])]),
-            members=members,
-            stencils=starts_of(np.array([len(one) for one in banded], dtype=np.intp)),
-            offsets=np.concatenate([np.empty(0, dtype=np.intp), *offsets]),
-            stencil_weights=np.concatenate([weights[:0], *stencil_weights]),
-            bands=np.concatenate([np.empty((0, 3), dtype=np.intp), *banded]),
-            spans=self._spans.array(),
-            row_offsets=self._offsets.array(),
-            row_weights=weights,
-        )
+        """All rows added so far; nothing can be added any more."""
+        spans, offsets = self._spans.array(), self._offsets.array()
+        return Rows.of(self._blocks.array(), self._stencils, spans, offsets, self._weights.array())
 
     def _stencil(self, offsets: Indices, weights: Array) -> int:
-        # Lines that follow each other often have the same one.
+        # Consecutive lines often have the same one.
         if self._stencils:
             last, values = self._stencils[-1]
             if np.array_equal(last, offsets):
                 close = _SAME * np.abs(values).max()
                 if np.abs(values - weights).max() <= close:
                     return len(self._stencils) - 1
-        # A copy: what comes in is a view of a whole chunk, which would live as long.
+        # A copy, because a view would keep the whole chunk alive.
         self._stencils.append((offsets, weights.copy()))
         return len(self._stencils) - 1
 
     def _add_rows(self, first: int, single: Mask) -> None:
         k = np.flatnonzero(single)
-        # A block ends where the particles do not follow each other, or where it is full.
-        fresh = np.diff(k, prepend=-2) != 1
-        since = np.arange(len(k)) - np.maximum.accumulate(np.where(fresh, np.arange(len(k)), 0))
-        at = np.flatnonzero(since % ROWS == 0)
-        self._add_blocks(first + k[at], np.diff([*at, len(k)]), -1 - (self._row_count + at))
+        at, count = stretches(k, ROWS)
+        self._add_blocks(first + k[at], count, -1 - (self._row_count + at))
 
     def _add_blocks(self, first: Indices, count: Indices, where: Indices) -> None:
         self._blocks.extend(np.stack([first, count, where], axis=1))
@@ -184,8 +188,8 @@ def compressed(
     Args:
         chunks: pairs of consecutive particles, and their weights.
         dimension: d.
-        dtype: number type in which the weights are kept.
-        shortest_run: fewest particles for which a stencil pays.
+        dtype: number type in which the weights are stored.
+        shortest_run: smallest number of particles for which a stencil pays.
     """
     compressor = _Compressor(dimension, dtype, shortest_run)
     for pairs, weights in chunks:
@@ -199,41 +203,24 @@ def compressed(
     return compressor.rows()
 
 
-def in_chunks(pairs: Pairs, weights: Array, rows: int = 2048) -> Iterator[tuple[Pairs, Array]]:
-    """A whole list of pairs and its weights (m, d), some rows at a time."""
-    for first in range(0, pairs.row_count, rows):
-        starts = pairs.starts[first : first + rows + 1]
-        own = slice(starts[0], starts[-1])
-        part = Pairs(
-            starts=starts - starts[0],
-            rows=pairs.rows[own],
-            columns=pairs.columns[own],
-            offsets=pairs.offsets[own],
-            distances=pairs.distances[own],
-        )
-        yield part, weights[own]
+def stretches(numbers: Indices, longest: int) -> tuple[Indices, Indices]:
+    """First place (k,) and length (k,) of stretches of consecutive integers, cut at `longest`."""
+    places = np.arange(len(numbers))
+    fresh = np.diff(numbers, prepend=numbers[:1] - 2) != 1
+    since = places - np.maximum.accumulate(np.where(fresh, places, 0))
+    first = np.flatnonzero(since % longest == 0)
+    return first, np.diff([*first, len(numbers)])
 
 
-def starts_of(lengths: Indices) -> Indices:
-    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.intp)
-
-
-def bands(offsets: Indices, start: int) -> Indices:
-    """Stretches of offsets that follow each other, (c, 3): first member, offset, width.
-
-    `start` is the first member of all.
-    """
-    fresh = np.diff(offsets, prepend=offsets[:1] - 2) != 1
-    since = np.arange(len(offsets))
-    since = since - np.maximum.accumulate(np.where(fresh, since, 0))
-    first = np.flatnonzero(since % BAND == 0)
-    width = np.diff([*first, len(offsets)])
+def _bands(offsets: Indices, start: int) -> Indices:
+    """Stretches of consecutive offsets, (c, 3): member from `start` on, offset, width."""
+    first, width = stretches(offsets, BAND)
     return np.stack([start + first, offsets[first], width], axis=1).astype(np.intp)
 
 
 @njit
 def _run_heads(starts: Indices, offsets: Indices, weights: Array, tolerance: float) -> Indices:
-    """For every row the first of those before it, without a gap, that have its stencil, (k,)."""
+    """For every row the first row of the run with the same stencil that it belongs to, (k,)."""
     heads = np.empty(len(starts) - 1, np.intp)
     head, largest = -1, 0.0
     for p in range(len(heads)):
@@ -250,13 +237,13 @@ def _run_heads(starts: Indices, offsets: Indices, weights: Array, tolerance: flo
 def _each_once(
     counts: Indices, first: int, offsets: Indices, weights: Array, known: Indices
 ) -> tuple[Indices, int]:
-    """Where the members of each new row begin and end, (k, 2), and how many members are kept.
+    """Begin and end of the members of each new row, (k, 2), and the number of members kept.
 
-    The new rows, of so many members each, stand in `offsets` and `weights` from `first` on. What
-    one of the `known` rows (h, 2) says already is dropped, and the others close up.
+    The new rows, with `counts` members each, are in `offsets` and `weights` from `first` on. A row
+    that equals one of the `known` rows (h, 2) is dropped, and the others close up.
     """
     spans = np.empty((len(counts), 2), np.intp)
-    start = end = first  # where the next row stands, and where it is to go
+    start = end = first  # of the next row now, and after dropping
     for row in range(len(counts)):
         n = counts[row]
         place = np.intp(n)

@@ -1,4 +1,4 @@
-"""The kernel at all pairs of moving particles, by its author's functions compiled."""
+"""Kernel values at all pairs of moving particles, by the compiled functions of the kernel."""
 
 from __future__ import annotations
 
@@ -8,12 +8,8 @@ from typing import Any, TypeAlias
 
 from numba import njit, types
 
-from solidsph.engines.compiled.cells import Near
-from solidsph.engines.compiled.pointwise import (
-    NotCompilableError,
-    compiled_function,
-    numbers_type,
-)
+from solidsph.engines.compiled.moving.search import Near
+from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function, numbers_type
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.smoothing_kernel import COMPLEX_STEP, SmoothingKernel
 from solidsph.maths.arrays import Array
@@ -23,7 +19,7 @@ KernelPass: TypeAlias = Callable[[Near, Array, Array], None]
 
 
 def kernel_pass(smoothing: SmoothingKernel) -> KernelPass:
-    """W and W'(r) / r, 0 at r = 0, as `SmoothingKernel` has them; by its arrays if need be."""
+    """Values as of `SmoothingKernel`, compiled, or by its arrays if the kernel does not compile."""
     try:
         loop = _loop(*_functions(smoothing.kernel))
     except NotCompilableError:
@@ -59,7 +55,7 @@ def _functions(kernel: Kernel) -> tuple[Any, Any]:
 
 @cache
 def _stepped(profile: Any) -> Any:
-    """The derivative by a step along the imaginary axis."""
+    """The derivative by a complex step."""
 
     @njit(error_model="numpy")
     def slope(q, params):

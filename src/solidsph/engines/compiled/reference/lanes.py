@@ -1,11 +1,11 @@
-"""Lanes: several numbers that stand side by side in an array, loaded and multiplied as one.
+"""Lanes: consecutive numbers of an array, loaded and multiplied as one (explicit SIMD).
 
-The compiler is not left to find out what can be done side by side: sums over neighbours keep their
-accumulators in vector registers only if they are written so. Where a machine's registers are
-narrower than the lanes asked for, LLVM takes several.
+The vectorisation is not left to the compiler: sums over neighbours keep their accumulators in
+vector registers only if they are written so. If the registers of a machine are narrower than the
+lanes, LLVM uses several.
 
-A field of vectors is flat; so are the d planes of a field of tensors, plane k holding column k.
-Loops know vectors as lanes, and tensors as tuples of d lanes, one a column.
+A field of vectors is flat; so are the d planes of a field of tensors, with column k in plane k.
+Loops treat vectors as lanes, and tensors as tuples of d lanes, one per column.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class _LanesModel(models.PrimitiveModel):
         super().__init__(manager, lanes, ir.VectorType(element, lanes.count))
 
 
-class Words(NamedTuple):
-    """What compiled loops say about lanes; `at` counts the elements of a flat array."""
+class LaneOperations(NamedTuple):
+    """Operations on lanes for compiled loops; `at` is an index into a flat array."""
 
     load: Any  # (array, at) -> vector
     store: Any  # (array, at, vector)
@@ -52,7 +52,7 @@ class Words(NamedTuple):
 
 
 def register_bytes() -> int:
-    """Width of this machine's vector registers."""
+    """Width of the vector registers of this machine [bytes]."""
     features = binding.get_host_cpu_features()
     if features.get("avx512f"):
         return 64
@@ -60,8 +60,8 @@ def register_bytes() -> int:
 
 
 @cache
-def words(dtype: str, count: int, dimension: int) -> Words:
-    """The words for lanes of `count` numbers of type `dtype`, and tensors of a dimension."""
+def lane_operations(dtype: str, count: int, dimension: int) -> LaneOperations:
+    """The operations for lanes of `count` numbers of type `dtype`, and tensors of a dimension."""
     element = from_dtype(np.dtype(dtype))
     lanes = Lanes(element, count)
     tensor = types.UniTuple(lanes, dimension)
@@ -91,7 +91,7 @@ def words(dtype: str, count: int, dimension: int) -> Words:
         return value
 
     def add_product(builder: Any, a: Any, b: Any, c: Any) -> Any:
-        # May be rounded once, where the machine can do both at once; nothing else is reordered.
+        # May be rounded once by a fused multiply-add; nothing else is reordered.
         product = builder.fmul(b, c, flags=("contract",))
         return builder.fadd(a, product, flags=("contract",))
 
@@ -191,4 +191,4 @@ def words(dtype: str, count: int, dimension: int) -> Words:
 
         return tensor(array, types.intp, types.intp), code
 
-    return Words(load, store, zeros, weight, outer, inner, total, put, get)
+    return LaneOperations(load, store, zeros, weight, outer, inner, total, put, get)

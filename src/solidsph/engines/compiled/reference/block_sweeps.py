@@ -1,4 +1,4 @@
-"""Sweeps: loops over blocks of rows, from displacements to stress and from stress to forces."""
+"""Loops over blocks of rows, from displacements to stress and from stress to forces."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from solidsph.engines.compiled.blocks import STRIDE, block_loops
+from solidsph.engines.compiled.constants import STRIDE
+from solidsph.engines.compiled.reference.blocks import block_loops
 
 
-class Sweeps(NamedTuple):
+class BlockSweeps(NamedTuple):
     """Compiled loops over the blocks `first` to `last` of `rows`.
 
     `u` and `f` are flat fields; in `f` particle 0 would stand at `shift`. `factors` (n,) multiply
@@ -23,7 +24,7 @@ class Sweeps(NamedTuple):
 
 
 @cache
-def sweeps(dimension: int, dtype: str, law: Any) -> Sweeps:
+def block_sweeps(dimension: int, dtype: str, law: Any) -> BlockSweeps:
     """Loops for one dimension, number type and compiled law (H, params) -> T."""
     d, D = dimension, STRIDE[dimension]
     gather, scatter, tensor, margin, plane = block_loops(dimension, dtype)
@@ -54,7 +55,7 @@ def sweeps(dimension: int, dtype: str, law: Any) -> Sweeps:
                     for k in range(d):
                         out[i, k, start + slot] = T[i][k]
 
-    return Sweeps(forces, stress)
+    return BlockSweeps(forces, stress)
 
 
 @cache

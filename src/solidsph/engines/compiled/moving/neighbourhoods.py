@@ -1,4 +1,4 @@
-"""What moving particles have around them, in rows for loops over the neighbours of each."""
+"""Neighbours of moving particles, in rows for loops over the neighbours of each."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.cells import Near
+from solidsph.engines.compiled.moving.search import Near
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.neighbours import Pairs
 
 
 class Neighbourhoods(NamedTuple):
-    """Ordered pairs in rows, as in `Pairs`: q rising, p among them. Arrays may be longer than m."""
+    """Ordered pairs in rows, as in `Pairs`, self pairs included. Arrays may be longer than m."""
 
     starts: Indices  # (n + 1,) row p is starts[p] : starts[p + 1]; the last is m
     own: Indices  # (n,) place of (p, p)
@@ -28,7 +28,7 @@ class Neighbourhoods(NamedTuple):
 
     @classmethod
     def with_room(cls, particles: int, pairs: int) -> Neighbourhoods:
-        """Arrays for so many particles and near pairs p < q, to be filled."""
+        """Arrays for these numbers of particles and of near pairs p < q, to be filled."""
         m = particles + 2 * pairs
         return cls(
             np.empty(particles + 1, np.intp),
@@ -38,10 +38,10 @@ class Neighbourhoods(NamedTuple):
         )
 
     def pairs(self, positions: Array) -> Pairs:
-        """The same for array functions."""
+        """The pairs for functions of arrays."""
         rows = np.repeat(np.arange(len(positions)), np.diff(self.starts))
         columns = self.columns[: self.pair_count].astype(np.intp)
-        with np.errstate(all="ignore"):  # a particle may be nowhere
+        with np.errstate(all="ignore"):  # a position may not be finite
             offsets = positions[columns] - positions[rows]
         return Pairs(
             starts=self.starts,
@@ -52,9 +52,18 @@ class Neighbourhoods(NamedTuple):
         )
 
 
+class Place(NamedTuple):
+    """Everything that the current positions determine."""
+
+    rows: Neighbourhoods
+    positions: Array  # (n, d) x [m]
+    cells: Array  # (n,) weights in sums over neighbours [m^d]
+    volumes: Array  # (n,) [m^d]
+
+
 @njit
 def fill(near: Near, slopes: Array, rows: Neighbourhoods) -> None:
-    """rows = both directions of the near pairs, and the pairs (p, p)."""
+    """Fill `rows` with both directions of the near pairs and with the self pairs."""
     n = len(rows.own)
     rows.own[:] = 0
     for k in range(near.starts[n]):
@@ -65,7 +74,7 @@ def fill(near: Near, slopes: Array, rows: Neighbourhoods) -> None:
         cursor[p] = rows.starts[p]
         rows.own[p] += rows.starts[p]
         rows.starts[p + 1] = rows.own[p] + 1 + near.starts[p + 1] - near.starts[p]
-    # Rows are visited in rising order, so neighbours before q arrive in rising order too.
+    # Rows are visited in ascending order, so neighbours before q come in that order too.
     for p in range(n):
         here = rows.own[p]
         rows.columns[here], rows.slopes[here] = p, 0.0
@@ -80,7 +89,7 @@ def fill(near: Near, slopes: Array, rows: Neighbourhoods) -> None:
 
 @njit
 def kernel_sums(near: Near, values: Array, own_value: float, cells: Array, sums: Array) -> None:
-    """sums (n,) = sum over neighbours of W_pq by reference cells [-]."""
+    """Fill `sums` (n,) with the sums over neighbours of W_pq times reference cells [-]."""
     sums[:] = own_value * cells
     for p in range(len(sums)):
         total = 0.0

@@ -1,9 +1,8 @@
 """Loops over one block of rows: gather the gradient of a field, scatter the force of a stress.
 
-Vectors are kept flat, with 1, 2 or 4 numbers a particle in 1, 2 or 3 dimensions: one layout in
-which a register holds either the values of one neighbour or those of several particles that follow
-each other. The tensors of the block in hand are in a small scratch array, with a margin of zeros
-on both sides so that loops may overrun it.
+Fields of vectors are flat, with 1, 2 or 4 numbers per particle in 1, 2 or 3 dimensions, so that a
+register holds the values of one neighbour or of several consecutive particles. The tensors of the
+current block are in a small scratch array with margins of zeros, which loops may overrun.
 """
 
 from __future__ import annotations
@@ -14,16 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from solidsph.engines.compiled.lanes import register_bytes, words
-from solidsph.engines.compiled.rows import BAND, RUN
+from solidsph.engines.compiled.constants import STRIDE
+from solidsph.engines.compiled.reference.lanes import lane_operations, register_bytes
+from solidsph.engines.compiled.reference.rows import BAND, RUN
 
-STRIDE = {1: 1, 2: 2, 3: 4}  # numbers kept for a particle, by dimension
-
-_REGISTERS = 4  # of consecutive particles that go through a stencil together
+_REGISTERS = 4  # of consecutive particles that a stencil is applied to together
 
 
 def group(dimension: int, dtype: str) -> int:
-    """How many particles of a run go through its stencil together."""
+    """Number of particles of a run that a stencil is applied to together."""
     return _REGISTERS * _lanes(dimension, dtype) // STRIDE[dimension]
 
 
@@ -32,7 +30,7 @@ def _lanes(dimension: int, dtype: str) -> int:
 
 
 class BlockLoops(NamedTuple):
-    """Compiled loops, and where they keep the tensors of a block's particles.
+    """Compiled loops, and the layout of the tensors of a block.
 
     Component T_ik of the particle in a slot is `scratch[k * plane + (margin + slot) * stride + i]`.
     """
@@ -51,9 +49,11 @@ def block_loops(dimension: int, dtype: str) -> BlockLoops:
     W, G = _lanes(d, dtype), group(d, dtype)
     margin = BAND + G
     plane = (margin + RUN + margin) * D
-    # Of several particles, and of one.
-    load, store, zeros, weight, outer, inner, _, put, get = words(dtype, W, d)
-    load_1, store_1, zeros_1, weight_1, outer_1, inner_1, total_1, put_1, get_1 = words(dtype, D, d)
+    # Operations on several particles, and on one.
+    load, store, zeros, weight, outer, inner, _, put, get = lane_operations(dtype, W, d)
+    load_1, store_1, zeros_1, weight_1, outer_1, inner_1, total_1, put_1, get_1 = lane_operations(
+        dtype, D, d
+    )
 
     @njit
     def gather_run(rows, first, count, stencil, u, scratch):
@@ -77,7 +77,7 @@ def block_loops(dimension: int, dtype: str) -> BlockLoops:
     def gather_rows(rows, first, count, row, u, scratch):
         for slot in range(count):
             m, end = rows.spans[row + slot]
-            # Two sums side by side, because each addition waits for the one before it.
+            # Two sums, because each addition waits for the one before it.
             h, other = zeros_1(), zeros_1()
             while m + 1 < end:
                 at = (first + slot + rows.row_offsets[m]) * D
@@ -101,11 +101,10 @@ def block_loops(dimension: int, dtype: str) -> BlockLoops:
 
     @njit
     def scatter_run(rows, first, count, stencil, scratch, f, shift):
-        # What an earlier block, or an overrun, has left behind the last particle.
+        # Clear what an earlier block or an overrun left behind the last particle.
         for k in range(d):
             scratch[k * plane + (margin + count) * D : k * plane + (2 * margin + count) * D] = 0
-        # The members of a band add to the same particles: while their sums stay in registers,
-        # the tensors move past them.
+        # The members of a band add to the same particles, whose sums stay in registers.
         for band in range(rows.stencils[stencil], rows.stencils[stencil + 1]):
             member, offset, width = rows.bands[band]
             for slot in range(0, count + width - 1, G):
@@ -153,34 +152,24 @@ def block_loops(dimension: int, dtype: str) -> BlockLoops:
 def _tensor_at(dimension: int, plane: int) -> Any:
     """Compiled (scratch, at) -> nested tuples, in double precision."""
 
+    @njit
     def number(scratch, at):
         return np.float64(scratch[at])
 
-    number = njit(number)
     if dimension == 1:
+        return njit(lambda scratch, at: ((number(scratch, at),),))
+    if dimension == 2:
 
         @njit
-        def tensor_at(scratch, at):
-            return ((number(scratch, at),),)
+        def row_2(scratch, at):
+            return number(scratch, at), number(scratch, at + plane)
 
-    elif dimension == 2:
+        return njit(lambda scratch, at: (row_2(scratch, at), row_2(scratch, at + 1)))
 
-        @njit
-        def tensor_at(scratch, at):
-            return (
-                (number(scratch, at), number(scratch, at + plane)),
-                (number(scratch, at + 1), number(scratch, at + plane + 1)),
-            )
+    @njit
+    def row_3(scratch, at):
+        return number(scratch, at), number(scratch, at + plane), number(scratch, at + 2 * plane)
 
-    else:
-
-        @njit
-        def tensor_at(scratch, at):
-            x, y, z = at, at + plane, at + 2 * plane
-            return (
-                (number(scratch, x), number(scratch, y), number(scratch, z)),
-                (number(scratch, x + 1), number(scratch, y + 1), number(scratch, z + 1)),
-                (number(scratch, x + 2), number(scratch, y + 2), number(scratch, z + 2)),
-            )
-
-    return tensor_at
+    return njit(
+        lambda scratch, at: (row_3(scratch, at), row_3(scratch, at + 1), row_3(scratch, at + 2))
+    )

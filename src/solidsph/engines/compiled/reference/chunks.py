@@ -1,4 +1,4 @@
-"""Neighbours of some particles at a time, so that no list of all pairs need exist."""
+"""Neighbour pairs of some particles at a time, so that no list of all pairs has to exist."""
 
 from __future__ import annotations
 
@@ -18,6 +18,9 @@ def weighted_chunks(body: Body, wanted: Mask) -> Iterator[tuple[Pairs, Array]]:
     """Pairs of the particles `wanted` (n,), some rows at a time, with gradient weights (m, d).
 
     Rows and columns are numbered within the body; the weights of a row depend on that row alone.
+
+    Raises:
+        BuildError: the neighbours of a particle do not determine a gradient.
     """
     positions, cells = body.particles.positions, body.particles.cells
     tree = cKDTree(positions)
@@ -27,8 +30,25 @@ def weighted_chunks(body: Body, wanted: Mask) -> Iterator[tuple[Pairs, Array]]:
         yield pairs, body.formulation.gradient.weights(pairs, kernel_gradients, cells)
 
 
+def in_chunks(
+    pairs: Pairs, weights: Array, rows: int = _ROWS_AT_ONCE
+) -> Iterator[tuple[Pairs, Array]]:
+    """A complete list of pairs and its weights (m, d), some rows at a time."""
+    for first in range(0, pairs.row_count, _ROWS_AT_ONCE):
+        starts = pairs.starts[first : first + _ROWS_AT_ONCE + 1]
+        own = slice(starts[0], starts[-1])
+        part = Pairs(
+            starts=starts - starts[0],
+            rows=pairs.rows[own],
+            columns=pairs.columns[own],
+            offsets=pairs.offsets[own],
+            distances=pairs.distances[own],
+        )
+        yield part, weights[own]
+
+
 def _chunks(wanted: Mask) -> Iterator[slice]:
-    """Consecutive particles that are wanted, not too many at a time."""
+    """Stretches of consecutive wanted particles of limited length."""
     change = np.flatnonzero(np.diff(wanted, prepend=False, append=False))
     for begin, end in change.reshape(-1, 2).tolist():
         for first in range(begin, end, _ROWS_AT_ONCE):

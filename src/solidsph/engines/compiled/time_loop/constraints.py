@@ -1,4 +1,4 @@
-"""Imposed motions in the compiled loop."""
+"""Constraints in the compiled loop."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.interfaces.compilable_terms import LinearExtension, ScheduledConstraint
@@ -15,7 +16,7 @@ from solidsph.interfaces.terms import Constraint
 from solidsph.maths.arrays import Array, Indices
 
 
-class Scheduled(NamedTuple):
+class ScheduledMotion(NamedTuple):
     """A motion known ahead: values for the steps to come, or one row for all of them."""
 
     particles: Indices  # (m,)
@@ -24,22 +25,22 @@ class Scheduled(NamedTuple):
     velocities: Array  # (t, m) [m/s]
     accelerations: Array  # (t, m) [m/s^2]
     before: Array  # (m,) reaction at the end of the last step [N]
-    work: Array  # (1,) done so far [J]
+    work: Array  # (1,) so far [J]
 
 
-class Following(NamedTuple):
-    """Ghosts that follow others."""
+class FollowingGhosts(NamedTuple):
+    """Ghosts whose values are weighted sums of those of other particles."""
 
     ghosts: Indices  # (k,)
     signs: Array  # (k, d)
     starts: NDArray[np.int32]  # rows of the matrix
     columns: NDArray[np.int32]
     weights: Array
-    work: Array  # (1,) stays 0: what ghosts take from the others' motion they give back
+    work: Array  # (1,) stays 0: ghosts return the work that they take from other particles
 
 
-class MotionWords(NamedTuple):
-    """What the loop asks of a motion, compiled."""
+class ConstraintCalls(NamedTuple):
+    """The compiled functions of a constraint."""
 
     move: Any  # (motion, step, dt, u, h, path, v): before the forces, displacement and velocity
     hand_on: Any  # (motion, total): forces on ghosts go to those they follow
@@ -47,47 +48,52 @@ class MotionWords(NamedTuple):
     react: Any
 
 
-def motion_words(motion: Constraint, dimension: int) -> MotionWords:
-    """The words of a motion's kind.
+def constraint_calls(motion: Constraint, dimension: int) -> ConstraintCalls:
+    """The compiled functions for the kind of a constraint.
 
     Raises:
-        NotCompilableError: it is not of a declared kind.
+        NotCompilableError: it is not of a compilable kind.
     """
     match motion:
         case ScheduledConstraint():
             return _scheduled()
         case LinearExtension():
             return _following(dimension)
-    raise NotCompilableError(f"motion {motion.label!r} is not of a declared kind")
+    raise NotCompilableError(f"motion {motion.label!r} is not of a compilable kind")
 
 
-def motion_data(
+def constraint_data(
     motion: Constraint, times: Array, before: Array, step: float
-) -> Scheduled | Following:
-    """What the loop holds of a motion over steps that end at `times` (t,) [s].
+) -> ScheduledMotion | FollowingGhosts:
+    """The data of a constraint for steps that end at `times` (t,) [s].
 
-    `before` (m,) is its reaction at the start [N], `step` the time step [s].
+    `before` (m,) is its reaction at the beginning [N], `step` the time step [s].
     """
     match motion:
         case ScheduledConstraint():
             particles, axes = motion.entries
             u, v, a = (np.ascontiguousarray(motion.schedule(times, k, step)) for k in range(3))
-            return Scheduled(particles, axes, u, v, a, before, np.zeros(1))
+            return ScheduledMotion(particles, axes, u, v, a, before, np.zeros(1))
         case LinearExtension():
-            A = motion.displacement
-            return Following(motion.ghosts, motion.signs, A.indptr, A.indices, A.data, np.zeros(1))
-    raise AssertionError("motion_words has refused it")
+            return following(motion, motion.displacement)
+    raise AssertionError("constraint_calls has refused it")
+
+
+def following(extension: LinearExtension, weights: csr_array) -> FollowingGhosts:
+    """Ghosts that follow by `weights` (k, n)."""
+    rows = weights.indptr, weights.indices, weights.data
+    return FollowingGhosts(extension.ghosts, extension.signs, *rows, np.zeros(1))
 
 
 @njit
 def _now(table: Array, step: int) -> Array:
-    """The row of a step; a table of one row holds for all."""
+    """The row of a step; a single row is for all steps."""
     row: Array = table[min(step, len(table) - 1)]
     return row
 
 
 @cache
-def _scheduled() -> MotionWords:
+def _scheduled() -> ConstraintCalls:
     @njit
     def move(motion, step, dt, u, h, path, v):
         displacements, velocities = _now(motion.displacements, step), _now(motion.velocities, step)
@@ -116,11 +122,11 @@ def _scheduled() -> MotionWords:
             motion.before[m] = reaction
         motion.work[0] += work
 
-    return MotionWords(move, hand_on, react)
+    return ConstraintCalls(move, hand_on, react)
 
 
 @cache
-def _following(dimension: int) -> MotionWords:
+def _following(dimension: int) -> ConstraintCalls:
     @njit
     def followed(motion, k, i, values):
         total = 0.0
@@ -157,4 +163,4 @@ def _following(dimension: int) -> MotionWords:
                 a[p, i] = followed(motion, k, i, a)
                 v[p, i] = followed(motion, k, i, v)
 
-    return MotionWords(move, hand_on, react)
+    return ConstraintCalls(move, hand_on, react)

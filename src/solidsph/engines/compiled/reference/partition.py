@@ -1,7 +1,7 @@
-"""Shares: which blocks each thread sweeps, and where it adds up its forces.
+"""Partition of rows among threads, and the passes over all particles of a body.
 
-A thread scatters into a buffer of its own, over its particles and those within reach. Buffers are
-summed in order, so the same number of threads gives the same bits.
+Each thread scatters into a buffer of its own, over its particles and those within reach. Buffers
+are summed in order, so that the same number of threads gives the same bits.
 """
 
 from __future__ import annotations
@@ -16,54 +16,52 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.blocks import STRIDE, group
-from solidsph.engines.compiled.rows import Rows
-from solidsph.engines.compiled.sweeps import spread_sweep, sweeps
+from solidsph.engines.compiled.constants import STRIDE, WORTH_A_THREAD
+from solidsph.engines.compiled.reference.block_sweeps import block_sweeps, spread_sweep
+from solidsph.engines.compiled.reference.blocks import group
+from solidsph.engines.compiled.reference.rows import Rows
 from solidsph.engines.compiled.threads import check_alive, started
 from solidsph.maths.arrays import Indices
-
-# A second thread must be woken for every pass, which takes some tens of microseconds: as long as
-# one thread takes for so many operations of a nanosecond.
-WORTH_A_THREAD = 200_000
+from solidsph.model.neighbours import ranges
 
 _ALIGNMENT = 64  # bytes of a cache line
 
-# OpenMP threads that have done their share spin until the others have too: where a core is busy
-# with something else, that costs time slices. Read when the first parallel loop starts.
+# OpenMP threads that are done would spin until the others are too, which costs time slices where a
+# core is busy with something else. Read when the first parallel loop starts.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 
 def thread_count(operations: int) -> int:
-    """How many threads share so many operations of about a nanosecond in several passes."""
+    """Number of threads for so many operations of about a nanosecond in several passes."""
     return 1 if operations < WORTH_A_THREAD else started()
 
 
 @attrs.frozen(eq=False)
-class Shares:
+class Partition:
     """The division of rows among threads."""
 
-    # (t, 5) for each thread: its first block, the one after its last, the first particle that it
-    # reaches, the one after the last, and where particle 0 would stand in the common array
+    # (t, 5) per thread: first block and end of its blocks, first particle and end of those that it
+    # reaches, and the offset of particle 0 in the common array
     table: Indices
     buffers: NDArray[Any]  # all buffers, flat
 
     @property
     def threaded(self) -> bool:
-        """Whether there is more than one."""
+        """True if there is more than one thread."""
         return len(self.table) > 1
 
     def check(self) -> None:
-        """That there are the threads that share.
+        """Check that the threads exist.
 
         Raises:
-            ForkError: in a fork of the process that had started them there are none.
+            ForkError: this process is a fork of the one that started them.
         """
         if self.threaded:
             check_alive()
 
 
-def shared(rows: Rows, dimension: int, dtype: str, threads: int) -> Shares:
-    """Blocks divided among `threads` by the work that they are."""
+def partitioned(rows: Rows, dimension: int, dtype: str, threads: int) -> Partition:
+    """Blocks divided among `threads` by their work."""
     done = np.concatenate([[0.0], np.cumsum(rows.costs())])
     edges = np.searchsorted(done, done[-1] * np.arange(threads + 1) / threads)
     low, high = _reach(rows)
@@ -78,10 +76,15 @@ def shared(rows: Rows, dimension: int, dtype: str, threads: int) -> Shares:
         table[share] = first, last, a, b, end - a * stride
         # Loops over runs go beyond the last particle by up to a group.
         end += -(-(b - a + margin) * stride // line) * line
-    return Shares(table, aligned(end, dtype))
+    return Partition(table, _aligned(end, dtype))
 
 
-def aligned(count: int, dtype: str) -> NDArray[Any]:
+def flat_field(particles: int, dimension: int, dtype: str) -> NDArray[Any]:
+    """A flat field of vectors for loops over runs, which read up to a group beyond the last."""
+    return _aligned((particles + group(dimension, dtype)) * STRIDE[dimension], dtype)
+
+
+def _aligned(count: int, dtype: str) -> NDArray[Any]:
     """Zeros (count,) that begin on a cache line."""
     extra = _ALIGNMENT // np.dtype(dtype).itemsize
     array = np.zeros(count + extra, dtype=dtype)
@@ -90,7 +93,7 @@ def aligned(count: int, dtype: str) -> NDArray[Any]:
 
 
 def _reach(rows: Rows) -> tuple[Indices, Indices]:
-    """First particle that each block scatters to, and the one after the last, (b,) each."""
+    """First particle that each block scatters to and the end of these, (b,) each."""
     first, count, where = rows.blocks.T
     low, high = first.copy(), first + count
     run = where >= 0
@@ -98,16 +101,11 @@ def _reach(rows: Rows) -> tuple[Indices, Indices]:
     low[run] += rows.offsets[rows.members[stencil]]
     high[run] += rows.offsets[rows.members[stencil + 1] - 1]
     if not run.all():
-        begins = -1 - where[~run]  # blocks of rows stand in their order
-        own = np.repeat(first[~run], count[~run]) + _place_in(count[~run])
+        begins = -1 - where[~run]  # blocks of rows are in order
+        own = ranges(first[~run], count[~run])
         low[~run] = np.minimum.reduceat(own + rows.row_offsets[rows.spans[:, 0]], begins)
         high[~run] = np.maximum.reduceat(own + rows.row_offsets[rows.spans[:, 1] - 1], begins) + 1
     return low, high
-
-
-def _place_in(counts: Indices) -> Indices:
-    """0, 1, ... within each of several groups of so many, one behind the other."""
-    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 class Passes(NamedTuple):
@@ -121,9 +119,9 @@ class Passes(NamedTuple):
 
 @cache
 def passes(dimension: int, dtype: str, law: Any, threaded: bool) -> Passes:
-    """Passes for one dimension, number type and compiled law (H, params) -> T."""
+    """The passes for one dimension, number type and compiled law (H, params) -> T."""
     place, cleared, total = _fields(dimension, dtype, threaded)
-    sweep_forces, sweep_stress = sweeps(dimension, dtype, law)
+    sweep_forces, sweep_stress = block_sweeps(dimension, dtype, law)
 
     @njit(parallel=threaded)
     def forces(table, rows, displacements, u, params, factors, buffers, out):
@@ -145,7 +143,7 @@ def passes(dimension: int, dtype: str, law: Any, threaded: bool) -> Passes:
 
 @cache
 def spread_pass(dimension: int, dtype: str, threaded: bool) -> Any:
-    """Pass (table, rows, stress (d, d, n), factors, buffers, forces (n, d)) for any law."""
+    """Compiled pass (table, rows, stress (d, d, n), factors, buffers, forces (n, d))."""
     _, cleared, total = _fields(dimension, dtype, threaded)
     sweep = spread_sweep(dimension, dtype)
 

@@ -1,9 +1,8 @@
-"""Near pairs of moving particles, by cells; a list with a margin serves many steps.
+"""Near pairs of moving particles by a cell list with a margin, which serves many steps.
 
 The pairs are those of `solidsph.model.neighbours`, in the same order and with the same bits,
-whenever the list was made: each is tested anew at every step, on the square of its distance as the
-k-d tree does. A tree that takes or leaves whole boxes may differ within rounding of the support
-radius.
+whenever the list was made: each is tested at every step, by its squared distance as in the k-d
+tree. A tree that accepts or rejects whole boxes may differ within rounding of the support radius.
 """
 
 from __future__ import annotations
@@ -21,27 +20,26 @@ from scipy.spatial import cKDTree
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.neighbours import Hidden
 
-# The list holds pairs up to this much beyond the support radius. A wider margin lasts longer, but
-# in 3D a step tests a third more pairs than there are already.
+# Margin of the list over the support radius. A wider one lasts longer, but in 3D a step already
+# tests a third more pairs than there are.
 _MARGIN = 0.1
 
-# Of half the margin, what a particle may move before the list is made anew: the rest is far above
-# the rounding of distances.
+# Part of half the margin that a particle may move before the list is made again; the rest is far
+# above the rounding of distances.
 _SPENT = 0.99
 
-# Cells are this much wider than what is looked for, so that rounding cannot put a neighbour two
-# cells away.
+# Width of the cells over the search radius, so that rounding cannot put a neighbour two cells away.
 _WIDER = 1.001
 
-# With more cells than these for a particle, most of them empty, the k-d tree is the better list.
+# Cells per particle, most of them empty, beyond which the k-d tree is better.
 _MOST_CELLS = 8
 
-# Coordinates from here on are as good as infinite: their squares no longer are numbers [m].
+# Coordinates from which on squares may overflow, which count as infinite [m].
 _FURTHEST = 1e150
 
 
 class Near(NamedTuple):
-    """Pairs p < q, once each: those of p stand together, q rising. Arrays may be longer than k."""
+    """Pairs p < q in rows of p, with q rising. Arrays may be longer than k."""
 
     starts: Indices  # (n + 1,) those of p are starts[p] : starts[p + 1]; the last is k
     columns: NDArray[np.int32]  # (k,) q
@@ -56,67 +54,67 @@ class Near(NamedTuple):
 @final
 @attrs.define(eq=False)
 class NeighbourSearch:
-    """Finds neighbours at positions that change little from one call to the next.
+    """Search for neighbours at positions that change little from one call to the next.
 
-    What it keeps between calls saves time and has no influence on what it finds. A particle whose
-    position is not finite, or as good as infinite, has no neighbours.
+    What it keeps between calls does not influence the result. A particle whose position is not
+    finite has no neighbours.
     """
 
     radius: float  # [m]
-    hidden: Hidden | None = None  # near particles that are no neighbours
-    _made_at: Array = attrs.field(init=False)  # (n, d) positions of the list
+    hidden: Hidden | None = None  # near particles that are not neighbours
+    _list_at: Array = attrs.field(init=False)  # (n, d) positions of the list
     _list: Near = attrs.field(init=False)  # pairs up to the margin beyond the radius
-    _found: Near = attrs.field(init=False)
+    _near: Near = attrs.field(init=False)
 
     def __attrs_post_init__(self) -> None:
-        self._made_at = np.empty((0, 0))
+        self._list_at = np.empty((0, 0))
         none = np.empty(0, np.int32)
-        self._list = self._found = Near(np.zeros(1, np.intp), none, np.empty(0))
+        self._list = self._near = Near(np.zeros(1, np.intp), none, np.empty(0))
 
     def near(self, positions: Array) -> Near:
-        """All pairs at `positions` (n, d); the arrays are overwritten by the next call."""
+        """All pairs at `positions` (n, d); the next call overwrites the arrays."""
         loops = search_loops(positions.shape[1])
-        stale = positions.shape != self._made_at.shape
-        if stale or loops.moved(positions, self._made_at, 0.5 * _SPENT * _MARGIN * self.radius):
+        stale = positions.shape != self._list_at.shape
+        if stale or loops.moved(positions, self._list_at, 0.5 * _SPENT * _MARGIN * self.radius):
             self._make_list(positions)
-        loops.test(positions, self.radius, self._list, self._found)
-        return self._found
+        loops.test(positions, self.radius, self._list, self._near)
+        return self._near
 
     @property
     def list_origin(self) -> Array:
-        """Positions at which the list in use was made, (n, d)."""
-        return self._made_at
+        """Positions at which the current list was made, (n, d)."""
+        return self._list_at
 
     @property
     def bytes(self) -> int:
         """Memory of all arrays."""
-        return self._made_at.nbytes + sum(array.nbytes for array in (*self._list, *self._found))
+        return self._list_at.nbytes + sum(array.nbytes for array in (*self._list, *self._near))
 
     def _make_list(self, positions: Array) -> None:
         n = len(positions)
-        self._made_at = positions.copy()
+        self._list_at = positions.copy()
         starts, columns = candidates(positions, (1.0 + _MARGIN) * self.radius)
         if self.hidden is not None:
             rows = np.repeat(np.arange(n), np.diff(starts))
             seen = ~self.hidden.between(rows, columns.astype(np.intp))
             starts = np.concatenate([[0], np.cumsum(seen)])[starts]
             columns = columns[seen]
-        self._list = Near(starts, columns, np.empty(0))  # distances are asked for when they count
+        self._list = Near(starts, columns, np.empty(0))  # distances are computed at each step
         most = len(columns) + 1  # the loop writes a pair before it knows whether it counts
-        if len(self._found.starts) != n + 1 or len(self._found.columns) < most:
+        if len(self._near.starts) != n + 1 or len(self._near.columns) < most:
             room = most + most // 8  # so that a list a little longer needs no other arrays
-            self._found = Near(np.empty(n + 1, np.intp), np.empty(room, np.int32), np.empty(room))
+            self._near = Near(np.empty(n + 1, np.intp), np.empty(room, np.int32), np.empty(room))
 
 
 def candidates(positions: Array, radius: float) -> tuple[Indices, NDArray[np.int32]]:
-    """Pairs p < q no further apart than `radius`: where rows begin (n + 1,), and q rising (k,)."""
+    """Pairs p < q at most `radius` apart: starts of rows (n + 1,), and q (k,), rising in each."""
     n, d = positions.shape
     finite: Mask = np.all(np.abs(positions) < _FURTHEST, axis=1)
     if not finite.any():
         return np.zeros(n + 1, np.intp), np.empty(0, np.int32)
     width = _WIDER * radius
     low, high = positions[finite].min(axis=0), positions[finite].max(axis=0)
-    # A layer of empty cells all round, so that every cell has all its neighbours.
+    # With a layer of empty cells around, so that every cell has all its neighbours.
     cells = np.floor((high - low) / width) + 3.0
     with np.errstate(over="ignore"):
         few = np.prod(cells) <= _MOST_CELLS * n + 5**d
@@ -143,7 +141,7 @@ def _by_tree(positions: Array, finite: Mask, radius: float) -> tuple[Indices, ND
 class SearchLoops(NamedTuple):
     """Compiled loops of the search."""
 
-    moved: Any  # (positions, made_at, limit) -> whether a particle has moved further
+    moved: Any  # (positions, list_at, limit) -> True if a particle has moved further
     by_cells: Any  # (positions, finite, radius, low, width, strides, around, total) -> starts, q
     test: Any  # (positions, radius, list, found): found = those of the list within the radius
 
@@ -155,7 +153,7 @@ def search_loops(dimension: int) -> SearchLoops:
 
     @njit
     def square(x, p, y, q):
-        # One after the other, as NumPy and the k-d tree add: the bits must be theirs.
+        # In the order of NumPy and of the k-d tree, for the same bits.
         total = 0.0
         for i in range(d):
             apart = y[q, i] - x[p, i]
@@ -163,11 +161,11 @@ def search_loops(dimension: int) -> SearchLoops:
         return total
 
     @njit
-    def moved(x, made_at, limit):
+    def moved(x, list_at, limit):
         for p in range(len(x)):
-            if square(x, p, made_at, p) <= limit * limit:
+            if square(x, p, list_at, p) <= limit * limit:
                 continue
-            return True  # what is not a number has moved too
+            return True  # also if it is not a number
         return False
 
     @njit
@@ -221,7 +219,7 @@ def search_loops(dimension: int) -> SearchLoops:
             for c in range(listed.starts[p], listed.starts[p + 1]):
                 q = listed.columns[c]
                 apart = square(x, p, x, q)
-                # Written in any case and counted if near: nothing to mispredict.
+                # Written in any case and counted if near, without a branch.
                 found.columns[k], found.distances[k] = q, np.sqrt(apart)
                 k += int(apart <= radius * radius)
             found.starts[p + 1] = k

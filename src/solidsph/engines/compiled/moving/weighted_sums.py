@@ -1,4 +1,4 @@
-"""Sums over the neighbours of moving particles, with weights that their parts give as arrays."""
+"""Sums over the neighbours of moving particles, with weights from functions of arrays."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, final
 import attrs
 from numba import njit
 
-from solidsph.engines.compiled.neighbourhoods import Neighbourhoods
+from solidsph.engines.compiled.moving.neighbourhoods import Place
 from solidsph.engines.compiled.vectors import MATRIX, ROW, with_outer, with_product
 from solidsph.interfaces.formulation import Formulation
 from solidsph.maths.arrays import Array
@@ -18,35 +18,25 @@ from solidsph.model.neighbours import Pairs
 @final
 @attrs.define(eq=False)
 class WeightedSums:
-    """Both sums of a body whose gradient or divergence is a function of all pairs at once."""
+    """Both sums of a body whose gradient or divergence is a function of all pairs together."""
 
     formulation: Formulation
     pairs: Pairs | None = None
     weights: Array | None = None  # (m, d) the gradient's [1/m]
 
-    def gradients(
-        self, rows: Neighbourhoods, positions: Array, cells: Array, u: Array, out: Array
-    ) -> None:
-        """As in `PointwiseSums`."""
-        self.pairs = pairs = rows.pairs(positions)
-        slopes = rows.slopes[: pairs.count, None]
-        self.weights = self.formulation.gradient.weights(pairs, -slopes * pairs.offsets, cells)
-        _gather(u.shape[1])(rows, self.weights, u, out)
+    def gradients(self, place: Place, u: Array, out: Array) -> None:
+        """Fill `out` (n, d, d) with the gradients of u (n, d)."""
+        self.pairs = pairs = place.rows.pairs(place.positions)
+        kernel_gradients = -place.rows.slopes[: pairs.count, None] * pairs.offsets
+        self.weights = self.formulation.gradient.weights(pairs, kernel_gradients, place.cells)
+        _gather(u.shape[1])(place.rows, self.weights, u, out)
 
-    def forces(
-        self,
-        rows: Neighbourhoods,
-        positions: Array,
-        cells: Array,
-        volumes: Array,
-        stress: Array,
-        out: Array,
-    ) -> None:
-        """As in `PointwiseSums`."""
+    def forces(self, place: Place, stress: Array, out: Array) -> None:
+        """Fill `out` (n, d) with the forces of a stress (n, d, d), after `gradients`."""
         assert self.pairs is not None, "gradients come first"
         assert self.weights is not None, "gradients come first"
-        weights = self.formulation.divergence.weights(self.pairs, self.weights, volumes)
-        _force(positions.shape[1])(rows, weights, stress, out)
+        weights = self.formulation.divergence.weights(self.pairs, self.weights, place.volumes)
+        _force(out.shape[1])(place.rows, weights, stress, out)
 
 
 @cache

@@ -1,7 +1,7 @@
-"""Sums over the neighbours of moving particles, with weights by formulas compiled into the loops.
+"""Sums over the neighbours of moving particles, with weights by compiled formulas.
 
-Weights are not stored: they are made from the kernel's slope of a pair and from one matrix a
-particle, which costs less than fetching them from memory.
+Weights are not stored: to compute them from the kernel's slope of a pair and from one matrix per
+particle costs less than to load them from memory.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import attrs
 import numpy as np
 from numba import njit, types
 
-from solidsph.engines.compiled.neighbourhoods import Neighbourhoods
+from solidsph.engines.compiled.moving.neighbourhoods import Place
 from solidsph.engines.compiled.pointwise import (
-    NUMBERS,
     NotCompilableError,
     compiled_function,
+    numbers,
     registered,
     tensor_type,
 )
@@ -53,7 +53,7 @@ class PointwiseSums:
         """The sums of a body.
 
         Raises:
-            NotCompilableError: its gradient or divergence is no such formula, or not compilable.
+            NotCompilableError: its gradient or divergence is not pointwise, or does not compile.
         """
         n, d = body.particles.count, body.particles.dimension
         gradient, divergence = body.formulation.gradient, body.formulation.divergence
@@ -71,49 +71,39 @@ class PointwiseSums:
             np.empty((n, d)),
         )
 
-    def gradients(
-        self, rows: Neighbourhoods, positions: Array, cells: Array, u: Array, out: Array
-    ) -> None:
-        """H (n, d, d) of u (n, d), and what the forces will need.
+    def gradients(self, place: Place, u: Array, out: Array) -> None:
+        """Fill `out` (n, d, d) with the gradients of u (n, d).
 
         Raises:
             BuildError: the neighbours of a particle do not determine a gradient.
         """
-        done = self.gather(rows, positions, cells, u, self.corrections, self.own, out)
+        done = self.gather(place, u, self.corrections, self.own, out)
         if not done:
             # The array form says whose neighbours they are.
-            pairs = rows.pairs(positions)
-            slopes = rows.slopes[: pairs.count]
-            self.gradient.weights(pairs, -slopes[:, None] * pairs.offsets, cells)
+            pairs = place.rows.pairs(place.positions)
+            slopes = place.rows.slopes[: pairs.count]
+            self.gradient.weights(pairs, -slopes[:, None] * pairs.offsets, place.cells)
 
-    def forces(
-        self,
-        rows: Neighbourhoods,
-        positions: Array,
-        cells: Array,
-        volumes: Array,
-        stress: Array,
-        out: Array,
-    ) -> None:
-        """Forces (n, d) from stress (n, d, d), at the positions of the gradients before."""
-        K, own = self.corrections, self.own
-        self.scatter(rows, positions, cells, volumes, K, own, stress, out)
+    def forces(self, place: Place, stress: Array, out: Array) -> None:
+        """Fill `out` (n, d) with the forces of a stress (n, d, d), after `gradients`."""
+        self.scatter(place, self.corrections, self.own, stress, out)
 
 
 @cache
 def _gather(dimension: int, correction: Any, of_differences: bool) -> Any:
-    """Loop (rows, positions, cells, u, corrections, own, gradients) -> whether all K are finite."""
-    row, numbers, one = ROW[dimension], NUMBERS[dimension], IDENTITY[dimension]
-    nothing = tuple(tuple(0.0 for _ in r) for r in one)
+    """Loop (place, u, corrections, own, gradients) -> whether all K are finite."""
+    row, identity = ROW[dimension], IDENTITY[dimension]
+    nothing = tuple(tuple(0.0 for _ in r) for r in identity)
     corrects = correction is not None
 
     @njit(error_model="numpy")
-    def gather(rows, positions, cells, u, corrections, own, gradients):
+    def gather(place, u, corrections, own, gradients):
+        rows, positions, cells, _ = place
         unknown = 0.0
         for p in range(len(positions)):
             here, u_p = row(positions, p), row(u, p)
             moment = along = nothing
-            total = times(0.0, here)  # not a number where the particle is nowhere
+            total = times(0.0, here)  # not a number where the position is none
             for m in range(rows.starts[p], rows.starts[p + 1]):
                 q = rows.columns[m]
                 offset = moved(row(positions, q), -1.0, here)
@@ -125,7 +115,7 @@ def _gather(dimension: int, correction: Any, of_differences: bool) -> Any:
                 total = moved(total, 1.0, plain)
                 if corrects:
                     moment = with_outer(moment, offset, plain)
-            K = one
+            K = identity
             if corrects:
                 K = numbers(correction(moment))
             weight = with_product(nothing[0], K, total)
@@ -143,13 +133,14 @@ def _gather(dimension: int, correction: Any, of_differences: bool) -> Any:
 
 @cache
 def _adjoint(dimension: int, corrects: bool) -> Any:
-    """Loop (rows, positions, cells, volumes, corrections, own, stress, forces): the transpose."""
+    """Loop (place, corrections, own, stress, forces): the transpose."""
     row, matrix, zero = ROW[dimension], MATRIX[dimension], (0.0,) * dimension
     times_matrix = registered(product)
 
     @njit(error_model="numpy")
-    def force(rows, positions, cells, volumes, corrections, own, stress, forces):
-        # What K_q does to the slope of every pair (q, p) it does to the stress once.
+    def force(place, corrections, own, stress, forces):
+        rows, positions, cells, volumes = place
+        # K_q is applied to the stress once instead of to the slope of every pair (q, p).
         acting = np.empty_like(stress)
         for q in range(len(positions)):
             T = matrix(stress, q)
@@ -172,7 +163,7 @@ def _adjoint(dimension: int, corrects: bool) -> Any:
 
 
 def _pointwise(dimension: int, corrects: bool, divergence: Divergence) -> Any:
-    """Loop (rows, positions, cells, volumes, corrections, own, stress, forces) of any other."""
+    """Loop (place, corrections, own, stress, forces) for any other divergence."""
     if not isinstance(divergence, PointwiseDivergence):
         raise NotCompilableError(f"{divergence} has no pointwise form")
     pair_weight = compiled_function(divergence.pair_weight, *[types.float64] * 4)
@@ -185,7 +176,8 @@ def _by_formula(dimension: int, corrects: bool, pair_weight: Any, own_weight: An
     row, matrix, zero = ROW[dimension], MATRIX[dimension], (0.0,) * dimension
 
     @njit(error_model="numpy")
-    def force(rows, positions, cells, volumes, corrections, own, stress, forces):
+    def force(place, corrections, own, stress, forces):
+        rows, positions, cells, volumes = place
         weights = np.zeros((1, dimension))
         for p in range(len(positions)):
             here, K_p = row(positions, p), matrix(corrections, p)

@@ -1,0 +1,73 @@
+"""Constitutive laws evaluated by arrays of all particles of a body: the reference for any other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import final
+
+import attrs
+import numpy as np
+
+from solidsph.interfaces.body import Body
+from solidsph.interfaces.engine import StressFields
+from solidsph.interfaces.history import History, HistoryMaterial
+from solidsph.interfaces.law import Law
+from solidsph.maths.arrays import Array, Tensor
+from solidsph.maths.tensors import components_first, particles_first
+
+# Particles whose stress is evaluated together for reports, so that temporaries stay in cache.
+_AT_ONCE = 4096
+
+
+@final
+@attrs.frozen(eq=False)
+class ArrayLaw(Law):
+    """A law evaluated by arrays."""
+
+    body: Body
+
+    def flux(self, H: Array, history: Array, step: float) -> tuple[Array, Array]:
+        formulation, material = self.body.formulation, self.body.material
+        n = self.body.particles.count
+        with np.errstate(all="ignore"):  # a run that leaves the material's domain is caught later
+            if isinstance(material, HistoryMaterial):
+                F = formulation.deformation_gradient(components_first(H))
+                h: History = tuple(history.T)
+                if step > 0.0:
+                    h = material.advance(F, h, step, material.params)
+                T = formulation.flux(F, material.stress(F, h, material.params))
+                history = np.column_stack([np.broadcast_to(values, n) for values in h])
+            else:
+                T = flux(self.body, components_first(H))
+        return np.moveaxis(particles_first(T, n), 0, -1), history
+
+
+def flux(body: Body, H: Tensor) -> Tensor:
+    """The formulation's flux [Pa] at displacement gradients H, without history."""
+    F = body.formulation.deformation_gradient(H)
+    return body.formulation.flux(F, body.material.first_piola(F, body.material.params))
+
+
+def stress_fields(bodies: Sequence[Body], gradients: Array) -> StressFields:
+    """Deformation, stress and energy, without history.
+
+    Args:
+        bodies: all bodies, in order.
+        gradients: displacement gradients H of their particles, (n, d, d); F takes their place.
+    """
+    fields = StressFields(gradients, np.zeros_like(gradients), np.zeros(len(gradients)))
+    for body in bodies:
+        begin, end = body.extent.start, body.extent.stop
+        for first in range(begin, end, _AT_ONCE):
+            some = slice(first, min(first + _AT_ONCE, end))
+            F, count = gradients[some], some.stop - some.start
+            with np.errstate(all="ignore"):  # as above
+                F[...] = particles_first(
+                    body.formulation.deformation_gradient(components_first(F)), count
+                )
+                F[body.particles.ghosts[first - begin : some.stop - begin]] = np.eye(F.shape[1])
+                components, params = components_first(F), body.material.params
+                P = body.material.first_piola(components, params)
+                fields.stresses[some] = particles_first(P, count)
+                fields.energy_densities[some] = body.material.energy(components, params)
+    return fields

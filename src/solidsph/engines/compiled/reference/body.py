@@ -1,0 +1,196 @@
+"""ReferenceBody: a body whose sums are taken in the reference configuration, prepared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, final
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from solidsph.engines.compiled.pointwise import no_law
+from solidsph.engines.compiled.reference.blocks import group
+from solidsph.engines.compiled.reference.chunks import in_chunks, weighted_chunks
+from solidsph.engines.compiled.reference.partition import (
+    Partition,
+    Passes,
+    flat_field,
+    partitioned,
+    passes,
+    spread_pass,
+    thread_count,
+)
+from solidsph.engines.compiled.reference.rows import Rows, compressed
+from solidsph.engines.compiled.reference.subset_rows import part_of_rows
+from solidsph.interfaces.body import Body, part_of
+from solidsph.interfaces.plan import Operations, SumMethod, vectors
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.neighbours import Pairs
+
+
+@final
+@attrs.frozen(eq=False)
+class ReferenceBody:
+    """Weights, work space, and the compiled passes over them."""
+
+    body: Body
+    law: Any  # compiled (H, params) -> T
+    gradient: Rows
+    force: Rows  # rows to scatter with; those of the gradient if the divergence is adjoint
+    factors: NDArray[Any]  # (n,) multiply the stress before it is scattered
+    pair_count: int
+    gradient_partition: Partition
+    force_partition: Partition
+    u: NDArray[Any]  # flat
+    passes: Passes
+    gradients: Passes  # without a law
+    spread_pass: Any
+
+    @classmethod
+    def of(
+        cls, body: Body, law: Any, gradient: Rows, force: Rows, factors: Array, pair_count: int
+    ) -> ReferenceBody:
+        """The body with these rows, in the number type of their weights."""
+        dtype = gradient.row_weights.dtype.name
+        n, d = body.particles.positions.shape
+        threads = thread_count(pair_count)
+        own = partitioned(gradient, d, dtype, threads)
+        return cls(
+            body=body,
+            law=law,
+            gradient=gradient,
+            force=force,
+            factors=factors.astype(dtype),
+            pair_count=pair_count,
+            gradient_partition=own,
+            force_partition=own if force is gradient else partitioned(force, d, dtype, threads),
+            u=flat_field(n, d, dtype),
+            passes=passes(d, dtype, law, threads > 1),
+            gradients=passes(d, dtype, no_law, threads > 1),
+            spread_pass=spread_pass(d, dtype, threads > 1),
+        )
+
+    def part(self, chosen: Indices) -> ReferenceBody:
+        """The chosen particles (k,) alone, renumbered in order."""
+        rows = part_of_rows(self.gradient, chosen, self.body.particles.count)
+        count = rows.run_pairs + rows.row_pairs
+        return self.of(
+            part_of(self.body, chosen), self.law, rows, rows, self.factors[chosen], count
+        )
+
+    @property
+    def precision(self) -> float:
+        """Machine epsilon of the numbers that are summed."""
+        return float(np.finfo(self.u.dtype).eps)
+
+    @property
+    def bytes(self) -> int:
+        """Memory of all arrays [bytes]."""
+        rows = {id(part): part.bytes for part in (self.gradient, self.force)}
+        both = (self.gradient_partition, self.force_partition)
+        buffers = {id(part): part.buffers.nbytes for part in both}
+        own = self.factors.nbytes + self.u.nbytes
+        return own + sum(rows.values()) + sum(buffers.values())
+
+    @property
+    def operations(self) -> Sequence[Operations]:
+        """Operations of one evaluation: of runs by stencils, of the rest by rows."""
+        n, d = self.body.particles.positions.shape
+        # Gathering and scattering are one pass each; a pair counts once for the two together.
+        both = (self.gradient, self.force)
+        run_pairs = sum(part.run_pairs for part in both) // 2
+        row_pairs = sum(part.row_pairs for part in both) // 2
+        ran = sum(part.run_particles for part in both) // 2
+        row_bytes = sum({id(part): part.row_bytes for part in both}.values())
+        stencil_bytes = sum({id(part): part.bytes for part in both}.values()) - row_bytes
+        # The number of buffers depends on the threads of the machine; at least one is touched.
+        touched = stencil_bytes + self.factors.nbytes + 2 * self.u.nbytes + vectors(n, d)
+        held = self.bytes - row_bytes
+        kind = self.u.itemsize, self.gradient_partition.threaded
+        return (
+            Operations(SumMethod.STENCILS, run_pairs, ran, touched, held, *kind),
+            Operations(SumMethod.ROWS, row_pairs, n - ran, row_bytes, row_bytes, *kind),
+        )
+
+    @property
+    def fused(self) -> bool:
+        """True if both passes are one call where no term changes the stress between them."""
+        return self.force is self.gradient and not self._ghosts_act
+
+    @property
+    def _ghosts_act(self) -> bool:
+        uses = self.body.formulation.divergence.uses_ghost_stress
+        return uses and bool(self.body.particles.ghosts.any())
+
+    def forces(self, displacements: Array, out: Array) -> None:
+        """Forces (n, d) of a fused body from displacements (n, d)."""
+        own = self.gradient_partition
+        own.check()
+        params = self.body.material.params
+        self.passes.forces(
+            own.table, self.gradient, displacements, self.u, params, self.factors, own.buffers, out
+        )
+
+    def stress(self, displacements: Array, out: Array) -> None:
+        """Stress (d, d, n) from displacements (n, d); ghosts have none."""
+        self._stress(self.passes, displacements, out)
+        out[:, :, self.body.particles.ghosts] = 0.0
+
+    def gradient_of(self, displacements: Array, out: Array) -> None:
+        """Gradients H (n, d, d) of displacements (n, d); those of ghosts are not written."""
+        self._stress(self.gradients, displacements, out.transpose(1, 2, 0))
+
+    def _stress(self, passes: Passes, displacements: Array, out: Array) -> None:
+        own = self.gradient_partition
+        own.check()
+        params = self.body.material.params
+        passes.stress(own.table, self.gradient, displacements, self.u, params, out)
+
+    def spread(self, stress: Array, out: Array) -> None:
+        """Forces (n, d) from stress (d, d, n)."""
+        ghosts = self.body.particles.ghosts
+        ghosts_act = self.body.formulation.divergence.uses_ghost_stress
+        if not ghosts_act:
+            stress[:, :, ghosts] = 0.0
+        own = self.force_partition
+        self.spread_pass(own.table, self.force, stress, self.factors, own.buffers, out)
+        if ghosts_act:
+            # Ghosts have acted through their stress; no force acts on them.
+            out[ghosts] = 0.0
+
+
+def reference_body(body: Body, law: Any, dtype: str) -> ReferenceBody:
+    """A body with its compiled law (H, params) -> T, prepared for sums in a number type.
+
+    Raises:
+        BuildError: a formulation's operators cannot be formed on these particles.
+    """
+    particles, divergence = body.particles, body.formulation.divergence
+    n, d = particles.count, particles.dimension
+    shortest_run = max(2, group(d, dtype) // 2)
+    count = 0
+
+    def counted(chunks: Iterator[tuple[Pairs, Array]]) -> Iterator[tuple[Pairs, Array]]:
+        nonlocal count
+        for pairs, weights in chunks:
+            count += pairs.count
+            yield pairs, weights
+
+    if divergence.adjoint:
+        # Ghosts have no stress of the law, so their rows are needed only if they act.
+        wanted = np.ones(n, dtype=np.bool_) if divergence.uses_ghost_stress else ~particles.ghosts
+        chunks = counted(weighted_chunks(body, wanted))
+        gradient = force = compressed(chunks, d, dtype, shortest_run)
+        factors = np.where(wanted, -particles.volumes, 0.0)
+    else:
+        pairs = body.pairs()
+        weights = body.formulation.gradient.weights(
+            pairs, body.smoothing.gradient(pairs.offsets, pairs.distances), particles.cells
+        )
+        gradient = compressed(counted(in_chunks(pairs, weights)), d, dtype, shortest_run)
+        # To gather with d_pq is to scatter with d_qp.
+        weights = divergence.weights(pairs, weights, particles.volumes)[pairs.reversed_order()]
+        force = compressed(in_chunks(pairs, weights), d, dtype, shortest_run)
+        factors = np.ones(n)
+    return ReferenceBody.of(body, law, gradient, force, factors, count)
