@@ -257,7 +257,7 @@ def test_a_header_of_points_is_named(header: str, tmp_path: Path) -> None:
     points = construct("discretisations", {"type": "points", "file": str(tmp_path / "points.csv")})
     with pytest.raises(SceneError) as caught:
         points.particles(square, 0.5)
-    assert f"its first line {header!r} is no row of numbers" in str(caught.value)
+    assert f"its first line {header!r} is not a row of numbers" in str(caught.value)
     assert "begin a header with '#'" in str(caught.value)
 
 

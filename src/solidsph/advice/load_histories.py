@@ -108,8 +108,9 @@ def motion_histories(simulation: BuiltScene) -> Iterator[MotionHistory]:
         if isinstance(motion, ScheduledConstraint):
 
             def sample(some: Array, motion: ScheduledConstraint = motion) -> tuple[Array, ...]:
-                values = (np.abs(motion.schedule(some, k)).max(axis=1, initial=0.0) for k in (0, 1))
-                return tuple(np.broadcast_to(value, (len(some),)) for value in values)
+                several = (motion.schedule(some, k, simulation.step_size) for k in (0, 1))
+                largest = (np.abs(values).max(axis=1, initial=0.0) for values in several)
+                return tuple(np.broadcast_to(value, (len(some),)) for value in largest)
 
             times = _times(simulation, len(motion.entries[0]))
             times, (sizes, speeds) = _sampled(times, sample)

@@ -129,10 +129,10 @@ def held_only(handler: BoundaryHandler) -> Iterator[float]:
     for sample, motion in _constraints(handler):
         for derivative in (0, 1, 2):
             free = sample.random()
-            once = _imposed(motion, 1e-3, derivative, free)
+            once = _imposed(sample, motion, 1e-3, derivative, free)
             if not np.array_equal(once[~motion.held], free[~motion.held]):
                 raise Broken(f"derivative {derivative}: a free entry was changed")
-            twice = _imposed(motion, 1e-3, derivative, once)
+            twice = _imposed(sample, motion, 1e-3, derivative, once)
             yield float(np.abs(twice - once).max() / max(np.abs(once).max(), 1e-300))
 
 
@@ -149,6 +149,7 @@ def rates(handler: BoundaryHandler) -> Iterator[float]:
         for derivative in (1, 2):
             before, after = (
                 _imposed(
+                    sample,
                     motion,
                     t,
                     derivative - 1,
@@ -156,7 +157,9 @@ def rates(handler: BoundaryHandler) -> Iterator[float]:
                 )
                 for t in (time - step, time + step)
             )
-            rate = _imposed(motion, time, derivative, v + a * time if derivative == 1 else a)
+            rate = _imposed(
+                sample, motion, time, derivative, v + a * time if derivative == 1 else a
+            )
             error = np.abs(rate - (after - before) / (2.0 * step)).max()
             yield float(error / np.abs(rate).max())
 
@@ -171,7 +174,7 @@ def virtual_power(handler: BoundaryHandler) -> Iterator[float]:
         ghosts = sample.simulation.particles.ghosts[:, None]
         u, f = sample.random(), np.where(ghosts, sample.random(), 0.0)
         du = np.where(motion.held, 0.0, sample.random())
-        placed = _imposed(motion, 0.0, 0, u + du) - _imposed(motion, 0.0, 0, u)
+        placed = _imposed(sample, motion, 0.0, 0, u + du) - _imposed(sample, motion, 0.0, 0, u)
         returned = f.copy()
         motion.return_forces(returned)
         scale = float(np.abs(f * placed).sum())
@@ -258,7 +261,9 @@ def _constraints(handler: BoundaryHandler) -> Iterator[tuple[_Sample, Constraint
                 yield sample, term
 
 
-def _imposed(motion: Constraint, time: float, derivative: int, free: Array) -> Array:
+def _imposed(
+    sample: _Sample, motion: Constraint, time: float, derivative: int, free: Array
+) -> Array:
     values = free.copy()
-    motion.impose(time, derivative, values)
+    motion.impose(time, derivative, values, sample.simulation.step_size)
     return values

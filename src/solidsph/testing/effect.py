@@ -14,15 +14,7 @@ import attrs
 import numpy as np
 
 from solidsph.assembly.builder import Builder
-from solidsph.conformance.check import (
-    Broken,
-    Kit,
-    NotPromised,
-    Verdict,
-    at_most,
-    more_than,
-    worst,
-)
+from solidsph.conformance.check import Broken, Kit, NotPromised, Verdict, at_most, more_than, worst
 from solidsph.conformance.samples import DIMENSIONS, accepted, kept_for_last
 from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.effect import Effect

@@ -175,7 +175,8 @@ def _fields(dimension: int, dtype: str, threaded: bool) -> tuple[Any, Any, Any]:
     @njit
     def cleared(share, buffers):
         low, high, shift = share[2], share[3], share[4]
-        buffers[low * D + shift : (high + margin) * D + shift] = 0.0
+        if high > low:  # a thread without work has no buffer, and must not touch another's
+            buffers[low * D + shift : (high + margin) * D + shift] = 0.0
 
     @njit(parallel=threaded)
     def total(table, buffers, forces):
