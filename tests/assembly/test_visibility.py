@@ -15,8 +15,8 @@ import pytest
 
 from solidsph import Simulation
 from solidsph.assembly.visibility import hidden_pairs
+from solidsph.engines.compiled.fixed.chunks import weighted_chunks
 from solidsph.engines.compiled.moving.search import NeighbourSearch
-from solidsph.engines.compiled.reference.chunks import weighted_chunks
 from solidsph.interfaces.body import Body, part_of
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.neighbours import Hidden, neighbour_pairs

@@ -14,7 +14,7 @@ import pytest
 from solidsph import Simulation
 from solidsph.engines.automatic import AutomaticEngine
 from solidsph.engines.compiled.engine import CompiledEngine, CompiledForces
-from solidsph.engines.compiled.reference import partition
+from solidsph.engines.compiled.fixed import partition
 from solidsph.engines.matrix import MatrixEngine, MatrixForces
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import Engine, InternalForces

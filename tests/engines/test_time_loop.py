@@ -10,7 +10,7 @@ import pytest
 from numba.core.config import NUMBA_NUM_THREADS
 
 from solidsph import DivergedError, Simulation
-from solidsph.engines.compiled.reference import partition
+from solidsph.engines.compiled.fixed import partition
 from solidsph.engines.compiled.time_loop.loop import CompiledLoop
 from solidsph.interfaces.compilable_terms import PointwiseLoad
 from solidsph.interfaces.effect import Effect

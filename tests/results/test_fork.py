@@ -15,7 +15,7 @@ CODE = """
 import multiprocessing as mp, os, sys
 from concurrent.futures import ProcessPoolExecutor
 from solidsph import SolidsphError
-from solidsph.engines.compiled.reference import partition
+from solidsph.engines.compiled.fixed import partition
 from tests.helpers.scenes import box
 partition.WORTH_A_THREAD = 1
 def built():

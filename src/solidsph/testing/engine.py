@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from functools import partial
 from typing import final
 
 import attrs
 import numpy as np
 
 from solidsph.conformance.check import Broken, Kit, Verdict, at_most, worst
-from solidsph.conformance.samples import kept_for_last
+from solidsph.conformance.samples import accepted, kept_for_last
 from solidsph.engines.matrix import MatrixEngine
+from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import Engine, InternalForces
 from solidsph.interfaces.plan import BodySize
@@ -58,31 +60,37 @@ class _Sample:
 
 @kept_for_last
 def _samples(engine: Engine) -> list[_Sample]:
-    return list(_prepared(engine))
+    """Bodies in every dimension and form that the engine does not refuse.
+
+    Raises:
+        SceneError: it refuses all of them.
+    """
+    attempts = (
+        (f"{d}D, {form}", partial(_prepared, engine, d, form, seed))
+        for seed, (d, form) in enumerate(_FORMS)
+    )
+    return accepted("form", attempts, (BuildError, SceneError))
 
 
-def _prepared(engine: Engine) -> Iterator[_Sample]:
-    for number, (d, form) in enumerate(_FORMS):
-        builder = Simulation.builder().material("neo-hookean", **_MATERIAL).duration(1e-3)
-        for name, origin in (("one", 0.0), ("other", 1.0)):
-            shape = {
-                "type": "interval" if d == 1 else "box",
-                **({"length": 0.8, "origin": origin} if d == 1 else {}),
-                **({"lengths": [0.5] * d, "origin": [origin] * d} if d > 1 else {}),
-            }
-            jittered = {"type": "jittered-lattice", "amplitude": 0.1, "seed": number}
-            builder.body(name, shape=shape, spacing=_SPACING, discretisation=jittered)
-        simulation = builder.kernel("cubic-spline").formulation(form).engine("matrix").build()
-        bodies = simulation.model.bodies
-        yield _Sample(
-            engine=engine,
-            simulation=simulation,
-            own=engine.prepare(bodies, ()),
-            reference=simulation.dynamics.internal,
-            displacements=0.02
-            * _SPACING
-            * np.random.default_rng(0).normal(size=(simulation.particles.count, d)),
+def _prepared(engine: Engine, d: int, form: Mapping[str, str], seed: int) -> _Sample:
+    builder = Simulation.builder().material("neo-hookean", **_MATERIAL).duration(1e-3)
+    jittered = {"type": "jittered-lattice", "amplitude": 0.1, "seed": seed}
+    for name, origin in (("one", 0.0), ("other", 1.0)):
+        shape = (
+            {"type": "interval", "length": 0.8, "origin": origin}
+            if d == 1
+            else {"type": "box", "lengths": [0.5] * d, "origin": [origin] * d}
         )
+        builder.body(name, shape=shape, spacing=_SPACING, discretisation=jittered)
+    simulation = builder.kernel("cubic-spline").formulation(form).engine("matrix").build()
+    u = np.random.default_rng(seed).normal(size=simulation.particles.positions.shape)
+    return _Sample(
+        engine=engine,
+        simulation=simulation,
+        own=engine.prepare(simulation.model.bodies, ()),
+        reference=simulation.dynamics.internal,
+        displacements=0.02 * _SPACING * u,
+    )
 
 
 @KIT.check

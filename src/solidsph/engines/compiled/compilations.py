@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from solidsph.engines.compiled.fixed.body import ReferenceBody
 from solidsph.engines.compiled.moving.body import MovingBody
-from solidsph.engines.compiled.reference.body import ReferenceBody
 from solidsph.engines.compiled.time_loop.loads import kind_of
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import Integrator

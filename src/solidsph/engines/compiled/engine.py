@@ -11,10 +11,10 @@ import numpy as np
 from solidsph.engines.array_law import stress_fields
 from solidsph.engines.compiled.compilations import of_forces, of_steps
 from solidsph.engines.compiled.expected import expected_plan
+from solidsph.engines.compiled.fixed.body import ReferenceBody, reference_body
 from solidsph.engines.compiled.history_law import CompiledLaw
 from solidsph.engines.compiled.moving.body import MovingBody, moving_body
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux
-from solidsph.engines.compiled.reference.body import ReferenceBody, reference_body
 from solidsph.engines.compiled.time_loop.loop import are_compilable, compiled_loop
 from solidsph.engines.matrix import MatrixEngine
 from solidsph.interfaces.body import Body

@@ -11,18 +11,18 @@ from numba import njit, prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.pointwise import no_law
-from solidsph.engines.compiled.reference.blocks import group
-from solidsph.engines.compiled.reference.chunks import weighted_chunks
-from solidsph.engines.compiled.reference.partition import (
+from solidsph.engines.compiled.fixed.blocks import group
+from solidsph.engines.compiled.fixed.chunks import weighted_chunks
+from solidsph.engines.compiled.fixed.partition import (
     flat_field,
     partitioned,
     passes,
     spread_pass,
     thread_count,
 )
-from solidsph.engines.compiled.reference.rows import Rows, compressed
-from solidsph.engines.compiled.reference.subset_rows import part_of_rows
+from solidsph.engines.compiled.fixed.rows import Rows, compressed
+from solidsph.engines.compiled.fixed.subset_rows import part_of_rows
+from solidsph.engines.compiled.pointwise import no_law
 from solidsph.engines.compiled.threads import check_alive
 from solidsph.engines.compiled.vectors import ROW, moved
 from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassPairs

@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from solidsph.engines.compiled.fixed.rows import Rows
 from solidsph.engines.compiled.pointwise import NotCompilableError
-from solidsph.engines.compiled.reference.rows import Rows
 from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.constraints import following
 from solidsph.interfaces.compilable_terms import LinearExtension
@@ -19,7 +19,7 @@ from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Indices
 
 if TYPE_CHECKING:
-    from solidsph.engines.compiled.reference.body import ReferenceBody
+    from solidsph.engines.compiled.fixed.body import ReferenceBody
 
 
 class BodyData(NamedTuple):

@@ -11,8 +11,8 @@ import numpy as np
 from numba import njit, prange, types
 
 from solidsph.engines.compiled.constants import PER_PARTICLE
+from solidsph.engines.compiled.fixed.partition import thread_count
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function
-from solidsph.engines.compiled.reference.partition import thread_count
 from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.constraints import (
     ConstraintCalls,
@@ -38,7 +38,7 @@ from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 
 if TYPE_CHECKING:
-    from solidsph.engines.compiled.reference.body import ReferenceBody
+    from solidsph.engines.compiled.fixed.body import ReferenceBody
 
 # Largest number of entries in the tables of scheduled values, for the steps that go together.
 _TABLE = 1 << 18

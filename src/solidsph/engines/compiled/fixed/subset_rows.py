@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solidsph.engines.compiled.reference.rows import ROWS, Rows, stretches
+from solidsph.engines.compiled.fixed.rows import ROWS, Rows, stretches
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.neighbours import ranges
 

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from solidsph.engines.compiled.constants import STRIDE
-from solidsph.engines.compiled.reference.blocks import block_loops
+from solidsph.engines.compiled.fixed.blocks import block_loops
 
 
 class BlockSweeps(NamedTuple):

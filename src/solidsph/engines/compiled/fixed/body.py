@@ -9,10 +9,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.pointwise import no_law
-from solidsph.engines.compiled.reference.blocks import group
-from solidsph.engines.compiled.reference.chunks import in_chunks, weighted_chunks
-from solidsph.engines.compiled.reference.partition import (
+from solidsph.engines.compiled.fixed.blocks import group
+from solidsph.engines.compiled.fixed.chunks import in_chunks, weighted_chunks
+from solidsph.engines.compiled.fixed.partition import (
     Partition,
     Passes,
     flat_field,
@@ -21,8 +20,9 @@ from solidsph.engines.compiled.reference.partition import (
     spread_pass,
     thread_count,
 )
-from solidsph.engines.compiled.reference.rows import Rows, compressed
-from solidsph.engines.compiled.reference.subset_rows import part_of_rows
+from solidsph.engines.compiled.fixed.rows import Rows, compressed
+from solidsph.engines.compiled.fixed.subset_rows import part_of_rows
+from solidsph.engines.compiled.pointwise import no_law
 from solidsph.interfaces.body import Body, part_of
 from solidsph.interfaces.plan import Operations, SumMethod, vectors
 from solidsph.maths.arrays import Array, Indices

@@ -14,8 +14,8 @@ import numpy as np
 from numba import njit
 
 from solidsph.engines.compiled.constants import STRIDE
-from solidsph.engines.compiled.reference.lanes import lane_operations, register_bytes
-from solidsph.engines.compiled.reference.rows import BAND, RUN
+from solidsph.engines.compiled.fixed.lanes import lane_operations, register_bytes
+from solidsph.engines.compiled.fixed.rows import BAND, RUN
 
 _REGISTERS = 4  # of consecutive particles that a stencil is applied to together
 

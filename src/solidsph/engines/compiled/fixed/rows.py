@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.reference.growing import Growing
+from solidsph.engines.compiled.fixed.growing import Growing
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.neighbours import Pairs, row_starts
 
