@@ -35,6 +35,7 @@ from solidsph.costs.process import memory_now, peak_memory
 from solidsph.costs.terms import CostTerm
 from solidsph.costs.work import Work
 from solidsph.scene.scene_builder import SceneBuilder
+from solidsph.system.cache import CACHE
 
 SPACING, STEP = 0.01, 2e-5
 VISCOSITY, HOURGLASS = {"type": "artificial-viscosity"}, {"type": "hourglass-control"}
@@ -298,10 +299,11 @@ def main() -> None:
             continue
         begun = time.perf_counter()
         command = [sys.executable, __file__, "--one", f"{k}"]
-        threads = {"NUMBA_NUM_THREADS": f"{specimen.threads}"}
-        done = subprocess.run(
-            command, capture_output=True, check=False, env={**os.environ, **threads}
-        )
+        with tempfile.TemporaryDirectory() as empty:  # so that nothing has been compiled before
+            own = {"NUMBA_NUM_THREADS": f"{specimen.threads}", CACHE: empty}
+            done = subprocess.run(
+                command, capture_output=True, check=False, env={**os.environ, **own}
+            )
         if done.returncode:
             raise SystemExit(f"{specimen}: {done.stderr.decode()}")
         kept[key] = pickle.loads(done.stdout)

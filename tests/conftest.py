@@ -17,6 +17,7 @@ from hypothesis import HealthCheck, is_hypothesis_test, settings
 from solidsph.costs import calibration
 from solidsph.costs.coefficients import REFERENCE
 from solidsph.registry import registry
+from solidsph.system.cache import CACHE
 from tests.helpers.examples import QUICK, THOROUGH
 
 # Machines that run the tests are shared: a slow moment is not a failure. Examples stay random, so
@@ -59,9 +60,12 @@ def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     The calibration in it is the reference: no test measures this machine unless it says so.
     """
-    folder = tmp_path_factory.mktemp("cache")
+    # Of all processes of this session, which share what they compile.
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "cache"
+    folder.mkdir(exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(calibration.CACHE, str(folder))
+        patch.setenv(CACHE, str(folder))
         calibration.cache_file().write_text(REFERENCE.to_json(), encoding="utf-8")
     return folder
 

@@ -19,7 +19,7 @@ from solidsph.errors import BuildError, ConvergenceError, DivergedError, Solidsp
 
 VERBS = (
     *("run", "resume", "explain", "cases", "plugins", "check", "plot"),
-    *("reproduce", "cost", "stability"),
+    *("reproduce", "cost", "stability", "cache"),
 )
 
 TRACEBACK = "SOLIDSPH_TRACEBACK"

@@ -33,6 +33,7 @@ from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.plan import CompilationUnit, SumMethod
 from solidsph.interfaces.terms import Load
 from solidsph.run.stable_step import stable_step
+from solidsph.system.cache import CACHE
 from tests.commands.test_cli import solidsph
 from tests.helpers.scenes import SCENE_TOML, SOFT
 from tests.helpers.waiting import HANG
@@ -293,7 +294,7 @@ def test_what_was_built_or_compiled_before_is_not_predicted_again() -> None:
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv(calibration.CACHE, str(tmp_path / "own"))
+    monkeypatch.setenv(CACHE, str(tmp_path / "own"))
     calibration.this_machine.cache_clear()
     yield calibration.cache_file()
     calibration.this_machine.cache_clear()

@@ -19,7 +19,7 @@ MAY_IMPORT = {
     "model": "errors maths",
     "interfaces": "errors maths model",
     "registry": "errors",
-    "engines": "errors maths model interfaces",
+    "engines": "errors system maths model interfaces",
     "scene": "errors system maths model interfaces registry",
     "run": "errors maths model interfaces registry scene",
     "statics": "errors maths model interfaces engines scene run",
@@ -31,7 +31,7 @@ MAY_IMPORT = {
     "conformance",
     "simulation": "errors interfaces scene run statics results watch assembly",
     "resumption": "errors system scene run results simulation",
-    "costs": "errors interfaces registry engines scene run simulation",
+    "costs": "errors system interfaces registry engines scene run simulation",
     "studies": "errors maths model interfaces registry scene run results conformance simulation "
     "costs",
     "testing": "errors maths interfaces registry engines run conformance assembly simulation",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -56,7 +57,7 @@ def in_a_child(code: str) -> subprocess.CompletedProcess[str]:
         text=True,
         check=False,
         timeout=HANG,
-        env={"NUMBA_NUM_THREADS": "2", "PATH": "", "PYTHONPATH": "."},
+        env={**os.environ, "NUMBA_NUM_THREADS": "2", "PYTHONPATH": "."},
     )
 
 

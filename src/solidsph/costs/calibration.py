@@ -13,7 +13,6 @@ import subprocess
 import sys
 import time as clock
 from collections.abc import Callable
-from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -21,14 +20,13 @@ from typing import Any
 
 import attrs
 
+from solidsph.system.cache import cache_folder, write_whole
+
 # Lifetime of a cached calibration [s]: the load and the cooling of a machine change.
 _STALE = 86400.0
 
 # Timeout of a calibration [s]; it takes about one.
 _LONGEST = 20.0
-
-CACHE = "SOLIDSPH_CACHE"
-"""Environment variable: folder of the cache, instead of the user's cache folder."""
 
 
 @attrs.frozen
@@ -72,7 +70,7 @@ def this_machine() -> Calibration:
     calibration = cached_calibration()
     if calibration is None:
         calibration = measure_calibration()
-        _write(cache_file(), calibration)
+        write_whole(cache_file(), calibration.to_json().encode())
     return calibration
 
 
@@ -101,23 +99,9 @@ def measure_calibration() -> Calibration:
 
 def cache_file() -> Path:
     """Path of the cache file of this machine and this version."""
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(os.environ.get(CACHE) or Path(home) / "solidsph")
     machine = f"{platform.node()}-{platform.machine()}-{os.cpu_count()}"
     safe = "".join(sign if sign.isalnum() or sign in "-." else "_" for sign in machine)
-    return folder / f"calibration-{version('solidsph')}-{safe}.json"
-
-
-def _write(path: Path, calibration: Calibration) -> None:
-    """Write the cache file atomically; do nothing where that is impossible."""
-    draft = path.with_name(f"{path.name}.{os.getpid()}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        draft.write_text(calibration.to_json(), encoding="utf-8")
-        draft.replace(path)
-    except OSError:
-        with suppress(OSError):
-            draft.unlink()
+    return cache_folder() / f"calibration-{version('solidsph')}-{safe}.json"
 
 
 def best(

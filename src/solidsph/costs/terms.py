@@ -22,6 +22,9 @@ _CACHED_OUTPUTS = 150.0
 # The C library requests larger arrays from the system one by one, which clears every page [bytes].
 _LARGE = 128 * 1024
 
+# Time and memory of reading compiled functions from the disk, over those of compiling them.
+_READING, _READ = 0.01, 0.35
+
 _OF_BUILD = (CompilationUnit.ENGINE, CompilationUnit.MOVING_ENGINE)
 
 
@@ -164,7 +167,8 @@ def run_memory(work: Work) -> Iterator[CostTerm]:
             yield CostTerm(f"memory of a run, pair {part.method.name} {d}D", part.pairs, Unit.BYTES)
     for c in work.compilations:
         if c.unit not in _OF_BUILD:
-            yield CostTerm(f"memory of {c.unit.name}{_threads(c.threaded)}", 1.0, Unit.BYTES)
+            share = _READ if c.on_disk else 1.0
+            yield CostTerm(f"memory of {c.unit.name}{_threads(c.threaded)}", share, Unit.BYTES)
     if work.statics is not None:
         yield CostTerm(f"memory of a tangent entry {d}D", work.statics.entries, Unit.BYTES)
         yield CostTerm(f"memory of a factor entry {d}D", work.statics.fill, Unit.BYTES)
@@ -188,15 +192,17 @@ def _sum_terms(part: Operations, d: int) -> Iterator[CostTerm]:
 def _compilations(work: Work, *, of_build: bool) -> Iterator[CostTerm]:
     for part in work.compilations:
         if (part.unit in _OF_BUILD) == of_build:
+            share = _READING if part.on_disk else 1.0
             yield CostTerm(
-                f"compile {part.unit.name}{_threads(part.threaded)}", 1.0, Unit.COMPILING
+                f"compile {part.unit.name}{_threads(part.threaded)}", share, Unit.COMPILING
             )
 
 
 def _compiler_memory(work: Work) -> Iterator[CostTerm]:
     for part in work.compilations:
         if part.unit in _OF_BUILD:
-            yield CostTerm(f"memory of {part.unit.name}", 1.0, Unit.BYTES)
+            share = _READ if part.on_disk else 1.0
+            yield CostTerm(f"memory of {part.unit.name}", share, Unit.BYTES)
 
 
 def _threads(threaded: bool) -> str:

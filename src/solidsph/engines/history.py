@@ -72,6 +72,9 @@ class HistoryForces(InternalForces):
     def compilations(self) -> frozenset[Compilation]:
         return self.sums.compilations
 
+    def note(self, compilations: frozenset[Compilation]) -> None:
+        self.sums.note(compilations)
+
     @property
     def precision(self) -> float:
         return self.sums.precision

@@ -117,6 +117,13 @@ class InternalForces(ABC):
         """What must be compiled for one evaluation."""
         return frozenset()
 
+    def note(self, compilations: frozenset[Compilation]) -> None:
+        """Take note that a run has compiled these, which `Compilation.on_disk` then tells.
+
+        Does nothing by default.
+        """
+        return
+
     @property
     def precision(self) -> float:
         """Machine epsilon of the numbers that are summed."""

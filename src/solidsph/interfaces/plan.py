@@ -43,7 +43,7 @@ class Operations:
 
 
 class CompilationUnit(Enum):
-    """Code that may have to be compiled, once per process and key."""
+    """Code that a process has to compile, or to read from the disk, once per key."""
 
     ENGINE = "the engine, laws and the layout of rows"
     MOVING_ENGINE = "the engine, laws and the search for neighbours"
@@ -67,6 +67,7 @@ class Compilation:
     dimension: int
     threaded: bool
     key: object = None  # distinguishes variants of one unit
+    on_disk: bool = attrs.field(default=False, eq=False)  # it need only be read
 
 
 @attrs.frozen

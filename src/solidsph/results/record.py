@@ -73,7 +73,7 @@ class Record:
         RecordError: there is no such file, it is no record, or it is damaged.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         self._file: Any = None
         self._source: HDF5Source | None = None

@@ -79,6 +79,7 @@ def run_motion(
                     raise simulation.diverged(failed.state, failed.cause) from failed
                 observation = simulation.observe(state)
                 hook.solidsph_step_end(simulation=simulation, observation=observation)
+            simulation.dynamics.internal.note(simulation.plan.compilations)
             judge(simulation)
     except UnsoundError as unsound:
         unsound.result = result()

@@ -18,13 +18,13 @@ class Scene(SceneData):
     """Everything that a run depends on."""
 
     @classmethod
-    def read(cls, path: Path) -> Scene:
+    def read(cls, path: Path | str) -> Scene:
         """Read a TOML file.
 
         Raises:
             SceneError: the file is missing, is not TOML, or has mistakes.
         """
-        return cls.from_toml(read_text(path), str(path))
+        return cls.from_toml(read_text(Path(path)), str(path))
 
     @classmethod
     def from_toml(cls, text: str, origin: str = "scene") -> Scene:

@@ -39,6 +39,7 @@ def run_statics(
 
     with session(simulation, listeners):
         result = equilibrium(simulation, **attrs.asdict(wanted), observer=observe)
+    simulation.dynamics.internal.note(simulation.dynamics.internal.compilations)
     return Result(
         state=result.state,
         record=None,

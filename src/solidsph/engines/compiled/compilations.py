@@ -44,7 +44,7 @@ def of_steps(
     d = equation.particles.dimension
     threaded = any(o.threaded for part in parts for o in part.operations)
     kinds = tuple(sorted(type(term).__name__ for term in (*equation.constraints, *equation.loads)))
-    laws = frozenset(_law(part) for part in parts)
+    laws = tuple(sorted({_law(part) for part in parts}, key=repr))
     yield Compilation(CompilationUnit.STEPS, d, threaded, (type(integrator), laws, kinds))
     for load in equation.loads:
         unit = kind_of(load).unit

@@ -14,6 +14,7 @@ from solidsph.engines.compiled.expected import expected_plan
 from solidsph.engines.compiled.fixed.body import ReferenceBody, reference_body
 from solidsph.engines.compiled.history_law import CompiledLaw
 from solidsph.engines.compiled.moving.body import MovingBody, moving_body
+from solidsph.engines.compiled.notes import looked_up, note
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux
 from solidsph.engines.compiled.time_loop.loop import are_compilable, compiled_loop
 from solidsph.engines.matrix import MatrixEngine
@@ -102,7 +103,10 @@ class CompiledForces(InternalForces):
 
     @property
     def compilations(self) -> frozenset[Compilation]:
-        return frozenset(of_forces(self.parts, self.conditions))
+        return looked_up(of_forces(self.parts, self.conditions))
+
+    def note(self, compilations: frozenset[Compilation]) -> None:
+        note(compilations)
 
     def plan(self, equation: EquationOfMotion, integrator: Integrator) -> Plan:
         fixed = self._fixed
@@ -112,8 +116,8 @@ class CompiledForces(InternalForces):
             return super().plan(equation, integrator)
         d = equation.particles.dimension
         loads = [o for load in equation.loads for o in load.operations(d, compiled=True)]
-        units = {*self.compilations, *of_steps(fixed, equation, integrator)}
-        return Plan(True, self.operations, loads, frozenset(units))
+        steps = looked_up(of_steps(fixed, equation, integrator))
+        return Plan(True, self.operations, loads, self.compilations | steps)
 
     @property
     def _fixed(self) -> Sequence[ReferenceBody]:

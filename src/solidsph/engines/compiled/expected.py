@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from solidsph.engines.compiled.constants import STRIDE, WORTH_A_THREAD
+from solidsph.engines.compiled.notes import looked_up
 from solidsph.interfaces.plan import (
     BodySize,
     Compilation,
@@ -31,7 +32,7 @@ def expected_plan(sizes: Sequence[BodySize], precision: int = 8) -> Plan:
             *(Compilation(p, d, True) for p in own),
         ]
     operations = tuple(o for size in sizes for o in _operations(size, precision))
-    return Plan(not moving, operations, (), frozenset(units))
+    return Plan(not moving, operations, (), looked_up(units))
 
 
 def _operations(size: BodySize, precision: int) -> Iterator[Operations]:

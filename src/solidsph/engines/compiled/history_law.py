@@ -7,9 +7,10 @@ from typing import Any, final
 
 import attrs
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
+from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import (
     NotCompilableError,
     compiled_function,

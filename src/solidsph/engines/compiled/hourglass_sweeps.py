@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, final
 
 import attrs
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
@@ -22,6 +22,7 @@ from solidsph.engines.compiled.fixed.partition import (
 )
 from solidsph.engines.compiled.fixed.rows import Rows, compressed
 from solidsph.engines.compiled.fixed.subset_rows import part_of_rows
+from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import no_law
 from solidsph.engines.compiled.threads import check_alive
 from solidsph.engines.compiled.vectors import ROW, moved

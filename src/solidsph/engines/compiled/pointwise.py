@@ -11,10 +11,11 @@ from functools import cache
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
-from numba import njit, types
+from numba import types
 from numba.core.errors import NumbaError
 from numba.extending import register_jitable
 
+from solidsph.engines.compiled.jit import njit
 from solidsph.errors import PortableError
 from solidsph.interfaces.formulation import Formulation
 from solidsph.interfaces.material import Material

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
-
+from solidsph.engines.compiled.jit import njit
 from solidsph.maths.arrays import Array, Scalar, Tensor
 
 Vector = Any  # a tuple of 1, 2 or 3 numbers

@@ -6,10 +6,10 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from solidsph.engines.compiled.constants import STRIDE
 from solidsph.engines.compiled.fixed.blocks import block_loops
+from solidsph.engines.compiled.jit import njit
 
 
 class BlockSweeps(NamedTuple):

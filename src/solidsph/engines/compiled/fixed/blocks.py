@@ -11,11 +11,11 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from solidsph.engines.compiled.constants import STRIDE
 from solidsph.engines.compiled.fixed.lanes import lane_operations, register_bytes
 from solidsph.engines.compiled.fixed.rows import BAND, RUN
+from solidsph.engines.compiled.jit import njit
 
 _REGISTERS = 4  # of consecutive particles that a stencil is applied to together
 

@@ -13,13 +13,14 @@ from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
 from solidsph.engines.compiled.constants import STRIDE, WORTH_A_THREAD
 from solidsph.engines.compiled.fixed.block_sweeps import block_sweeps, spread_sweep
 from solidsph.engines.compiled.fixed.blocks import group
 from solidsph.engines.compiled.fixed.rows import Rows
+from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.threads import check_alive, started
 from solidsph.maths.arrays import Indices
 from solidsph.model.neighbours import ranges

@@ -11,10 +11,10 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from solidsph.engines.compiled.fixed.growing import Growing
+from solidsph.engines.compiled.jit import njit
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.neighbours import Pairs, row_starts
 

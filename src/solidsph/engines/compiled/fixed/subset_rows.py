@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from solidsph.engines.compiled.fixed.rows import ROWS, Rows, stretches
+from solidsph.engines.compiled.jit import njit
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.neighbours import ranges
 

@@ -9,8 +9,8 @@ from typing import Any, ClassVar, final
 
 import attrs
 import numpy as np
-from numba import njit
 
+from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.moving.kernel_pass import KernelPass, kernel_pass
 from solidsph.engines.compiled.moving.neighbourhoods import Neighbourhoods, Place, fill, kernel_sums
 from solidsph.engines.compiled.moving.pointwise_sums import PointwiseSums

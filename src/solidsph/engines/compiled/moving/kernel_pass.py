@@ -6,8 +6,9 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, TypeAlias
 
-from numba import njit, types
+from numba import types
 
+from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.moving.search import Near
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function, numbers_type
 from solidsph.interfaces.kernel import Kernel

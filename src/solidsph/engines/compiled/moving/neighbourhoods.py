@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.moving.search import Near
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.neighbours import Pairs

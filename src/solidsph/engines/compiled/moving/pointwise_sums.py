@@ -11,8 +11,9 @@ from typing import Any, final
 
 import attrs
 import numpy as np
-from numba import njit, types
+from numba import types
 
+from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.moving.neighbourhoods import Place
 from solidsph.engines.compiled.pointwise import (
     NotCompilableError,

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple, final
 
 import attrs
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from solidsph.engines.compiled.jit import njit
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.neighbours import Hidden
 

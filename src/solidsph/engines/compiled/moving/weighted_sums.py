@@ -6,8 +6,8 @@ from functools import cache
 from typing import Any, final
 
 import attrs
-from numba import njit
 
+from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.moving.neighbourhoods import Place
 from solidsph.engines.compiled.vectors import MATRIX, ROW, with_outer, with_product
 from solidsph.interfaces.formulation import Formulation

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from numba import njit
+from solidsph.engines.compiled.jit import njit
 
 
 @cache

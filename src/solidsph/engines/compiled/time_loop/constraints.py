@@ -6,10 +6,10 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.interfaces.compilable_terms import LinearExtension, ScheduledConstraint
 from solidsph.interfaces.terms import Constraint

@@ -7,10 +7,10 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from solidsph.engines.compiled.fixed.rows import Rows
+from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.constraints import following

@@ -7,11 +7,12 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
 from solidsph.engines.compiled.hourglass_sweeps import HourglassArrays, HourglassSweeps, body_sweep
+from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function, numbers_type
 from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.vectors import ROW, moved

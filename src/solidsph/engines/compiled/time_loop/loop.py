@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import attrs
 import numpy as np
-from numba import njit, prange, types
+from numba import prange, types
 
 from solidsph.engines.compiled.constants import PER_PARTICLE
 from solidsph.engines.compiled.fixed.partition import thread_count
+from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function
 from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.constraints import (

@@ -1,0 +1,160 @@
+"""Compiled functions on disk: the next process compiles nothing, and computes the same bits."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from solidsph.costs.coefficients import REFERENCE
+from solidsph.costs.count import count_work
+from solidsph.costs.model import predict
+from solidsph.system.cache import CACHE
+from tests.helpers.scenes import box
+
+COUNTED = """
+import numba.core.event as event
+
+class Count(event.Listener):
+    compiled = 0
+    def on_start(self, what): self.compiled += 1
+    def on_end(self, what): pass
+
+count = Count()
+event.register("numba:compile", count)
+"""
+
+LAW = (
+    COUNTED
+    + """
+import sys
+from numba import types
+from solidsph.engines.compiled.pointwise import compiled_function
+import law
+
+for argument in sys.argv[1:]:
+    function = compiled_function(law.times(float(argument)), types.float64)
+    print(function(1.0), count.compiled)
+    count.compiled = 0
+"""
+)
+
+SOURCE = """
+def shift(x):
+    return x + 1.0
+
+def times(factor):
+    def law(x):
+        return factor * shift(x)
+    return law
+"""
+
+
+@pytest.fixture
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "cache"
+    monkeypatch.setenv(CACHE, str(folder))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")  # an edit within a second must be seen
+    return folder
+
+
+def printed(program: str, *arguments: str) -> list[list[str]]:
+    done = subprocess.run(
+        [sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return [line.split() for line in done.stdout.splitlines()]
+
+
+def test_only_what_has_changed_is_compiled(
+    tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "law.py").write_text(SOURCE)
+    ((value, first),) = printed(LAW, "2")
+    assert (value, int(first) > 0) == ("4.0", True)
+    assert printed(LAW, "2") == [["4.0", "0"]]
+    # Another closure of the same name is another function, and meets the first in one process.
+    assert printed(LAW, "3", "2") == [["6.0", first], ["4.0", "0"]]
+    assert printed(LAW, "2", "3") == [["4.0", "0"], ["6.0", "0"]]
+    # A helper that it calls has changed.
+    (tmp_path / "law.py").write_text(SOURCE.replace("1.0", "2.0"))
+    (two, again), (three, closure) = printed(LAW, "2", "3")
+    assert (two, again, three) == ("6.0", first, "9.0")
+    assert int(closure) > 0
+    # A setting of the compiler makes other code.
+    monkeypatch.setenv("NUMBA_OPT", "1")
+    assert printed(LAW, "2") == [["6.0", first]]
+
+
+def test_damaged_entries_are_compiled_anew(tmp_path: Path, own_cache: Path) -> None:
+    (tmp_path / "law.py").write_text(SOURCE)
+    ((_, first),) = printed(LAW, "2")
+    entries = list((own_cache / "compiled").iterdir())
+    assert entries
+    for path in entries:
+        path.write_bytes(path.read_bytes()[:-100])
+    assert printed(LAW, "2") == [["4.0", first]]
+    assert printed(LAW, "2") == [["4.0", "0"]]
+
+
+def test_numbers_of_functions_differ_between_processes() -> None:
+    """Or the linker would take functions of equal names for the same."""
+    first, second = (int(printed(IDS)[0][0]) for _ in range(2))
+    assert abs(first - second) > 10**6
+
+
+IDS = """
+import solidsph.engines.compiled.jit
+from numba.core.bytecode import FunctionIdentity
+print(next(FunctionIdentity._unique_ids))
+"""
+
+RUN = (
+    COUNTED
+    + """
+import hashlib
+from pathlib import Path
+from solidsph import Scene, Simulation
+import sys
+
+simulation = Simulation.builder(Scene.read(Path(sys.argv[1]))).build()
+end = simulation.run().state
+print(count.compiled, hashlib.sha256(end.positions.tobytes()).hexdigest())
+"""
+)
+
+
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_a_second_run_compiles_nothing_and_moves_the_same(
+    threads: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a cache that other tests may have filled."""
+    monkeypatch.setenv("NUMBA_NUM_THREADS", threads)
+    path = tmp_path / "scene.toml"
+    # Large enough for two threads.
+    scene = (
+        box(2, 64)
+        .boundary("clamp", where="left")
+        .effect("hourglass-control")
+        .initial(velocity={"y": "X"})
+        .engine("compiled")
+        .duration(1e-3)
+        .outputs(1)
+    )
+    path.write_text(scene.scene().to_toml())
+    (_, moved), (compiled, same) = (printed(RUN, str(path))[0] for _ in range(2))
+    assert compiled == "0"
+    assert same == moved
+
+
+def test_a_prediction_knows_what_is_on_disk() -> None:
+    """What is read takes a hundredth of what is compiled."""
+    scene = box(1, 12).engine("compiled")
+    scene.build().run()
+    work = count_work(scene.build())
+    assert work.compilations
+    assert all(one.on_disk for one in work.compilations)
+    assert predict(work, REFERENCE).compiling < 0.2
