@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, is_hypothesis_test, settings
 from solidsph.costs import calibration
 from solidsph.costs.coefficients import REFERENCE
 from solidsph.registry import registry
-from solidsph.system.cache import CACHE
+from solidsph.system.cache import CACHE, write_whole
 from tests.helpers.examples import QUICK, THOROUGH
 
 # Machines that run the tests are shared: a slow moment is not a failure. Examples stay random, so
@@ -55,18 +55,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture(scope="session")
-def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where this session keeps what the user's cache would hold.
+def cache_folder(pytestconfig: pytest.Config) -> Path:
+    """What the user's cache would hold, of all processes of this session and those after it.
 
     The calibration in it is the reference: no test measures this machine unless it says so.
     """
-    # Of all processes of this session, which share what they compile.
-    base = tmp_path_factory.getbasetemp()
-    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "cache"
-    folder.mkdir(exist_ok=True)
+    assert pytestconfig.cache is not None
+    folder = pytestconfig.cache.mkdir("solidsph")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(CACHE, str(folder))
-        calibration.cache_file().write_text(REFERENCE.to_json(), encoding="utf-8")
+        write_whole(calibration.cache_file(), REFERENCE.to_json().encode())
     return folder
 
 

@@ -318,6 +318,7 @@ def test_an_installed_hook_hears_every_run(guide) -> None:
     assert listener.peaks[built] == pytest.approx(3.0, rel=1e-9)
 
 
+@pytest.mark.validation  # some ten seconds of compiling
 def test_their_formulas_compile(guide) -> None:
     """Whole steps, from output to output, as step by step."""
     for page in ("first-material", "first-effect", "first-integrator", "first-boundary"):

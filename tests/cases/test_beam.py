@@ -77,6 +77,7 @@ def test_at_rest() -> None:
     assert errors[1] < 0.01
 
 
+@pytest.mark.validation  # the case csm3 is the same beam
 def test_first_minimum_of_five_particles_across() -> None:
     assert error_of_first_minimum(5) == pytest.approx(0.0, abs=0.015)
 

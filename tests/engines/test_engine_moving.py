@@ -132,10 +132,11 @@ GRADIENTS = [name for name in registry.names("gradients") if name not in REFEREN
 
 
 @pytest.mark.parametrize(
-    ("d", "arrangement", "divergence", "gradient"),
-    pairwise((1, 2, 3), ARRANGEMENTS, registry.names("divergences"), GRADIENTS),
+    ("arrangement", "divergence", "gradient"),
+    pairwise(ARRANGEMENTS, registry.names("divergences"), GRADIENTS),
     ids=arrangement_name,
 )
+@mostly_in_2d
 def test_agrees_for_every_operator(
     d: int, arrangement: dict[str, Any], divergence: str, gradient: str
 ) -> None:
@@ -148,7 +149,14 @@ def test_agrees_for_every_operator(
         assert_same(forces, reference, random_displacements(simulation, seed))
 
 
-@pytest.mark.parametrize("material", registry.names("materials"))
+@pytest.mark.parametrize(
+    "material",
+    [
+        # The same function as of the fixed engine, which is put to all of them.
+        pytest.param(name, marks=() if name == "j2-plasticity" else pytest.mark.validation)
+        for name in registry.names("materials")
+    ],
+)
 @mostly_in_2d
 def test_agrees_for_every_material(d: int, material: str) -> None:
     part = example_part("materials", material)

@@ -236,6 +236,7 @@ def test_conditions_that_share_an_account_are_carried_out_step_by_step() -> None
     assert isinstance(loop, StepByStep)
 
 
+@pytest.mark.validation  # of one step in tests/engines/test_engines.py
 def test_single_precision_in_the_loop() -> None:
     simulation = stretched(box(2, 7).boundary("clamp", where="left")).engine("matrix").build()
     single = stretched(box(2, 7).boundary("clamp", where="left")).engine("compiled-float32").build()

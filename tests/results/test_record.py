@@ -408,7 +408,13 @@ def assert_is_start_of_the_run(record: Record, count: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("count", "delay"), [(60, 0.0), (60, 0.03), (60, 0.11), (9000, 0.0), (9000, 0.02), (9000, 0.15)]
+    ("count", "delay"),
+    [
+        (60, 0.0),
+        (60, 0.03),
+        (9000, 0.15),
+        *(pytest.param(*one, marks=pytest.mark.validation) for one in [(60, 0.11), (9000, 0.02)]),
+    ],
 )
 def test_a_killed_run_leaves_a_readable_record(tmp_path: Path, count: int, delay: float) -> None:
     path = tmp_path / "run.vtkhdf"

@@ -150,7 +150,14 @@ def assert_goes_on(
 @pytest.mark.usefixtures("often")
 @at_outputs
 @pytest.mark.parametrize("formulation", registry.names("formulations"))
-@pytest.mark.parametrize("gradient", registry.names("gradients"))
+@pytest.mark.parametrize(
+    "gradient",
+    [
+        # A gradient has no state of its own.
+        pytest.param(name, marks=() if name == "corrected" else pytest.mark.validation)
+        for name in registry.names("gradients")
+    ],
+)
 def test_every_formulation(
     tmp_path: Path, stops: Sequence[tuple[int, bool]], formulation: str, gradient: str
 ) -> None:

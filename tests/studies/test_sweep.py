@@ -616,6 +616,7 @@ def local_cluster() -> Iterator[Any]:
         yield cluster
 
 
+@pytest.mark.validation
 def test_a_worker_killed_in_mid_sweep(tmp_path: Path) -> None:
     # First those that write down how often they are run, then those that have costs.
     tasks = [*several(tmp_path, 0.1, 0.2, 0.3), *swinging()[::2]]

@@ -131,7 +131,9 @@ def test_every_arrangement_keeps_the_promises(shape: Shape, arrangement: Discret
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS, ids=name_of)
-@pytest.mark.parametrize("shape", SHAPES, ids=name_of)
+@pytest.mark.parametrize(
+    "shape", [Box([1.0, 0.5, 0.4]), Difference(Box([1.0, 1.0]), Disc(0.3))], ids=name_of
+)
 def test_same_input_gives_the_same_bits(shape: Shape, arrangement: Discretisation) -> None:
     one, other = (arrangement.particles(shape, 0.11) for _ in range(2))
     for field in attrs.fields(Particles):

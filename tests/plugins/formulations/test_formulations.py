@@ -149,7 +149,7 @@ def stirred(simulation: Simulation, speed: float) -> State:
 
 @every_formulation
 @every_integrator
-@pytest.mark.parametrize("dimension", [1, 2, 3])
+@pytest.mark.parametrize("dimension", [1, 2, pytest.param(3, marks=pytest.mark.validation)])
 def test_a_free_body_keeps_its_momentum(name: str, integrator: str, dimension: int) -> None:
     body = free_body(
         {"type": name, "gradient": "corrected", "divergence": "variational"},

@@ -8,7 +8,6 @@ import attrs
 import numpy as np
 import pytest
 
-from solidsph import Simulation
 from solidsph.errors import SceneError
 from solidsph.interfaces.material import Material
 from solidsph.maths.tensors import cauchy_stress
@@ -117,28 +116,6 @@ def test_fibres_act_along_themselves_in_the_plane_too() -> None:
     P = np.array(turned.first_piola(flat, turned.params))
     whole = np.array(turned.first_piola(Q @ F @ Q.T, turned.params))
     assert np.allclose(P, whole[:2, :2], atol=1e-12 * np.abs(whole).max())
-
-
-@pytest.mark.parametrize("name", ["mooney-rivlin", "holzapfel-ogden"])
-@pytest.mark.parametrize("d", [2, 3])
-def test_the_compiled_engine_has_the_forces_of_the_matrix_engine(name: str, d: int) -> None:
-    material = example_part("materials", name)
-    ends = [
-        Simulation.builder()
-        .body("b", shape={"type": "box", "lengths": [0.6, 0.5, 0.4][:d]}, spacing=0.1)
-        .kernel("cubic-spline", cover=2.6)
-        .material(material)
-        .boundary("clamp", where="left")
-        .initial(velocity={"x": "5*X*(1 + 0.3*Y)"})
-        .duration(2e-3)
-        .engine(engine)
-        .build()
-        .run()
-        .state.positions
-        for engine in ("matrix", "compiled")
-    ]
-    # Rounding, through some dozen steps.
-    assert np.abs(ends[0] - ends[1]).max() < 1e-12
 
 
 @pytest.mark.parametrize(
