@@ -32,14 +32,12 @@ def test_it_comes_to_rest_at_the_equilibrium() -> None:
     for name, builder in (
         ("relaxed", hanging().effect("dynamic-relaxation")),
         ("slowly damped", hanging().effect("mass-damping", rate=1.0)),
-        ("undamped", hanging()),
     ):
         state = builder.build().run().state
         left[name] = np.abs(state.positions - at_rest).max() / sag
     # Two periods of the first bending mode, at close to its critical rate: w t = 12.
     assert left["relaxed"] < 1e-3
     assert left["slowly damped"] > 0.05
-    assert left["undamped"] > 0.1
 
 
 def test_its_rate_is_critical_for_the_slowest_motion() -> None:
