@@ -169,17 +169,17 @@ class CollidingBars(Case):
         t = record.times / self.transit - _BEFORE
         first, second = self.mean_velocities(record).T / self.velocity
         part = 0.5 * np.clip(t, 0.0, 2.0)
-        law = {"color": "tab:orange", "linestyle": "--", "linewidth": 1.5}
+        law = {"color": "tab:orange", "linewidth": 1.5}
         force = Panel(
             line(t, record.history[_FORCE] / self.plateau, linewidth=1.0, label="simulated"),
-            line(t, (t > 0.0) & (t < 2.0), "-", **law, label="waves of two bars"),
+            line(t, (t > 0.0) & (t < 2.0), "--", **law, label="waves of two bars"),
             x="time since the contact [L / c]",
             y="force of contact [rho c v A / 2]",
             legend={},
         )
         velocity = Panel(
-            line(t, 1.0 - part, "-", **law, zorder=0),
-            line(t, part, "-", **law, zorder=0),
+            line(t, 1.0 - part, "--", **law, zorder=0),
+            line(t, part, "--", **law, zorder=0),
             line(t, first, label="first bar"),
             line(t, second, "k:", label="second bar"),
             x="time since the contact [L / c]",

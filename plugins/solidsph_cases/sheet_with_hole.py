@@ -167,7 +167,12 @@ class SheetWithHole(Case):
         above = above[np.argsort(Y[above])]
         marks = [
             mark("axvspan", 0.0, a / W, color="0.9"),
-            mark("text", 0.5 * a / W, 0.5, "hole", ha="center", rotation=90),
+            mark(
+                *("annotate", "hole", (0.5 * a / W, 0.04)),
+                xycoords=("data", "axes fraction"),
+                ha="center",
+                rotation=90,
+            ),
             line(Y[above] / W, stress[above], "ko-", ms=4, label="particles on X = 0"),
         ]
         peak = self.measure(records)[1].reference
