@@ -93,6 +93,7 @@ def test_csm1_measures_what_a_softer_scheme_does_wrong(tmp_path: Path) -> None:
     assert outcome.measurements[1].verdict == "NOT within 0.5 %"
 
 
+@pytest.mark.validation  # csm1 is the same beam at rest
 def test_csm3_at_five_across(tmp_path: Path) -> None:
     outcome = run_case(Csm3(duration=0.48), tmp_path)
     assert outcome.passed

@@ -87,6 +87,7 @@ def test_only_what_has_changed_is_compiled(
     assert printed(LAW, "2") == [["6.0", first]]
 
 
+@pytest.mark.validation
 def test_damaged_entries_are_compiled_anew(tmp_path: Path, own_cache: Path) -> None:
     (tmp_path / "law.py").write_text(SOURCE)
     ((_, first),) = printed(LAW, "2")

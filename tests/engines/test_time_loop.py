@@ -140,13 +140,8 @@ def test_others_go_step_by_step_with_compiled_forces(effect: str) -> None:
     assert by_engine[0].work[effect] != 0.0 or effect == "bond-failure"
 
 
-@pytest.mark.parametrize(
-    "divergence",
-    [
-        pytest.param(name, marks=() if name == "variational" else pytest.mark.validation)
-        for name in registry.names("divergences")
-    ],
-)
+@pytest.mark.validation  # the bar below has ghosts too
+@pytest.mark.parametrize("divergence", registry.names("divergences"))
 def test_ghosts_of_a_symmetric_body(divergence: str) -> None:
     """Their motion, their forces handed on, and their stress where it acts."""
     ghosts = {

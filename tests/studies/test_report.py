@@ -303,6 +303,7 @@ def test_the_function_says_that_plotly_is_missing(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.validation
 def test_the_command_writes_it_beside_the_points(tmp_path: Path) -> None:
     axes = ("--axis", "across=5,9", "--axis", "gradient=consistent")
     done = solidsph("cost", "csm1", *axes, "--report", "--json", cwd=tmp_path)

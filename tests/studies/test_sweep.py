@@ -353,6 +353,7 @@ def test_a_process_that_dies_is_a_failed_point_and_the_rest_goes_on(tmp_path: Pa
     assert len(journal.points(tasks)) == 3  # what died, or broke, is tried again
 
 
+@pytest.mark.validation
 def test_peaks_of_memory_do_not_mix(tmp_path: Path) -> None:
     ballast = np.ones(2**26)  # 512 MiB, in this process alone
     (point,) = sweep(several(tmp_path, 0.1), Processes(1), Journal(tmp_path / "journal"))
@@ -413,6 +414,7 @@ def finish(folder: Path) -> tuple[int, int, int]:
     return total, kept, done
 
 
+@pytest.mark.validation
 def test_killed_in_mid_sweep_and_given_again(tmp_path: Path) -> None:
     tasks, journal = swinging(), Journal(tmp_path / "journal")
     with parent(tmp_path, hold=2) as process:
