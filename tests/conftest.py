@@ -86,7 +86,7 @@ def _plain_environment(monkeypatch: pytest.MonkeyPatch, cache_folder: Path) -> N
     """No test sees a restriction of plugins that the caller's shell may hold, or its cache."""
     for name in [name for name in os.environ if name.startswith("SOLIDSPH_")]:
         monkeypatch.delenv(name)
-    monkeypatch.setenv("SOLIDSPH_CACHE", str(cache_folder))
+    monkeypatch.setenv(CACHE, str(cache_folder))
 
 
 @pytest.fixture
