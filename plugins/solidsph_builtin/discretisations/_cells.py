@@ -78,7 +78,7 @@ def lattice_particles(
         occupied[ghost_numbers[kept]] = True
         cells = np.maximum(volumes, grid.cell_volume * grid.completed(occupied)[numbers])
     count = numbers.size + len(ghost_positions)
-    owned = faces(surface, owners)
+    owned = faces(surface, owners, positions)
     is_ghost = np.arange(count) >= numbers.size
     everywhere = np.concatenate([positions, ghost_positions])
     return Particles(

@@ -31,18 +31,13 @@ def sampled(discretisation: Discretisation, shape: Shape, spacing: float) -> Sur
     return surface
 
 
-def faces(surface: Surface, owners: Assignment) -> dict[str, Face]:
+def faces(surface: Surface, owners: Assignment, positions: Array) -> dict[str, Face]:
     """Area that each particle owns of each face, with a total that closes.
-
-    A uniform pressure over a closed surface must not push the body. Where a composite shape cuts
-    through samples, their sum is off by about the size of a sample. So every area A is rescaled at
-    constant normal n by the smallest changes that close the sum:
-
-        A <- A (1 + n . l),    (sum |A| n n^T) l = -sum A
 
     Args:
         surface: samples of a closed surface.
         owners: the particles that own the samples.
+        positions: of all particles (n, d) [m].
     """
     numbers = {name: number for number, name in enumerate(dict.fromkeys(surface.faces))}
     face_of = np.array([numbers[name] for name in surface.faces], dtype=np.intp)[owners.points]
@@ -54,28 +49,44 @@ def faces(surface: Surface, owners: Assignment) -> dict[str, Face]:
     np.add.at(area_vectors, which, areas)
     lengths = np.zeros(keys.size)
     np.add.at(lengths, which, np.linalg.norm(areas, axis=1))
+    arms = surface.points[owners.points] - positions[owners.particles]
+    d = positions.shape[1]
+    moments = np.zeros((keys.size, d, d))
+    np.add.at(moments, which, areas[:, :, None] * arms[:, None, :])
     bounds = np.searchsorted(keys, count * np.arange(len(numbers) + 1)).tolist()
     found = {
-        name: Face(keys[a:b] % count, area_vectors[a:b], lengths[a:b])
+        name: Face(keys[a:b] % count, area_vectors[a:b], lengths[a:b], moments[a:b])
         for name, a, b in zip(numbers, bounds[:-1], bounds[1:], strict=True)
     }
 
+    return closed(found)
+
+
+def closed(found: Mapping[str, Face]) -> dict[str, Face]:
+    """Faces of a closed surface, their areas A changed so that they add up to zero.
+
+    A uniform pressure over a closed surface must not push the body. Where a composite shape cuts
+    through samples, their sum is off by about the size of a sample. So every area A is rescaled at
+    constant normal n by the smallest changes that close the sum:
+
+        A <- A (1 + n . l),    (sum |A| n n^T) l = -sum A
+    """
     vectors = np.concatenate([face.area_vectors for face in found.values()])
     sizes = np.linalg.norm(vectors, axis=1)
     residual = vectors.sum(axis=0)
     # Rounding alone is left as it is, so that plane faces keep their exact areas.
     if np.linalg.norm(residual) <= 1e-13 * sizes.sum():
-        return found
+        return dict(found)
     # A face folded within one particle may leave it no area, and then no normal.
     normals = vectors / np.where(sizes > 0.0, sizes, 1.0)[:, np.newaxis]
     change = np.linalg.lstsq(vectors.T @ normals, -residual)[0]
-    closed = np.split(
+    rescaled = np.split(
         vectors * (1.0 + normals @ change)[:, np.newaxis],
         np.cumsum([face.particles.size for face in found.values()])[:-1],
     )
     return {
-        name: attrs.evolve(face, area_vectors=area_vectors)
-        for (name, face), area_vectors in zip(found.items(), closed, strict=True)
+        name: attrs.evolve(face, area_vectors=own)
+        for (name, face), own in zip(found.items(), rescaled, strict=True)
     }
 
 

@@ -9,12 +9,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.interfaces.discretisation import Discretisation
-from solidsph.interfaces.shape import Shape, Surface
+from solidsph.interfaces.shape import Shape
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.particles import Particles
 from solidsph_builtin.discretisations._cells import cell_shares, fitted, mean_spacing
 from solidsph_builtin.discretisations._checks import check_spacing, refusal
 from solidsph_builtin.discretisations._features import Features, gap, meetings, smooth
+from solidsph_builtin.discretisations._feet import on_boundary
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._nearest import nearest, thinned
 from solidsph_builtin.discretisations._pieces import finest_pieces
@@ -26,8 +27,6 @@ _AT = 1e-9
 _CLOSEST = 0.5
 # How much more finely than the particles the boundary is sampled, in each dimension.
 _FINER = {1: 1.0, 2: 4.0, 3: 2.0}
-# Steps along the gradient of the distance, which halve the distance at the sharpest of corners.
-_STEPS = 40
 _CELLS_AT_ONCE = 1024
 
 
@@ -76,8 +75,16 @@ class ConformingLattice(Discretisation):
         positions, volumes, onto = positions[kept], volumes[kept], onto[kept]
         outermost = np.flatnonzero(onto)
         owners = nearest(cKDTree(positions[outermost]), surface.points)
-        owned = faces(surface, attrs.evolve(owners, particles=outermost[owners.particles]))
+        owners = attrs.evolve(owners, particles=outermost[owners.particles])
+        owned = faces(surface, owners, positions)
         return without_ghosts(positions, volumes, mean_spacing(grid, spacing), owned)
+
+
+def outermost(shape: Shape, grid: Grid, spacing: float) -> Array:
+    """The particles on the boundary of `shape`, (m, d) [m], by a `grid` with points on it."""
+    distance = in_chunks(grid.size, lambda n: shape.signed_distance(grid.positions(n)))
+    _, onto, positions, _ = _arranged(shape, grid, distance, spacing)
+    return positions[onto]
 
 
 def _arranged(
@@ -103,7 +110,7 @@ def _arranged(
     for codimension, features in enumerate(kinds, start=1):
         chosen, found = _feet(features, grid, start, reach, everywhere=codimension == 1)
         places[chosen], rank[chosen] = found, codimension
-    moved = _pulled(shape, surface, places, spacing)
+    moved = on_boundary(shape, surface, places, spacing)
     # Points that are on the boundary already stay in place to the last bit.
     still = np.abs((moved - start) / grid.steps).max(axis=1, initial=0.0) <= _AT
     moved[still] = start[still]
@@ -146,34 +153,6 @@ def _feet(
     length = np.linalg.norm(along, axis=1, keepdims=True)
     along *= np.minimum(1.0, reach / np.where(length > 0.0, length, 1.0))
     return chosen, own.points + along
-
-
-def _pulled(shape: Shape, surface: Surface, points: Array, spacing: float) -> Array:
-    """`points` (m, d) close to the boundary, moved onto it along the gradient of the distance."""
-    d, tolerance = points.shape[1], 1e-14 * spacing
-    points = points.copy()
-    for _ in range(_STEPS):
-        distance = shape.signed_distance(points)
-        off = np.flatnonzero(np.abs(distance) > tolerance)
-        if not off.size:
-            return points
-        # So small a step that beside an edge it stays on the side of one face.
-        step = np.maximum(1e-3 * np.abs(distance[off]), 1e-9 * spacing)[:, None]
-        slope = np.stack(
-            [
-                shape.signed_distance(points[off] + step * axis)
-                - shape.signed_distance(points[off] - step * axis)
-                for axis in np.eye(d)
-            ],
-            axis=1,
-        )
-        length = np.linalg.norm(slope, axis=1, keepdims=True)
-        points[off] -= distance[off, None] * slope / np.where(length > 0.0, length, 1.0)
-    distance = shape.signed_distance(points)
-    lost = np.abs(distance) > _AT * spacing
-    if lost.any():
-        points[lost] = surface.points[cKDTree(surface.points).query(points[lost])[1]]
-    return points
 
 
 def _volumes(

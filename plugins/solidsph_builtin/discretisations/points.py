@@ -92,7 +92,7 @@ class Points(Discretisation):
         self._check_places(shape, positions, spacing)
         tree = cKDTree(positions)
         surface = sampled(self, shape, spacing)
-        owned = faces(surface, nearest(tree, surface.points))
+        owned = faces(surface, nearest(tree, surface.points), positions)
         return without_ghosts(positions, self._volumes(shape, tree, spacing), spacing, owned)
 
     def _positions(self, dimension: int) -> Array:

@@ -41,7 +41,7 @@ class DiscreteModel:
             SceneError: no surface is there, or `where` cannot be understood.
         """
         pieces = self.pieces()
-        chosen = pieces.at(where) & (pieces.areas > 0.0)
+        chosen = pieces.at(where) & (pieces.areas != 0.0)
         if not chosen.any():
             self.select(where)  # raises if there is no particle either
             raise SceneError(

@@ -27,10 +27,15 @@ class Face:
     particles: Indices  # (k,)
     area_vectors: Array  # (k, d) outward [m^(d-1)]
     areas: Array = attrs.field()  # (k,) above the vectors' length where it is curved [m^(d-1)]
+    moments: Array = attrs.field()  # (k, d, d) integral of n_i (x - X)_j over the area [m^d]
 
     @areas.default
     def _lengths(self) -> Array:
         return np.asarray(np.linalg.norm(self.area_vectors, axis=1), dtype=np.float64)
+
+    @moments.default
+    def _at_the_particles(self) -> Array:
+        return np.zeros((*self.area_vectors.shape, self.area_vectors.shape[1]))
 
 
 @attrs.frozen(eq=False)
@@ -94,6 +99,7 @@ class Particles:
                     np.concatenate([piece.particles for piece in pieces]),
                     np.concatenate([piece.area_vectors for piece in pieces]),
                     np.concatenate([piece.areas for piece in pieces]),
+                    np.concatenate([piece.moments for piece in pieces]),
                 )
                 for face, pieces in faces.items()
             },

@@ -1,0 +1,220 @@
+"""Volumes and areas of particles that integrate polynomials of the second degree.
+
+The volume of a particle is the integral of the function that it has in a moving least squares fit
+(`_reproducing.py`), and its area is that over the surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import product
+from math import sqrt
+
+import attrs
+import numpy as np
+
+from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.shape import Shape
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import Face, Particles
+from solidsph_builtin.discretisations._cells import cell_shares
+from solidsph_builtin.discretisations._checks import refusal
+from solidsph_builtin.discretisations._grid import grid_over, in_chunks
+from solidsph_builtin.discretisations._pieces import finest_pieces
+from solidsph_builtin.discretisations._reproducing import RADIUS, Fit
+from solidsph_builtin.discretisations._surface import area_vectors, closed, sampled
+
+# Samples of the surface along a spacing, over those that an assignment to particles needs.
+_FINER = {1: 1.0, 2: 4.0, 3: 2.0}
+
+# For the moments of the body, whose error is that of the samples.
+_SAMPLES = 4
+
+# Particles this close to the boundary, in spacings, are on it.
+_ON_BOUNDARY = 1e-6
+
+# Moments that differ by less, as parts of the volume, are those of the body.
+_ROUNDING = 1e-12
+
+# Gauss's rule with two points, in cells from the middle.
+_GAUSS = 0.5 / sqrt(3.0)
+
+_CELLS_AT_ONCE = 4096
+
+
+def fitted(
+    discretisation: Discretisation,
+    shape: Shape,
+    spacing: float,
+    given: Particles,
+    disturbed: float = 0.0,
+) -> Particles:
+    """`given` particles with fitted volumes and, if all their owners are on it, a fitted surface.
+
+    Args:
+        discretisation: the part that messages name.
+        shape: the body.
+        spacing: of the particles [m].
+        given: particles, whose tags stay; those deep inside keep their volumes.
+        disturbed: depth to which the particles are no lattice [m].
+
+    Raises:
+        SceneError: a volume would not be positive.
+    """
+    real = ~given.ghosts
+    X, volumes = given.positions, given.volumes.copy()
+    volumes[real] = fitted_volumes(
+        discretisation, shape, spacing, X[real], volumes[real], disturbed
+    )
+    if not np.all(volumes > 0.0):
+        raise refusal(
+            discretisation,
+            f"the body is too thin for the spacing {spacing:g} m: a particle would have the volume "
+            f"{volumes.min():.3g} m^{shape.dimension}; use a finer spacing, or 'conforming-lattice'",
+        )
+    faces = given.faces
+    owners = np.unique(np.concatenate([face.particles for face in faces.values()]))
+    # Areas of particles inside are those of whom the surface is nearest to.
+    if np.abs(shape.signed_distance(X[owners])).max(initial=0.0) <= _ON_BOUNDARY * spacing:
+        faces = fitted_faces(discretisation, shape, spacing, X, faces)
+    areas = area_vectors(faces, given.count, shape.dimension)
+    return attrs.evolve(given, volumes=volumes, faces=faces, area_vectors=areas)
+
+
+def fitted_volumes(
+    discretisation: Discretisation,
+    shape: Shape,
+    spacing: float,
+    positions: Array,
+    volumes: Array,
+    disturbed: float = 0.0,
+) -> Array:
+    """Integrals of the functions of the particles, (n,) [m^d].
+
+    What curved surfaces leave of the body's volume, centre and second moments is corrected by the
+    smallest relative change.
+
+    Args:
+        discretisation: the part that messages name.
+        shape: the body.
+        spacing: of the particles [m].
+        positions: of the particles, (n, d) [m].
+        volumes: that particles deep inside keep, (n,) [m^d].
+        disturbed: depth to which the particles are no lattice [m].
+    """
+    # The function of a particle further inside meets complete neighbourhoods only.
+    reach = RADIUS * spacing
+    depth = disturbed + 2.0 * reach
+    near = shape.signed_distance(positions) > -depth
+    points, weights = _quadrature(discretisation, shape, spacing, depth + reach)
+    integrated = Fit(positions, spacing).positive_integrals(points, weights)
+    return with_moments(positions, np.where(near, integrated, volumes), shape, spacing)
+
+
+def _quadrature(
+    discretisation: Discretisation, shape: Shape, spacing: float, depth: float
+) -> tuple[Array, Array]:
+    """Points (m, d) [m] and weights (m,) [m^d] of integrals over `shape`, to a depth [m]."""
+    grid = grid_over(discretisation, shape, spacing)
+    distance = in_chunks(grid.size, lambda n: shape.signed_distance(grid.positions(n)))
+    numbers = np.flatnonzero(np.abs(distance + 0.5 * depth) < 0.5 * depth + grid.half_diagonal)
+    shares = cell_shares(shape, grid, numbers, distance)
+    whole, cut = numbers[shares == 1.0], numbers[(shares > 0.0) & (shares < 1.0)]
+    gauss = np.array(list(product((-_GAUSS, _GAUSS), repeat=shape.dimension))) * grid.steps
+    points = [(grid.positions(whole)[:, None, :] + gauss).reshape(-1, shape.dimension)]
+    weights = [np.full(len(points[0]), 1.0 / len(gauss))]
+    for start in range(0, cut.size, _CELLS_AT_ONCE):
+        some = cut[start : start + _CELLS_AT_ONCE]
+        found = finest_pieces(shape, grid.positions(some), grid.steps)
+        points.append(found.points)
+        weights.append(found.shares)
+    return np.concatenate(points), grid.cell_volume * np.concatenate(weights)
+
+
+def fitted_faces(
+    discretisation: Discretisation,
+    shape: Shape,
+    spacing: float,
+    positions: Array,
+    given: Mapping[str, Face],
+) -> dict[str, Face]:
+    """Faces with areas and moments that are integrals of functions of the particles on them.
+
+    All particles of the `given` faces must lie on the surface. The functions are those of the whole
+    surface: beside an edge, particles around it own a little of a face, which may be negative. A
+    load that varies then has its exact sum.
+    """
+    d = shape.dimension
+    surface = sampled(discretisation, shape, spacing / _FINER[d])
+    names = np.array(surface.faces)
+    outer = np.unique(np.concatenate([face.particles for face in given.values()]))
+    X, fit = positions[outer], Fit(positions[outer], spacing)
+    faces = {}
+    for name in given:
+        own = np.flatnonzero(names == name)
+        area = surface.area_vectors[own]
+        # About the middle, so that rounding is that of the face's own size.
+        middle = surface.points[own].mean(axis=0)
+        x = surface.points[own] - middle
+        products = (area[:, :, None] * x[:, None, :]).reshape(len(own), d * d)
+        weights = np.column_stack([area, products, np.linalg.norm(area, axis=1)])
+        found = fit.integrals(surface.points[own], weights)
+        some = np.flatnonzero(np.abs(found[:, -1]) > _ROUNDING * np.abs(found[:, -1]).max())
+        vectors, about_middle = found[some, :d], found[some, d:-1].reshape(-1, d, d)
+        moments = about_middle - vectors[:, :, None] * (X[some] - middle)[:, None, :]
+        faces[name] = Face(outer[some], vectors, found[some, -1], moments)
+    return closed(faces)
+
+
+def with_moments(positions: Array, volumes: Array, shape: Shape, spacing: float) -> Array:
+    """Volumes (n,) of particles at `positions` (n, d) with the moments of `shape` up to the second.
+
+    The smallest relative change of `volumes` (n,) that corrects them is V <- V (1 + a + b . X +
+    X . C X). `spacing` [m] is that of the particles; samples of the surface are finer.
+    """
+    d = positions.shape[1]
+    # About the centre, in units of the size, so that the equations are well scaled.
+    centre = volumes @ positions / volumes.sum()
+    scale = float(np.abs(positions - centre).max()) or 1.0
+    X = (positions - centre) / scale
+    upper = np.triu_indices(d)
+    basis = np.hstack([np.ones((len(X), 1)), X, X[:, upper[0]] * X[:, upper[1]]])
+    missing = _moments(shape, centre, scale, spacing / _SAMPLES) - volumes @ basis
+    if np.abs(missing).max() <= _ROUNDING * volumes.sum():
+        return volumes
+    # Volume and centre first, then second moments by what is left of their functions, which is
+    # zero along a direction with one or two layers of particles.
+    fitted = volumes * (1.0 + _change(basis[:, : 1 + d], volumes, missing[: 1 + d]))
+    gram = basis[:, : 1 + d].T @ (volumes[:, None] * basis[:, : 1 + d])
+    along = np.linalg.lstsq(gram, basis[:, : 1 + d].T @ (volumes[:, None] * basis[:, 1 + d :]))[0]
+    rest = basis[:, 1 + d :] - basis[:, : 1 + d] @ along
+    left = missing[1 + d :] - (fitted - volumes) @ basis[:, 1 + d :]
+    result: Array = fitted + volumes * _change(rest, volumes, left)
+    return result
+
+
+def _change(functions: Array, volumes: Array, missing: Array) -> Array:
+    """The smallest relative change (n,) of the volumes that adds `missing` (k,) to the sums of
+    `functions` (n, k), as far as any change can."""
+    gram = functions.T @ (volumes[:, None] * functions)
+    change: Array = functions @ np.linalg.lstsq(gram, missing, rcond=1e-10)[0]
+    return change
+
+
+def _moments(shape: Shape, centre: Array, scale: float, spacing: float) -> Array:
+    """Integrals of 1, x_i and x_i x_j (i <= j) over the shape, x scaled about the centre [m^d].
+
+    By the divergence theorem: a function f of degree k has div(f x) = (d + k) f.
+    """
+    surface = shape.surface(spacing)
+    x = (surface.points - centre) / scale
+    d = x.shape[1]
+    upper = np.triu_indices(d)
+    sizes = np.linalg.norm(surface.area_vectors, axis=1)
+    normals = surface.area_vectors / sizes[:, None]
+    flux = np.sum(x * surface.area_vectors, axis=1) * scale
+    # A sample is an edge or a square, with a second moment about its own middle.
+    edges = sizes ** (2.0 / max(d - 1, 1)) / scale**2 if d > 1 else np.zeros(len(x))
+    own = (np.eye(d) - normals[:, :, None] * normals[:, None, :]) * edges[:, None, None] / 12.0
+    second = x[:, upper[0]] * x[:, upper[1]] + own[:, upper[0], upper[1]]
+    return np.concatenate([[flux.sum() / d], flux @ x / (d + 1), flux @ second / (d + 2)])

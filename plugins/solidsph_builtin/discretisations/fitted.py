@@ -1,0 +1,102 @@
+"""Fitted: particles that follow the surface of any shape, with volumes that integrate."""
+
+from __future__ import annotations
+
+from typing import final
+
+import attrs
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.shape import Shape
+from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.model.particles import Particles
+from solidsph_builtin.discretisations._cells import mean_spacing
+from solidsph_builtin.discretisations._checks import check_spacing
+from solidsph_builtin.discretisations._curves import even_points
+from solidsph_builtin.discretisations._fitting import fitted
+from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
+from solidsph_builtin.discretisations._nearest import nearest
+from solidsph_builtin.discretisations._relaxation import relaxed
+from solidsph_builtin.discretisations._surface import faces, sampled, without_ghosts
+from solidsph_builtin.discretisations.conforming_lattice import outermost
+
+# In spacings: closer to the boundary there are no particles but those on it, and none closer to
+# one of those.
+_CLEAR = 0.5
+# Depth to which particles move, beside places where the boundary is off the lattice.
+_MOVES = 4.0
+# Particles this close to a point of the lattice are there.
+_AT = 1e-6
+# Particles that the others push closer to the boundary than this are left out.
+_PUSHED_OUT = 0.2
+
+
+@final
+@attrs.frozen
+class Fitted(Discretisation):
+    """Particles on the surface in even steps, and a lattice inside that adapts to them.
+
+    Each corner and edge has particles. Inside are the points of a lattice over the bounding box;
+    beside a part of the surface that is off the lattice they repel each other until their distances
+    are even. A box aligned with the axes has the particles of `lattice` with `on_boundary`.
+
+    Volumes and areas integrate polynomials of the second degree, as those of `fitted-moments` do.
+
+    Tags: each face of the shape, `surface` and `interior`. There are no ghosts.
+    """
+
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        """The particles on the surface and inside, in the order of the lattice.
+
+        Raises:
+            SceneError: the spacing is not positive, so large that the body has no particles inside
+                its surface, or so small that there would be too many.
+        """
+        spacing = check_spacing(self, spacing)
+        grid = grid_over(self, shape, spacing, on_boundary=True)
+        surface = sampled(self, shape, spacing)
+        size = mean_spacing(grid, spacing)
+        X, onto, irregular = self._arranged(shape, grid, size)
+        outer = np.flatnonzero(onto)
+        owners = nearest(cKDTree(X[outer]), surface.points)
+        owners = attrs.evolve(owners, particles=outer[owners.particles])
+        owned = faces(surface, owners, X)
+        whole = np.full(len(X), grid.cell_volume)
+        given = without_ghosts(X, whole, size, owned)
+        return fitted(self, shape, spacing, given, _MOVES * size if irregular else 0.0)
+
+    def _arranged(self, shape: Shape, grid: Grid, size: float) -> tuple[Array, Mask, bool]:
+        """Positions (n, d) [m], whether they are on the boundary (n,), and whether any particle is
+        off the lattice."""
+        outer = even_points(shape, size) if shape.dimension == 2 else outermost(shape, grid, size)
+        outer, at_lattice = _snapped(outer, grid)
+        distance = in_chunks(grid.size, lambda n: shape.signed_distance(grid.positions(n)))
+        inside = np.flatnonzero(distance < -_CLEAR * size)
+        inner = grid.positions(inside)
+        inner = inner[cKDTree(outer).query(inner)[0] > _CLEAR * size] if len(inner) else inner
+        off = outer[~at_lattice]
+        X = np.concatenate([outer, inner])
+        onto = np.arange(len(X)) < len(outer)
+        if len(off):
+            free = ~onto
+            free[free] = cKDTree(off).query(inner)[0] < _MOVES * size
+            X = relaxed(X, free, size)
+            onto_or_inside = onto | (shape.signed_distance(X) < -_PUSHED_OUT * size)
+            X, onto = X[onto_or_inside], onto[onto_or_inside]
+        order = _order(X, grid)
+        return X[order], onto[order], bool(len(off))
+
+
+def _snapped(points: Array, grid: Grid) -> tuple[Array, Mask]:
+    """Points (m, d), those at a point of the lattice to the last bit, and which these are (m,)."""
+    there = grid.positions(grid.cell_of(points))
+    at = np.abs((points - there) / grid.steps).max(axis=1, initial=0.0) <= _AT
+    return np.where(at[:, None], there, points), at
+
+
+def _order(X: Array, grid: Grid) -> Indices:
+    """The order of the lattice, (n,)."""
+    places = [*np.round(X / grid.steps, 6).T[list(grid.order)[::-1]], grid.cell_of(X)]
+    return np.asarray(np.lexsort(places), dtype=np.intp)
