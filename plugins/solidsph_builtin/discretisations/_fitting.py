@@ -15,20 +15,20 @@ import numpy as np
 
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
-from solidsph.maths.arrays import Array
+from solidsph.maths.arrays import Array, Mask
 from solidsph.model.particles import Face, Particles
 from solidsph_builtin.discretisations._cells import cell_shares
 from solidsph_builtin.discretisations._checks import refusal
-from solidsph_builtin.discretisations._grid import grid_over, in_chunks
+from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._pieces import finest_pieces
 from solidsph_builtin.discretisations._reproducing import RADIUS, Fit
 from solidsph_builtin.discretisations._surface import area_vectors, closed, sampled
 
 # Samples of the surface along a spacing, over those that an assignment to particles needs.
-_FINER = {1: 1.0, 2: 4.0, 3: 2.0}
+_FINER = {1: 1.0, 2: 4.0, 3: 1.0}
 
-# For the moments of the body, whose error is that of the samples.
-_SAMPLES = 4
+# How often a cell that the surface cuts is halved.
+_HALVINGS = {1: 3, 2: 3, 3: 2}
 
 # Particles this close to the boundary, in spacings, are on it.
 _ON_BOUNDARY = 1e-6
@@ -107,8 +107,20 @@ def fitted_volumes(
     depth = disturbed + 2.0 * reach
     near = shape.signed_distance(positions) > -depth
     points, weights = _quadrature(discretisation, shape, spacing, depth + reach)
-    integrated = Fit(positions, spacing).positive_integrals(points, weights)
-    return with_moments(positions, np.where(near, integrated, volumes), shape, spacing)
+    integrated = Fit(positions, spacing, _lattice_of(discretisation, shape, spacing, positions)).positive_integrals(points, weights)
+    return with_moments(positions, np.where(near, integrated, volumes), near, shape, spacing)
+
+
+def _lattice_of(
+    discretisation: Discretisation, shape: Shape, spacing: float, positions: Array
+) -> Grid:
+    """The lattice over the shape, with points on its faces or half a cell inside, that has more of
+    the particles."""
+    grids = [
+        grid_over(discretisation, shape, spacing, on_boundary=on_boundary)
+        for on_boundary in (True, False)
+    ]
+    return max(grids, key=lambda grid: int(np.sum(grid.has(positions))))
 
 
 def _quadrature(
@@ -125,7 +137,7 @@ def _quadrature(
     weights = [np.full(len(points[0]), 1.0 / len(gauss))]
     for start in range(0, cut.size, _CELLS_AT_ONCE):
         some = cut[start : start + _CELLS_AT_ONCE]
-        found = finest_pieces(shape, grid.positions(some), grid.steps)
+        found = finest_pieces(shape, grid.positions(some), grid.steps, _HALVINGS[shape.dimension])
         points.append(found.points)
         weights.append(found.shares)
     return np.concatenate(points), grid.cell_volume * np.concatenate(weights)
@@ -148,7 +160,7 @@ def fitted_faces(
     surface = sampled(discretisation, shape, spacing / _FINER[d])
     names = np.array(surface.faces)
     outer = np.unique(np.concatenate([face.particles for face in given.values()]))
-    X, fit = positions[outer], Fit(positions[outer], spacing)
+    X, fit = positions[outer], Fit(positions[outer], spacing, _lattice_of(discretisation, shape, spacing, positions))
     faces = {}
     for name in given:
         own = np.flatnonzero(names == name)
@@ -166,11 +178,14 @@ def fitted_faces(
     return closed(faces)
 
 
-def with_moments(positions: Array, volumes: Array, shape: Shape, spacing: float) -> Array:
+def with_moments(
+    positions: Array, volumes: Array, near: Mask, shape: Shape, spacing: float
+) -> Array:
     """Volumes (n,) of particles at `positions` (n, d) with the moments of `shape` up to the second.
 
-    The smallest relative change of `volumes` (n,) that corrects them is V <- V (1 + a + b . X +
-    X . C X). `spacing` [m] is that of the particles; samples of the surface are finer.
+    The smallest relative change of `volumes` (n,) `near` the surface (n,) that corrects them is
+    V <- V (1 + a + b . X + X . C X). `spacing` [m] is that of the particles; samples of the surface
+    are finer.
     """
     d = positions.shape[1]
     # About the centre, in units of the size, so that the equations are well scaled.
@@ -179,17 +194,18 @@ def with_moments(positions: Array, volumes: Array, shape: Shape, spacing: float)
     X = (positions - centre) / scale
     upper = np.triu_indices(d)
     basis = np.hstack([np.ones((len(X), 1)), X, X[:, upper[0]] * X[:, upper[1]]])
-    missing = _moments(shape, centre, scale, spacing / _SAMPLES) - volumes @ basis
+    missing = _moments(shape, centre, scale, spacing / _FINER[d]) - volumes @ basis
     if np.abs(missing).max() <= _ROUNDING * volumes.sum():
         return volumes
+    free = np.where(near, volumes, 0.0)
     # Volume and centre first, then second moments by what is left of their functions, which is
     # zero along a direction with one or two layers of particles.
-    fitted = volumes * (1.0 + _change(basis[:, : 1 + d], volumes, missing[: 1 + d]))
-    gram = basis[:, : 1 + d].T @ (volumes[:, None] * basis[:, : 1 + d])
-    along = np.linalg.lstsq(gram, basis[:, : 1 + d].T @ (volumes[:, None] * basis[:, 1 + d :]))[0]
+    change = free * _change(basis[:, : 1 + d], free, missing[: 1 + d])
+    gram = basis[:, : 1 + d].T @ (free[:, None] * basis[:, : 1 + d])
+    along = np.linalg.lstsq(gram, basis[:, : 1 + d].T @ (free[:, None] * basis[:, 1 + d :]))[0]
     rest = basis[:, 1 + d :] - basis[:, : 1 + d] @ along
-    left = missing[1 + d :] - (fitted - volumes) @ basis[:, 1 + d :]
-    result: Array = fitted + volumes * _change(rest, volumes, left)
+    left = missing[1 + d :] - change @ basis[:, 1 + d :]
+    result: Array = volumes + change + free * _change(rest, free, left)
     return result
 
 

@@ -71,6 +71,11 @@ class Grid:
         result: Array = self.lower + (index + self.first) / np.array(self.cells) * self.lengths
         return result
 
+    def has(self, points: Array) -> Mask:
+        """Which of `points` (m, d) are lattice points, up to a millionth of a cell, (m,)."""
+        places = (points - self.lower) / self.steps - self.first
+        return np.asarray((np.abs(places - np.rint(places)) <= 1e-6).all(axis=1))
+
     def cell_of(self, points: Array) -> Indices:
         """Number of the cell that holds each of `points` (n, d), or the nearest one, (n,)."""
         index = np.rint((points - self.lower) / self.steps - self.first).astype(np.intp)

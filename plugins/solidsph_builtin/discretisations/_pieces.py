@@ -28,17 +28,21 @@ def pieces(shape: Shape, centres: Array, steps: Array) -> Pieces:
     return _divided(shape, centres, steps, all_tiny=False)
 
 
-def finest_pieces(shape: Shape, centres: Array, steps: Array) -> Pieces:
-    """The same parts, all of the last size, for assignment to the nearest particle."""
-    return _divided(shape, centres, steps, all_tiny=True)
+def finest_pieces(
+    shape: Shape, centres: Array, steps: Array, halvings: int | None = None
+) -> Pieces:
+    """The same parts, all of the last size, that after so many `halvings` or the usual number."""
+    return _divided(shape, centres, steps, all_tiny=True, halvings=halvings)
 
 
-def _divided(shape: Shape, centres: Array, steps: Array, *, all_tiny: bool) -> Pieces:
+def _divided(
+    shape: Shape, centres: Array, steps: Array, *, all_tiny: bool, halvings: int | None = None
+) -> Pieces:
     dimension = len(steps)
     corners = np.array(list(itertools.product((-0.5, 0.5), repeat=dimension)))
     cells = np.arange(len(centres))
     settled: list[tuple[Indices, Array, Array]] = []
-    halvings = _HALVINGS[dimension]
+    halvings = _HALVINGS[dimension] if halvings is None else halvings
     for level in range(1, halvings + 1):
         steps = 0.5 * steps
         centres = (centres[:, np.newaxis, :] + corners * steps).reshape(-1, dimension)

@@ -8,7 +8,6 @@ second degree as far as the particles near x determine one safely.
 from __future__ import annotations
 
 from functools import cached_property
-from itertools import combinations_with_replacement
 
 import attrs
 import numpy as np
@@ -16,6 +15,8 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from solidsph.maths.arrays import Array, Indices
+from solidsph_builtin.discretisations._grid import Grid
+from solidsph_builtin.discretisations._surroundings import Surroundings
 
 # Radius of the fit, in spacings. On a lattice its integrals are then those of Gregory's rule of the
 # second order, 5/12, 13/12, 1 from the surface inwards, which integrates cubics exactly. With 2.2 they
@@ -33,7 +34,8 @@ _DETERMINED = 1e-4
 # is 1.8 at most in lattices with particles on the boundary.
 _LARGEST_SUM = 3.0
 
-_POINTS_AT_ONCE = 20_000
+# So few that what is computed for them stays in the cache.
+_POINTS_AT_ONCE = 300
 
 
 @attrs.frozen(eq=False, slots=False)
@@ -42,6 +44,7 @@ class Fit:
 
     particles: Array  # positions (n, d) [m]
     spacing: float  # of the particles [m]
+    grid: Grid  # a lattice that many of the particles belong to
 
     @cached_property
     def _tree(self) -> cKDTree:
@@ -73,44 +76,115 @@ class Fit:
             result += self._integrals(*some, degree[around])
         return result[:, 0]
 
+    @cached_property
+    def _lattice(self) -> Surroundings:
+        return Surroundings.of(self.particles, self.grid)
+
     def _integrals(self, points: Array, weights: Array, degree: Indices) -> Array:
         result = np.zeros((len(self.particles), weights.shape[1]))
-        for start in range(0, len(points), _POINTS_AT_ONCE):
-            some = slice(start, start + _POINTS_AT_ONCE)
-            functions = _functions(self._tree, RADIUS * self.spacing, points[some], degree[some])
-            result += functions.T @ weights[some]
+        regular = self._lattice.regular(points, RADIUS * self.spacing)
+        regular &= degree == 2
+        elsewhere = np.flatnonzero(~regular)
+        for start in range(0, elsewhere.size, _POINTS_AT_ONCE):
+            some = elsewhere[start : start + _POINTS_AT_ONCE]
+            values, near = self._functions(points[some], degree[some])
+            result += self._sums(values, near, weights[some])
+        some = np.flatnonzero(regular)
+        if some.size:
+            self._add_regular(result, points[some], weights[some])
         return result
 
+    def _add_regular(self, result: Array, points: Array, weights: Array) -> None:
+        """Add to `result` (n, k) the integrals over points (m, d) in a part that is a lattice."""
+        lattice = self._lattice
+        first, kind = lattice.kinds(points)
+        found = [
+            self._functions(points[some], np.full(len(some), 2))
+            for some in np.array_split(first, 1 + len(first) // _POINTS_AT_ONCE)
+        ]
+        values, near = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        # Where the particles are, from the cell of the point; one without a value may be anywhere.
+        count = near.shape[1]
+        places = lattice.places(self.particles[near.ravel()]).reshape(near.shape)
+        steps = places - lattice.home(points[first])[:, None]
+        steps = np.where(values != 0.0, steps, np.take_along_axis(steps, np.zeros((len(first), 1), dtype=np.intp), 1))
+        for start in range(0, len(points), _POINTS_AT_ONCE * count):
+            some = slice(start, start + _POINTS_AT_ONCE * count)
+            there = lattice.numbers[lattice.home(points[some])[:, None] + steps[kind[some]]]
+            result += self._sums(values[kind[some]], there, weights[some])
 
-def _functions(tree: cKDTree, radius: float, points: Array, degree: Indices) -> csr_array:
-    """N_p at `points` (m, d) by fits up to some `degree` (m,), (m, n)."""
-    m, d = points.shape
-    count = min(_MOST[d], tree.n)
-    found, near = tree.query(points, k=np.arange(1, count + 1))
+    def _sums(self, values: Array, near: Indices, weights: Array) -> Array:
+        starts = near.shape[1] * np.arange(len(near) + 1)
+        functions = csr_array(
+            (values.ravel(), near.ravel(), starts), shape=(len(near), len(self.particles))
+        )
+        sums: Array = functions.T @ weights
+        return sums
+
+    def _functions(self, points: Array, degree: Indices) -> tuple[Array, Indices]:
+        return _functions(self._tree, RADIUS * self.spacing, points, degree)
+
+
+def _functions(tree: cKDTree, radius: float, points: Array, degree: Indices) -> tuple[Array, Indices]:
+    """N_p at `points` (m, d) by fits up to some `degree` (m,), both (m, k): the values and the
+    particles p."""
+    count = min(_MOST[tree.m], tree.n)
+    found, near = tree.query(points, k=np.arange(1, count + 1), distance_upper_bound=radius)
     distances, near = np.asarray(found), np.asarray(near)
     # The nearest particle counts however far it is.
+    alone = ~np.isfinite(distances[:, 0])
+    if alone.any():
+        distances[alone, :1], near[alone, :1] = tree.query(points[alone], k=[1])
     reach = np.maximum(radius, 1.01 * distances[:, :1])
-    weight = np.maximum(1.0 - distances / reach, 0.0) ** 4 * (1.0 + 4.0 * distances / reach)
+    q = np.minimum(distances / reach, 1.0)
+    near = np.minimum(near, tree.n - 1)  # those further away weigh nothing
+    weight = (1.0 - q) ** 4 * (1.0 + 4.0 * q)
     offsets = (tree.data[near] - points[:, None, :]) / reach[:, :, None]
-    x = list(np.moveaxis(offsets, 2, 0))
-    degrees = [np.ones_like(weight)], x, [a * b for a, b in combinations_with_replacement(x, 2)]
-    # At the particles (m, count), and at the point itself (m,).
-    orthonormal: list[tuple[Array, Array]] = []
-    fitted = accepted = np.zeros((m, count))
-    for number, monomials in enumerate(degrees):
-        for f in monomials:
-            here = np.full(m, float(number == 0))
-            size = np.einsum("mk,mk,mk->m", weight, f, f)
-            for _ in range(2):  # again, for rounding
-                for g, g_here in orthonormal:
-                    part = np.einsum("mk,mk,mk->m", weight, f, g)
-                    f, here = f - part[:, None] * g, here - part * g_here
-            left = np.einsum("mk,mk,mk->m", weight, f, f)
-            known = left > _DETERMINED * size
-            scale = np.where(known, 1.0 / np.sqrt(np.where(known, left, 1.0)), 0.0)
-            orthonormal.append((f * scale[:, None], here * scale))
-            fitted = fitted + (weight * scale[:, None] * f) * (here * scale)[:, None]
-        safe = (np.abs(fitted).sum(axis=1) <= _LARGEST_SUM) & (number <= degree)
-        accepted = np.where(safe[:, None], fitted, accepted)
-    starts = count * np.arange(m + 1)
-    return csr_array((accepted.ravel(), near.ravel(), starts), shape=(m, tree.n))
+    return weight * _fits(weight, offsets, degree), near
+
+
+def _fits(weight: Array, offsets: Array, degree: Indices) -> Array:
+    """The functions over their weight, (m, k), from the weights (m, k) of near particles and their
+    `offsets` (m, k, d) from the points, in radii."""
+    d = offsets.shape[2]
+    upper = np.triu_indices(d)
+    basis = np.concatenate(
+        [np.ones((*weight.shape, 1)), offsets, offsets[..., upper[0]] * offsets[..., upper[1]]],
+        axis=2,
+    )
+    degrees = np.repeat([0, 1, 2], [1, d, len(upper[0])])
+    moments = (basis * weight[:, :, None]).transpose(0, 2, 1) @ basis
+    accepted = np.zeros(weight.shape)
+    for number in (0, 1, 2):
+        some = np.flatnonzero(degree >= number)
+        size = int(np.sum(degrees <= number))
+        factors = _first_column(moments[some, :size, :size])
+        fitted = np.einsum("mkj,mj->mk", basis[some, :, :size], factors)
+        safe = np.abs(weight[some] * fitted).sum(axis=1) <= _LARGEST_SUM
+        accepted[some[safe]] = fitted[safe]
+    return accepted
+
+
+def _first_column(moments: Array) -> Array:
+    """First column of the inverse of symmetric matrices (m, j, j), without the rows and columns
+    that the earlier ones determine, (m, j)."""
+    m, size = moments.shape[:2]
+    lower = np.zeros((size, size, m))
+    pivots, known = np.zeros((size, m)), np.zeros((size, m), dtype=np.bool_)
+    M = np.ascontiguousarray(moments.transpose(1, 2, 0))
+    for j in range(size):
+        pivot = M[j, j] - np.einsum("km,km->m", lower[j, :j] ** 2, pivots[:j])
+        known[j] = pivot > _DETERMINED * M[j, j]
+        pivots[j] = np.where(known[j], pivot, 1.0)
+        rest = M[j + 1 :, j] - np.einsum("ikm,km->im", lower[j + 1 :, :j], lower[j, :j] * pivots[:j])
+        lower[j + 1 :, j] = np.where(known[j], rest / pivots[j], 0.0)
+    # Of the unit vector along the first axis: forwards, then backwards.
+    x = np.zeros((size, m))
+    x[0] = 1.0
+    for j in range(1, size):
+        x[j] = -np.einsum("km,km->m", lower[j, :j], x[:j])
+    x = np.where(known, x / pivots, 0.0)
+    for j in range(size - 2, -1, -1):
+        x[j] -= np.where(known[j], np.einsum("km,km->m", lower[j + 1 :, j], x[j + 1 :]), 0.0)
+    result: Array = x.T
+    return result

@@ -16,21 +16,21 @@ from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs
 from solidsph.model.particles import Particles
+from solidsph_builtin.gradients._softening import softening
 from solidsph_builtin.gradients.quadratic import Quadratic, closeness
 
 # Eigenvalues of a moment matrix below this part of the largest belong to functions that the
 # neighbours do not determine; no condition can be imposed on those.
 _DEPENDENT = 1e-10
 
-# How far the sums of surface particles may miss their area, relative to the change of the weights:
-# sampled areas may disagree with the volumes, and then no weights are exact. It must be small: a
-# multiplier that varies over n particles costs n^-6 of one that alternates, so that with 1e-6 the
-# loads on a side of 48 particles had errors large enough to spoil the second order.
-_AT_SURFACE = 1e-9
+# Sums are wrong where more than this part of the worst is missing; weights change so many supports
+# around.
+_WRONG = 1e-8
+_AROUND = 2
+_SMALLEST = 1e-300
 
-# The same for the first moments of all sums. A part of them is beyond reach, and others cost more
-# change than they are worth; of what was missing, half a per cent is left.
-_MOMENTS = 1e-5
+# Multipliers of a body up to which the system is factorised, by dimension: for a second or two.
+_FACTORISED = {1: 100_000, 2: 6000, 3: 1200}
 
 # Keeps the matrix regular in spite of smooth fields, which hardly change any weight; corrected by
 # iterative refinement.
@@ -67,9 +67,12 @@ class Consistent(Gradient):
 
     with a_p such that polynomials up to the degree of the gradient, at most the second, keep what
     their gradients, and l and L from the sparse linear system of the sums: the least change, with
-    each weight's change divided by its kernel weight w. The system is solved once, when the body is
-    built, by a factorisation over neighbours of neighbours: some tenths of a second for 5000
-    particles in the plane, and too expensive beyond some 10^4 in space.
+    each weight's change divided by its kernel weight w. Weights change only where sums are wrong,
+    and up to two supports from there: deep inside a lattice they stay those of the wrapped gradient.
+
+    The system is solved once, when the body is built: by a factorisation if it is small, else by
+    conjugate gradients over the fixed pairs, which leave a hundredth of what was missing in the
+    plane, and in space what a hundred steps leave, some hundredths.
     """
 
     of: Gradient = attrs.field(factory=Quadratic, metadata={"part": "gradients"})
@@ -113,15 +116,21 @@ class Consistent(Gradient):
         length = float(particles.spacings.mean())
         plain = inner.weights(found, slopes, particles.cells)
         missing = _missing(particles, found, plain, length)
-        V = particles.volumes
-        change = _Change.of(found, slopes, particles.cells, V, self.exact_degree, length)
         surface = np.zeros(particles.count, dtype=np.bool_)
         for face in particles.faces.values():
             surface[face.particles] = True
-        missing[:, 0] = _possible(
-            missing[:, 0], particles.positions, surface, self.exact_degree
-        )
-        return _OfBody(inner, V, _solved(change.matrix(), missing, surface), length)
+        degree = self.exact_degree
+        missing[:, 0] = _possible(missing[:, 0], particles.positions, surface, degree)
+        active = _active(missing, found)
+        V = particles.volumes
+        if missing.shape[0] * missing.shape[1] <= _FACTORISED[particles.dimension]:
+            change = _Change.of(found, slopes, particles.cells, V, active, degree, length)
+            multipliers = _solved(change.matrix(), missing, surface, active)
+        else:
+            from solidsph_builtin.gradients._iteration import solved  # loads the compiler
+
+            multipliers = solved(found, slopes, particles, active, degree, length, missing)
+        return _OfBody(inner, V, active, multipliers, length)
 
 
 @final
@@ -131,6 +140,7 @@ class _OfBody(Gradient):
 
     of: Gradient
     volumes: Array  # (n,) of the body [m^d]
+    active: Mask  # (n,) between which weights change
     multipliers: Array  # (n, 1 + d, d) l and the columns of L
     length: float  # unit of the offsets that L is multiplied by [m]
 
@@ -139,10 +149,18 @@ class _OfBody(Gradient):
         return self.of.exact_degree
 
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
-        change = _Change.of(
-            pairs, kernel_gradients, volumes, self.volumes, self.exact_degree, self.length
-        )
         plain = self.of.weights(pairs, kernel_gradients, volumes)
+        if not self.active[pairs.rows].any():
+            return plain
+        change = _Change.of(
+            pairs,
+            kernel_gradients,
+            volumes,
+            self.volumes,
+            self.active,
+            self.exact_degree,
+            self.length,
+        )
         return plain + change.weights(self.multipliers)
 
 
@@ -167,6 +185,15 @@ def _missing(particles: Particles, pairs: Pairs, weights: Array, length: float) 
     return missing
 
 
+def _active(missing: Array, pairs: Pairs) -> Mask:
+    """Particles around those with wrong sums, (n,)."""
+    size = np.abs(missing).max(axis=(1, 2))
+    active = size > _WRONG * size.max()
+    for _ in range(_AROUND):
+        active = pairs.row_sums(active[pairs.columns].astype(np.intp)) > 0
+    return np.asarray(active, dtype=np.bool_)
+
+
 @attrs.frozen(eq=False)
 class _Change:
     """Change of the weights of some rows with the multipliers."""
@@ -184,6 +211,7 @@ class _Change:
         kernel_gradients: Array,
         cells: Array,
         volumes: Array,
+        active: Mask,
         degree: int,
         length: float,
     ) -> _Change:
@@ -194,9 +222,10 @@ class _Change:
         squares = scaled[:, upper[0]] * scaled[:, upper[1]]
         basis = np.hstack([scaled, squares]) if degree > 1 else scaled
         w = closeness(kernel_gradients, pairs.distances) * cells[pairs.columns]
+        w = np.where(active[pairs.rows] & active[pairs.columns], w, 0.0)
         moments = pairs.row_sums((w[:, None, None] * basis[:, :, None]) * basis[:, None, :])
         sizes, directions = np.linalg.eigh(moments)
-        known = sizes > _DEPENDENT * sizes[:, -1:]
+        known = sizes > _DEPENDENT * np.maximum(sizes[:, -1:], _SMALLEST)
         scales = np.where(known, 1.0 / np.sqrt(np.where(known, sizes, 1.0)), 0.0)
         units = directions * scales[:, None, :]
         tests = np.einsum("mi,mij->mj", basis, pairs.spread(units))
@@ -250,28 +279,30 @@ def _possible(missing: Array, positions: Array, surface: Mask, degree: int) -> A
     return missing - change
 
 
-def _solved(matrix: csr_array, missing: Array, surface: Mask) -> Array:
+def _solved(matrix: csr_array, missing: Array, surface: Mask, active: Mask) -> Array:
     """Multipliers (n, 1 + d, d) whose change of the weights adds `missing` (n, 1 + d, d)."""
     n, kinds, d = missing.shape
-    diagonal = matrix.diagonal().reshape(kinds, n)
+    some = np.flatnonzero(active)
+    unknown = (n * np.arange(kinds)[:, None] + some).ravel()
+    matrix = csr_array(matrix[unknown][:, unknown])
+    diagonal = matrix.diagonal().reshape(kinds, some.size)
     size = float(np.median(diagonal[0]))
-    soft = np.full((kinds, n), _MOMENTS * float(np.mean(diagonal[1:])))
-    soft[0] = np.where(surface, _AT_SURFACE * size, 0.0)
-    softened = csr_array(matrix + diags_array(soft.ravel()))
+    soft = softening(diagonal.T, surface[some]).T.ravel()
+    softened = csr_array(matrix + diags_array(soft))
     factors: Any = splu(
-        csc_array(softened + diags_array(np.full(n * kinds, _REGULAR * size))),
+        csc_array(softened + diags_array(np.full(unknown.size, _REGULAR * size))),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
-    wanted = missing.transpose(1, 0, 2).reshape(kinds * n, d)
-    multipliers, left = np.zeros_like(wanted), wanted
+    wanted = missing[some].transpose(1, 0, 2).reshape(unknown.size, d)
+    multipliers, left, unsolved = np.zeros_like(wanted), wanted, 1.0
     for _ in range(_REFINEMENTS):
         multipliers = multipliers + factors.solve(left)
         left = wanted - softened @ multipliers
-        if np.abs(left).max() <= _SOLVED * np.abs(wanted).max():
+        before, unsolved = unsolved, float(np.abs(left).max() / max(np.abs(wanted).max(), 1e-300))
+        if unsolved <= _SOLVED or unsolved > 0.5 * before:
             break
-    unsolved = float(np.abs(left).max() / max(np.abs(wanted).max(), 1e-300))
     if not unsolved <= _USELESS:
         raise BuildError(
             [
@@ -280,5 +311,6 @@ def _solved(matrix: csr_array, missing: Array, surface: Mask) -> Array:
                 "to change, or use the wrapped gradient by itself"
             ]
         )
-    result: Array = multipliers.reshape(kinds, n, d).transpose(1, 0, 2)
+    result = np.zeros_like(missing)
+    result[some] = multipliers.reshape(kinds, some.size, d).transpose(1, 0, 2)
     return result
