@@ -301,7 +301,7 @@ def _solved(matrix: csr_array, missing: Array, surface: Mask, active: Mask) -> A
         multipliers = multipliers + factors.solve(left)
         left = wanted - softened @ multipliers
         before, unsolved = unsolved, float(np.abs(left).max() / max(np.abs(wanted).max(), 1e-300))
-        if unsolved <= _SOLVED or unsolved > 0.5 * before:
+        if unsolved <= _SOLVED or unsolved > 0.9 * before:
             break
     if not unsolved <= _USELESS:
         raise BuildError(

@@ -47,20 +47,33 @@ def test_without_the_fit_the_section_is_too_soft_or_too_stiff() -> None:
         assert second * 12.0 == pytest.approx(expected, rel=1e-12)
 
 
-def test_on_the_boundary_of_a_box_they_are_those_of_gregory() -> None:
-    """3/8, 7/6, 23/24 and then whole cells, to the last bit where nothing is to be done."""
-    particles = FittedMoments(of=Lattice(on_boundary=True)).particles(Box(lengths=(1.2,)), 0.1)
-    V = np.array([3 / 8, 7 / 6, 23 / 24, *(7 * [1.0]), 23 / 24, 7 / 6, 3 / 8])
-    assert np.allclose(particles.volumes / 0.1, V, rtol=1e-12)
-    lattice, shape = Lattice(on_boundary=True), Box(lengths=(1.2, 1.0))
-    block = FittedMoments(of=lattice).particles(shape, 0.1)
-    deep = shape.signed_distance(block.positions) < -4.5 * 0.1
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_on_the_boundary_of_a_box_they_are_close_to_those_of_gregory(dimension: int) -> None:
+    """5/12, 13/12 and then whole cells, but for half a per cent that makes second moments exact."""
+    lattice, shape = Lattice(on_boundary=True), Box(lengths=(1.2, 1.0, 1.0)[:dimension])
+    particles = FittedMoments(of=lattice).particles(shape, 0.1)
+    V, X = particles.volumes / 0.1**dimension, particles.positions
+    from_left = np.round(X[:, 0] / 0.1).astype(int)
+    middle = np.all(np.abs(X[:, 1:] - 0.5) < 0.01, axis=1)
+    along = V[middle][np.argsort(from_left[middle])]
+    assert np.allclose(along[:3], [5 / 12, 13 / 12, 1.0], atol=8e-3)
+    assert np.allclose(along, along[::-1], rtol=1e-9)
+    deep = shape.signed_distance(X) < -3.7 * 0.1
     assert deep.any()
-    assert np.array_equal(block.volumes[deep], lattice.particles(shape, 0.1).volumes[deep])
-    # Along a face the rule is the same; its ends share what the two faces of a corner have.
+    assert np.array_equal(particles.volumes[deep], lattice.particles(shape, 0.1).volumes[deep])
+
+
+def test_at_an_edge_the_particles_around_it_share_a_face() -> None:
+    """All of it, and its middle; tags stay those of the particles that are on the face."""
+    shape = Box(lengths=(1.2, 1.0))
+    block = FittedMoments(of=Lattice(on_boundary=True)).particles(shape, 0.1)
     bottom = block.faces["bottom"]
-    order = np.argsort(block.positions[bottom.particles, 0])
-    assert np.allclose(bottom.areas[order] / 0.1, V, rtol=2e-3)  # samples of a quarter spacing
+    X = block.positions[bottom.particles]
+    # Samples of a quarter spacing leave the square of their size over that of the face.
+    assert bottom.areas.sum() == pytest.approx(1.2, rel=1e-12)
+    assert bottom.areas @ X == pytest.approx([0.72, 0.0], abs=1e-4)
+    assert (X[:, 1] > 0.0).any()
+    assert np.array_equal(block.tags["bottom"], block.positions[:, 1] == 0.0)
 
 
 def test_a_parabolic_load_has_its_sum() -> None:
@@ -123,5 +136,5 @@ def test_a_fit_that_would_need_negative_volumes_is_refused() -> None:
             found = super().surface(spacing)
             return attrs.evolve(found, points=found.points * [3.0, 1.0])
 
-    with pytest.raises(SceneError, match="too thin for positive volumes"):
+    with pytest.raises(SceneError, match="too thin for the spacing"):
         FittedMoments(of=Lattice()).particles(Wrong(lengths=(1.0, 1.0), origin=(-0.5, -0.5)), 0.2)
