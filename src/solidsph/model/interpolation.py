@@ -23,8 +23,10 @@ from solidsph.model.neighbours import row_starts
 Sees: TypeAlias = Callable[[Array, Indices], Mask]
 """Whether points (m, d) see particles (m, k), (m, k)."""
 
-# Radius of a fit around a particle, in spacings.
+# Radius of a fit around a particle, in spacings. Where it does not determine the second degree, as
+# beside a surface with irregular particles, a wider one is tried.
 _RADIUS = 2.2
+_WIDER = (1.0, 1.3, 1.6)
 
 # Particles within the largest radius, at most: a lattice has 7, 32 and 123.
 _MOST = {1: 8, 2: 40, 3: 150}
@@ -87,11 +89,21 @@ def _functions(
         distances = np.where(seen, distances, np.inf)
     # Beyond the surface there is nobody, so there the fit reaches further.
     reach = _RADIUS * spacing + distances.min(axis=1)
-    weights = _weights(distances / reach[:, None])
     offsets = tree.data[near] - points[:, None, :]
-    fitted = _fit(offsets / reach[:, None, None], weights)
-    fitted[:, 1:] /= reach[:, None, None]
-    within = weights > 0.0
+    fitted = np.empty((m, 1 + d, count))
+    left = np.arange(m)
+    for wider in _WIDER:
+        radius = wider * reach[left]
+        weights = _weights(distances[left] / radius[:, None])
+        fit, complete = _fit(offsets[left] / radius[:, None, None], weights)
+        fit[:, 1:] /= radius[:, None, None]
+        # Of fits that are all incomplete, the narrowest counts.
+        taken = complete | (wider == _WIDER[0])
+        fitted[left[taken]] = fit[taken]
+        left = left[~complete]
+        if not left.size:
+            break
+    within = np.any(fitted != 0.0, axis=1)
     starts = row_starts(within.sum(axis=1))
     return [
         csr_array((fitted[:, k][within], near[within], starts), shape=(m, tree.n))
@@ -106,8 +118,9 @@ def _weights(q: Array) -> Array:
     return weights
 
 
-def _fit(x: Array, weights: Array) -> Array:
-    """Weight of each particle in the value of a fit at the origin and in its slopes, (m, 1 + d, k).
+def _fit(x: Array, weights: Array) -> tuple[Array, Mask]:
+    """Weight of each particle in the value of a fit at the origin and in its slopes, (m, 1 + d, k),
+    and whether the fit is of the second degree, (m,).
 
     Monomials are made orthonormal one by one, so that those that the particles do not determine
     are left out.
@@ -122,6 +135,7 @@ def _fit(x: Array, weights: Array) -> Array:
     # At the particles (m, k), and value and slopes at the origin (m, 1 + d).
     orthonormal: list[tuple[Array, Array]] = []
     fitted = accepted = np.zeros((m, 1 + d, k))
+    complete = np.ones(m, dtype=np.bool_)
     number = 0
     for monomials in ([np.ones((m, k))], along, products):
         for f in monomials:
@@ -136,10 +150,12 @@ def _fit(x: Array, weights: Array) -> Array:
                     f, here = f - part[:, None] * g, here - part[:, None] * g_here
             left = np.einsum("mk,mk,mk->m", weights, f, f)
             known = left > _DETERMINED * size
+            complete &= known
             scale = np.where(known, 1.0 / np.sqrt(np.where(known, left, 1.0)), 0.0)[:, None]
             f, here = f * scale, here * scale
             orthonormal.append((f, here))
             fitted = fitted + here[:, :, None] * (weights * f)[:, None, :]
         safe = np.abs(fitted[:, 0]).sum(axis=1) <= _LARGEST_SUM
+        complete &= safe
         accepted = np.where(safe[:, None, None], fitted, accepted)
-    return accepted
+    return accepted, complete

@@ -1,8 +1,7 @@
-"""Stress across the plane of a body in plane strain, or across a bar in uniaxial strain.
+"""The whole stress of a body in plane strain, or of a bar in uniaxial strain.
 
 A material knows only the components of its dimension. Its law in three dimensions, at F with
-stretches of 1 across, gives the others. Internal variables keep their names in every dimension;
-those that only three dimensions have stay as they were at the start.
+stretches of 1 across, gives the others.
 """
 
 from __future__ import annotations
@@ -11,20 +10,21 @@ import numpy as np
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.history import HistoryMaterial
+from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.interfaces.law import memory_name
 from solidsph.interfaces.material import Material
 from solidsph.interfaces.memory import Memory
 from solidsph.maths.arrays import Array, Indices
 from solidsph.maths.tensors import components_first, particles_first
 
-# A deformation with which a law is tried, and how closely both dimensions must agree.
-_TRIED = np.eye(3) + 0.01 * np.array([[2.0, 1.0, 0.0], [-0.5, 1.0, 0.0], [0.0, 0.0, 0.0]])
+# A deformation, and a time, in which a law is tried, and how closely both dimensions must agree.
+_TRIED = np.eye(3) + 0.1 * np.array([[2.0, 1.0, 0.0], [-0.5, 1.0, 0.0], [0.0, 0.0, 0.0]])
+_STEP = 1e-3
 _AGREEMENT = 1e-9
 
 
-def stress_across(body: Body, rows: Indices, F: Array, memory: Memory) -> Array:
-    """Normal Cauchy stresses along the missing axes, (k, 3 - d) [Pa].
+def whole_stress(body: Body, rows: Indices, F: Array, memory: Memory) -> Array:
+    """Cauchy stress in three dimensions, (k, 3, 3) [Pa].
 
     Args:
         body: the body.
@@ -32,29 +32,35 @@ def stress_across(body: Body, rows: Indices, F: Array, memory: Memory) -> Array:
         F: their deformation gradients, (k, d, d).
         memory: `State.memory`.
     """
-    d, material = F.shape[1], body.material
-    history = None
+    material, d = body.material, F.shape[1]
+    history: History = ()
     if isinstance(material, HistoryMaterial):
-        recorded = memory.get(memory_name(body))
-        start = np.array([*material.initial_history(d).values()], dtype=np.float64)
-        history = np.tile(start, (len(rows), 1)) if recorded is None else recorded[rows]
-    P = _first_piola(material, F, history)
-    ratios = np.linalg.det(F)
-    return np.stack([P[:, k, k] / ratios for k in range(d, 3)], axis=1)
+        name = memory_name(body)
+        start = [np.full(len(rows), value) for value in material.initial_history(d).values()]
+        history = tuple(memory[name][rows].T) if name in memory else tuple(start)
+    P, wide = _whole_first_piola(material, F, history), _widened(F)
+    ratios = np.linalg.det(F)[:, None, None]
+    return np.asarray(np.einsum("pik,pjk->pij", P, wide) / ratios)
 
 
-def check_stress_across(body: Body, dimension: int) -> None:
+def check_whole_stress(body: Body, dimension: int) -> None:
     """Raise SceneError unless the law of a body agrees with its own in three dimensions."""
     material, d = body.material, dimension
     F = _TRIED[None, :d, :d]
-    history = None
-    if isinstance(material, HistoryMaterial):
-        history = np.array([[*material.initial_history(d).values()]], dtype=np.float64)
+    components, params = components_first(F), material.params
     problem = ""
     try:
-        P = particles_first(material.first_piola(components_first(F), material.params), 1)
-        agree = np.abs(_first_piola(material, F, history)[:, :d, :d] - P).max()
-        if not agree <= _AGREEMENT * np.abs(P).max():
+        with np.errstate(all="ignore"):
+            history: History = ()
+            if isinstance(material, HistoryMaterial):
+                start = tuple(np.full(1, value) for value in material.initial_history(d).values())
+                history = material.advance(components, start, _STEP, params)
+                P = material.stress(components, history, params)
+            else:
+                P = material.first_piola(components, params)
+            plane = particles_first(P, 1)
+            differs = np.abs(_whole_first_piola(material, F, history)[:, :d, :d] - plane).max()
+        if not differs <= _AGREEMENT * np.abs(plane).max():
             problem = "in three dimensions it has other stresses in the plane"
     except Exception as cause:  # of any material: one of two dimensions only, for example
         problem = f"in three dimensions it fails: {type(cause).__name__}: {cause}"
@@ -66,17 +72,20 @@ def check_stress_across(body: Body, dimension: int) -> None:
         )
 
 
-def _first_piola(material: Material, F: Array, history: Array | None) -> Array:
-    """P in three dimensions, (k, 3, 3) [Pa], from F (k, d, d) and internal variables (k, ...)."""
+def _whole_first_piola(material: Material, F: Array, history: History) -> Array:
+    """P in three dimensions, (k, 3, 3) [Pa], from F (k, d, d) and internal variables."""
+    k, d, _ = F.shape
+    components, params = components_first(_widened(F)), material.params
+    with np.errstate(all="ignore"):  # as in steps
+        if isinstance(material, HistoryMaterial):
+            h = material.history_in_space(history, d)
+            return particles_first(material.stress(components, h, params), k)
+        return particles_first(material.first_piola(components, params), k)
+
+
+def _widened(F: Array) -> Array:
+    """Deformation gradients (k, 3, 3) with stretches of 1 across, from (k, d, d)."""
     k, d, _ = F.shape
     wide = np.tile(np.eye(3), (k, 1, 1))
     wide[:, :d, :d] = F
-    components, params = components_first(wide), material.params
-    with np.errstate(all="ignore"):  # as in steps
-        if not isinstance(material, HistoryMaterial) or history is None:
-            return particles_first(material.first_piola(components, params), k)
-        own = dict(zip(material.initial_history(d), history.T, strict=True))
-        h = tuple(
-            own.get(name, np.full(k, start)) for name, start in material.initial_history(3).items()
-        )
-        return particles_first(material.stress(components, h, params), k)
+    return wide

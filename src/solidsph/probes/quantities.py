@@ -15,7 +15,7 @@ from solidsph.interfaces.body import Body
 from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import largest_principal
-from solidsph.probes.out_of_plane import check_stress_across, stress_across
+from solidsph.probes.out_of_plane import check_whole_stress, whole_stress
 from solidsph.probes.sampling import Sampling
 from solidsph.probes.values import cauchy_stress
 
@@ -65,20 +65,16 @@ class Sampled:
     @cached_property
     def whole_stresses(self) -> Array:
         """Cauchy stress with the components across a plane or a bar, (m, 3, 3) [Pa]."""
-        m, d = self.sampling.points.shape
-        whole = np.zeros((m, 3, 3))
-        whole[:, :d, :d] = self.stresses
-        if d < 3:
-            chosen = self.sampling.particles
-            across = np.empty((len(chosen), 3 - d))
-            F, memory = self.observation.deformation_gradients, self.observation.state.memory
-            for body in self.bodies:
-                own = (chosen >= body.extent.start) & (chosen < body.extent.stop)
-                if own.any():
-                    rows = chosen[own] - body.extent.start
-                    across[own] = stress_across(body, rows, F[chosen[own]], memory)
-            whole[:, range(d, 3), range(d, 3)] = self.sampling.interpolated(across)
-        return whole
+        if self.sampling.points.shape[1] == 3:
+            return self.stresses
+        chosen, seen = self.sampling.particles, self.observation
+        whole = np.empty((len(chosen), 3, 3))
+        for body in self.bodies:
+            own = (chosen >= body.extent.start) & (chosen < body.extent.stop)
+            rows = chosen[own] - body.extent.start
+            F = seen.deformation_gradients[chosen[own]]
+            whole[own] = whole_stress(body, rows, F, seen.state.memory)
+        return self.sampling.interpolated(whole)
 
     @property
     def _particle_displacements(self) -> Array:
@@ -190,7 +186,7 @@ class Measure:
         """Raise SceneError if it cannot be known of a material."""
         if self.quantity.crosses_plane and dimension < 3:
             for body in bodies:
-                check_stress_across(body, dimension)
+                check_whole_stress(body, dimension)
 
     def values(self, sampled: Sampled) -> Array:
         """The numbers at every point, (m, k)."""

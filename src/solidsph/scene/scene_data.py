@@ -61,10 +61,13 @@ class ProbeScene:
     @property
     def place(self) -> str:
         """Where it measures, in words."""
-        words = (("point", self.point), ("line", self.line), ("where", self.where))
-        found = [f"{name} {value}" for name, value in words if value is not None]
-        found += [f"account {self.account!r}"] if self.account is not None else []
-        found += [f"about {self.about}"] if self.about is not None else []
+        found = []
+        for name in ("point", "line", "where", "account", "about", "body"):
+            value = getattr(self, name)
+            if isinstance(value, Mapping):
+                value = " ".join(f"{word} {part}" for word, part in value.items())
+            if value is not None:
+                found.append(f"{name} {value}")
         return ", ".join(found)
 
 
