@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from solidsph import BuildError, Record, Scene, SceneError, Simulation, resume
+from solidsph.costs.effect_shares import without
 from solidsph.registry import registry
 from solidsph.results.output_fields import history
 from solidsph.scene.scene_builder import SceneBuilder
@@ -129,9 +130,10 @@ def test_a_face_has_the_mean_over_its_area() -> None:
         .probe(label="half", quantity="displacement x", where="right and Y > 0.5"),
         bent,
     )
-    assert found["end maximum displacement x [m]"] == pytest.approx(0.5e-6, rel=1e-2)  # a sample's
+    assert found["end maximum displacement x [m]"] == pytest.approx(0.5e-6, rel=2e-2)
+    # The last sample is half of a sixteenth of a spacing from the corner.
     assert found["end maximum at X [m]"] == 1.0
-    assert found["end maximum at Y [m]"] == pytest.approx(1.0, abs=0.25 / 6)
+    assert found["end maximum at Y [m]"] == pytest.approx(1.0 - 1.0 / 32.0 / 6.0)
     assert found["end mean displacement x [m]"] == pytest.approx(0.0, abs=1e-15)
     assert found["half minimum displacement x [m]"] > 0.0
     assert found["half mean displacement x [m]"] == pytest.approx(0.25e-6, rel=0.2)
@@ -287,7 +289,7 @@ def test_the_bending_stress_is_largest_at_the_root_above(tmp_path: Path) -> None
         .build()
     )
     final = simulation.run(record=tmp_path / "record.h5").final
-    # Bernoulli's M h / (2 I) at x = 0.1, a height away from the clamp; measured: 0.15 % more.
+    # Bernoulli's M h / (2 I) at x = 0.1, a height away from the clamp; measured: 0.14 % more.
     peak = force * (length - 0.1) * 0.05 / (0.1**3 / 12.0)
     assert final["fibre maximum stress xx [Pa]"] == pytest.approx(peak, rel=0.005)
     assert final["fibre maximum at X [m]"] == 0.1
@@ -335,6 +337,23 @@ def test_moments_are_about_each_axis_there_is(d: int) -> None:
         expected |= {"w moment x [N m]": 0.0, "w moment y [N m]": -500.0}
         expected |= {"w moment z [N m]": -250.0}
     assert found == pytest.approx(expected, abs=1e-9)
+
+
+def test_an_account_of_an_effect_that_is_taken_away_is_zero() -> None:
+    """As receipts do, to see what an effect changes."""
+    simulation = (
+        box(2, 4)
+        .effect("mass-damping", rate=30.0)
+        .probe(label="w", quantity="resultant", account="mass-damping")
+        .initial(velocity={"x": 1.0})
+        .build()
+    )
+    with_it, less = (
+        one.probes[0].report(one.observe(one.start()))
+        for one in (simulation, without(simulation, "mass-damping"))
+    )
+    assert with_it["w force x [N]"] == pytest.approx(-30.0 * 1000.0)
+    assert not any(less.values())
 
 
 def test_toml_round_trip_and_the_builders_words() -> None:

@@ -40,7 +40,8 @@ _DETERMINED = 1e-6
 # centres of cells 3.5, 7.0 and 10.7 in 1, 2 and 3D.
 _LARGEST_SUM = 12.0
 
-_POINTS_AT_ONCE = 2048
+# So that the arrays of a fit stay in cache.
+_POINTS_AT_ONCE = 512
 
 
 @attrs.frozen(eq=False)
@@ -48,13 +49,18 @@ class ShapeFunctions:
     """N_p and their slopes at m points; all matrices have their entries in the same places."""
 
     values: csr_array  # (m, n) N_p(x) [-]
-    slopes: Sequence[csr_array]  # d of (m, n), dN_p/dx_k [1/m]
+    slopes: Sequence[csr_array]  # d of (m, n), dN_p/dx_k [1/m]; none if not asked for
 
 
 def shape_functions(
-    particles: Array, spacing: float, points: Array, sees: Sees | None = None
+    particles: Array,
+    spacing: float,
+    points: Array,
+    sees: Sees | None = None,
+    *,
+    slopes: bool = True,
 ) -> ShapeFunctions:
-    """The functions N_p of particles, and their slopes, at any points.
+    """The functions N_p of particles at any points, and their slopes if wanted.
 
     They reproduce polynomials of the second degree wherever the particles determine them safely,
     and otherwise as many as they do determine; constants always.
@@ -64,10 +70,12 @@ def shape_functions(
         spacing: of the particles [m].
         points: (m, d) [m].
         sees: which particles a point depends on; all near ones if None.
+        slopes: whether slopes are wanted.
     """
+    count = 1 + particles.shape[1] if slopes else 1
     tree = cKDTree(particles)
     parts = [
-        _functions(tree, spacing, points[first : first + _POINTS_AT_ONCE], sees)
+        _functions(tree, spacing, points[first : first + _POINTS_AT_ONCE], sees)[:count]
         for first in range(0, max(1, len(points)), _POINTS_AT_ONCE)
     ]
     stacked = [csr_array(vstack(blocks, format="csr")) for blocks in zip(*parts, strict=True)]
@@ -90,16 +98,17 @@ def _functions(
     # Beyond the surface there is nobody, so there the fit reaches further.
     reach = _RADIUS * spacing + distances.min(axis=1)
     offsets = tree.data[near] - points[:, None, :]
-    fitted = np.empty((m, 1 + d, count))
+    fitted = np.zeros((m, 1 + d, count))
     left = np.arange(m)
     for wider in _WIDER:
         radius = wider * reach[left]
         weights = _weights(distances[left] / radius[:, None])
-        fit, complete = _fit(offsets[left] / radius[:, None, None], weights)
+        k = int(np.flatnonzero(weights.any(axis=0))[-1]) + 1  # the others are too far
+        fit, complete = _fit(offsets[left, :k] / radius[:, None, None], weights[:, :k])
         fit[:, 1:] /= radius[:, None, None]
         # Of fits that are all incomplete, the narrowest counts.
         taken = complete | (wider == _WIDER[0])
-        fitted[left[taken]] = fit[taken]
+        fitted[left[taken], :, :k] = fit[taken]
         left = left[~complete]
         if not left.size:
             break

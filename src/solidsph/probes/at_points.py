@@ -39,7 +39,7 @@ class PointProbe(Probe):
         self.check_place(shapes, particles)
         self.measure.check_bodies(model.bodies, particles.dimension)
         found = located(shapes, particles, self.point, self.body)
-        sampling = Sampling.of(shapes, particles, *found)
+        sampling = Sampling.of(shapes, particles, *found, slopes=self.measure.quantity.is_gradient)
         return _AtPoint(self.label, self.measure, sampling, model.bodies)
 
 
@@ -68,7 +68,7 @@ class LineProbe(Probe):
         return _OverPoints(
             self.label,
             self.measure,
-            Sampling.of(shapes, particles, *found),
+            Sampling.of(shapes, particles, *found, slopes=self.measure.quantity.is_gradient),
             model.bodies,
             shares / shares.sum(),
         )
@@ -92,7 +92,7 @@ class FaceProbe(Probe):
     def bind(self, model: DiscreteModel, accounts: Collection[str]) -> Term:
         self.measure.check_dimension(model.particles.dimension)
         self.measure.check_bodies(model.bodies, model.particles.dimension)
-        samples = face_samples(model, self.where)
+        samples = face_samples(model, self.where, slopes=self.measure.quantity.is_gradient)
         areas = np.linalg.norm(samples.area_vectors, axis=1)
         return _OverPoints(
             self.label, self.measure, samples.sampling, model.bodies, areas / areas.sum()

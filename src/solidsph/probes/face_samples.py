@@ -13,8 +13,9 @@ from solidsph.model.regions import Where, described
 from solidsph.model.surface import Pieces
 from solidsph.probes.sampling import Sampling
 
-# Distance of samples [spacings], at most: a maximum between two of them is hardly missed.
-_DISTANCE = 0.5
+# Distance of samples that is asked for [spacings], by dimension. Built-in shapes sample 16 times as
+# densely in the plane and 4 times in space: a maximum between two samples is hardly missed.
+_DISTANCE = {1: 1.0, 2: 1.0, 3: 2.0}
 
 
 @attrs.frozen(eq=False)
@@ -25,7 +26,7 @@ class FaceSamples:
     area_vectors: Array  # (m, d) outward [m^(d-1)]
 
 
-def face_samples(model: DiscreteModel, where: Where) -> FaceSamples:
+def face_samples(model: DiscreteModel, where: Where, *, slopes: bool = False) -> FaceSamples:
     """The surface at `where`: the faces that it names, or all surface of its particles.
 
     As with loads on surfaces, the name of a face holds on the samples of that face, everything
@@ -41,7 +42,8 @@ def face_samples(model: DiscreteModel, where: Where) -> FaceSamples:
     area_vectors: list[Array] = []
     owners, faces, bodies = [], [], []
     for number, body in enumerate(model.bodies):
-        surface = body.shape.surface(_DISTANCE * float(body.particles.spacings.max()))
+        distance = _DISTANCE[particles.dimension] * float(body.particles.spacings.max())
+        surface = body.shape.surface(distance)
         own = np.flatnonzero(~body.particles.ghosts) + body.extent.start
         labels = np.array(surface.faces)
         for name in dict.fromkeys(surface.faces):
@@ -69,13 +71,14 @@ def face_samples(model: DiscreteModel, where: Where) -> FaceSamples:
     )
     chosen = np.flatnonzero(pieces.at(where) & (pieces.areas > 0.0))
     if not chosen.size:
-        raise SceneError(f"{described(where)} is smaller than half a spacing; make it larger")
+        raise SceneError(f"{described(where)} has no sample of the surface; make it larger")
     return FaceSamples(
         Sampling.of(
             {body.name: body.shape for body in model.bodies},
             particles,
             np.concatenate(points)[chosen],
             np.concatenate(bodies)[chosen],
+            slopes=slopes,
         ),
         areas[chosen],
     )

@@ -104,6 +104,7 @@ class Quantity:
     values: Callable[[Sampled], Array]  # (m, d, ...), as many times d as its rank
     symmetric: bool = False
     crosses_plane: bool = False  # it needs the stress across a plane or a bar
+    is_gradient: bool = False
 
     def components(self, dimension: int) -> Mapping[str, tuple[int, ...]]:
         """Place of each component in the tensor, by name."""
@@ -120,7 +121,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "displacement": Quantity("m", 1, lambda s: s.displacements),
     "position": Quantity("m", 1, lambda s: s.positions),
     "velocity": Quantity("m/s", 1, lambda s: s.velocities),
-    "deformation-gradient": Quantity("-", 2, lambda s: s.deformation_gradients),
+    "deformation-gradient": Quantity("-", 2, lambda s: s.deformation_gradients, is_gradient=True),
     "stress": Quantity("Pa", 2, lambda s: s.stresses, symmetric=True),
     "principal-stress": Quantity("Pa", 0, lambda s: largest_principal(s.stresses)),
     "von-mises": Quantity("Pa", 0, _von_mises, crosses_plane=True),

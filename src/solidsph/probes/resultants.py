@@ -73,7 +73,9 @@ class _OfAccount(Term):
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         state = observation.state
-        return _resultant(self.label, state.positions - self.about, state.applied[self.account])
+        # A run without an effect, to see what it changes, has no account of it.
+        forces = state.applied.get(self.account, np.zeros_like(state.positions))
+        return _resultant(self.label, state.positions - self.about, forces)
 
 
 @final

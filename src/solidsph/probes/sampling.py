@@ -32,13 +32,22 @@ class Sampling:
     points: Array  # (m, d) reference positions [m]
     particles: Indices  # (k,)
     functions: csr_array  # (m, k)
-    slopes: Sequence[csr_array]  # d of (m, k) [1/m]
+    slopes: Sequence[csr_array]  # d of (m, k) [1/m], or none
 
     @classmethod
     def of(
-        cls, shapes: Mapping[str, Shape], particles: Particles, points: Array, bodies: Indices
+        cls,
+        shapes: Mapping[str, Shape],
+        particles: Particles,
+        points: Array,
+        bodies: Indices,
+        *,
+        slopes: bool = True,
     ) -> Sampling:
-        """The sampling at `points` (m, d), each of a body, by its number in `shapes` (m,)."""
+        """The sampling at `points` (m, d), each of a body, by its number in `shapes` (m,).
+
+        Without `slopes` there are no gradients.
+        """
         rows: list[Indices] = []
         columns: list[Indices] = []
         weights: list[Array] = []  # (1 + d, entries)
@@ -50,7 +59,7 @@ class Sampling:
             own = np.flatnonzero(~particles.ghosts[extent]) + extent.start
             X, spacing = particles.positions[own], float(particles.spacings[own].max())
             sees = None if shape.convex else _sees(shape, X, spacing)
-            functions = shape_functions(X, spacing, points[chosen], sees)
+            functions = shape_functions(X, spacing, points[chosen], sees, slopes=slopes)
             # The matrices have their entries in the same places.
             entries = functions.values.tocoo()
             rows.append(chosen[entries.row])
