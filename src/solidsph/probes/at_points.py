@@ -7,6 +7,7 @@ from typing import final
 
 import attrs
 import numpy as np
+from numpy.typing import ArrayLike
 
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.discrete_model import DiscreteModel
@@ -31,15 +32,11 @@ class PointProbe(Probe):
     body: str | None  # where several touch
 
     def check_place(self, shapes: Mapping[str, Shape], particles: Particles) -> None:
+        located(shapes, particles, [self.point], self.body)
         self.measure.check_dimension(particles.dimension)
-        located(shapes, particles, self.point, self.body)
 
     def bind(self, model: DiscreteModel, accounts: Collection[str]) -> Term:
-        shapes, particles = _shapes(model), model.particles
-        self.check_place(shapes, particles)
-        self.measure.check_bodies(model.bodies, particles.dimension)
-        found = located(shapes, particles, self.point, self.body)
-        sampling = Sampling.of(shapes, particles, *found, slopes=self.measure.quantity.is_gradient)
+        sampling = _sampling(model, self.measure, [self.point], self.body)
         return _AtPoint(self.label, self.measure, sampling, model.bodies)
 
 
@@ -55,23 +52,15 @@ class LineProbe(Probe):
     body: str | None  # where several touch
 
     def check_place(self, shapes: Mapping[str, Shape], particles: Particles) -> None:
-        self.measure.check_dimension(particles.dimension)
         located(shapes, particles, self._points(), self.body)
+        self.measure.check_dimension(particles.dimension)
 
     def bind(self, model: DiscreteModel, accounts: Collection[str]) -> Term:
-        shapes, particles = _shapes(model), model.particles
-        self.check_place(shapes, particles)
-        self.measure.check_bodies(model.bodies, particles.dimension)
-        found = located(shapes, particles, self._points(), self.body)
+        sampling = _sampling(model, self.measure, self._points(), self.body)
         shares = np.ones(self.count)
         shares[[0, -1]] = 0.5  # the trapezoidal rule
-        return _OverPoints(
-            self.label,
-            self.measure,
-            Sampling.of(shapes, particles, *found, slopes=self.measure.quantity.is_gradient),
-            model.bodies,
-            shares / shares.sum(),
-        )
+        shares /= shares.sum()
+        return _OverPoints(self.label, self.measure, sampling, model.bodies, shares)
 
     def _points(self) -> Array:
         return np.linspace(self.start, self.end, self.count)
@@ -90,13 +79,11 @@ class FaceProbe(Probe):
         select(particles, self.where)
 
     def bind(self, model: DiscreteModel, accounts: Collection[str]) -> Term:
-        self.measure.check_dimension(model.particles.dimension)
-        self.measure.check_bodies(model.bodies, model.particles.dimension)
+        self.measure.check(model)
         samples = face_samples(model, self.where, slopes=self.measure.quantity.is_gradient)
         areas = np.linalg.norm(samples.area_vectors, axis=1)
-        return _OverPoints(
-            self.label, self.measure, samples.sampling, model.bodies, areas / areas.sum()
-        )
+        shares = areas / areas.sum()
+        return _OverPoints(self.label, self.measure, samples.sampling, model.bodies, shares)
 
 
 @final
@@ -147,5 +134,16 @@ class _OverPoints(Term):
         }
 
 
-def _shapes(model: DiscreteModel) -> Mapping[str, Shape]:
-    return {body.name: body.shape for body in model.bodies}
+def _sampling(
+    model: DiscreteModel, measure: Measure, points: ArrayLike, body: str | None
+) -> Sampling:
+    """The sampling for a measure at points (m, d) of a body.
+
+    Raises:
+        SceneError: a point is outside, or the measure is not known of this model.
+    """
+    shapes = {own.name: own.shape for own in model.bodies}
+    found = located(shapes, model.particles, points, body)
+    measure.check(model)
+    slopes = measure.quantity.is_gradient
+    return Sampling.of(shapes, model.particles, *found, slopes=slopes)

@@ -12,6 +12,7 @@ import numpy as np
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
+from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import largest_principal
@@ -19,7 +20,7 @@ from solidsph.probes.out_of_plane import check_whole_stress, whole_stress
 from solidsph.probes.sampling import Sampling
 from solidsph.probes.values import cauchy_stress
 
-_AXES = ("x", "y", "z")
+COMPONENTS = ("x", "y", "z")
 
 MAGNITUDE = "magnitude"
 """The component of a vector that is its length."""
@@ -112,9 +113,9 @@ class Quantity:
         if self.rank == 0:
             return {"": ()}
         if self.rank == 1:
-            return {_AXES[i]: (i,) for i in axes}
+            return {COMPONENTS[i]: (i,) for i in axes}
         pairs = [(i, k) for i in axes for k in axes if i <= k or not self.symmetric]
-        return {_AXES[i] + _AXES[k]: (i, k) for i, k in pairs}
+        return {COMPONENTS[i] + COMPONENTS[k]: (i, k) for i, k in pairs}
 
 
 QUANTITIES: Mapping[str, Quantity] = {
@@ -183,10 +184,12 @@ class Measure:
                 + (f" or '{self.name} {MAGNITUDE}'" if self.quantity.rank == 1 else "")
             )
 
-    def check_bodies(self, bodies: Sequence[Body], dimension: int) -> None:
-        """Raise SceneError if it cannot be known of a material."""
+    def check(self, model: DiscreteModel) -> None:
+        """Raise SceneError if it does not exist in the model's dimension, or of its materials."""
+        dimension = model.particles.dimension
+        self.check_dimension(dimension)
         if self.quantity.crosses_plane and dimension < 3:
-            for body in bodies:
+            for body in model.bodies:
                 check_whole_stress(body, dimension)
 
     def values(self, sampled: Sampled) -> Array:

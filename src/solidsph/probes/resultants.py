@@ -18,8 +18,7 @@ from solidsph.model.particles import Particles
 from solidsph.model.regions import Where, select
 from solidsph.probes.face_samples import FaceSamples, face_samples
 from solidsph.probes.probe import Probe
-
-_AXES = ("x", "y", "z")
+from solidsph.probes.quantities import COMPONENTS
 
 # Axes about which there is a moment, by dimension.
 _TURNS = {1: (), 2: (2,), 3: (0, 1, 2)}
@@ -100,12 +99,13 @@ def _resultant(label: str, arms: Array, forces: Array) -> Mapping[str, float]:
     """Total of `forces` (k, d) [N] at `arms` (k, d) [m] from the point of the moment."""
     d = forces.shape[1]
     columns = {
-        f"{label} force {_AXES[k]} [N]": float(total) for k, total in enumerate(forces.sum(axis=0))
+        f"{label} force {COMPONENTS[k]} [N]": float(total)
+        for k, total in enumerate(forces.sum(axis=0))
     }
     for axis in _TURNS[d]:
         i, j = (axis + 1) % 3, (axis + 2) % 3
         moment = np.sum(arms[:, i] * forces[:, j] - arms[:, j] * forces[:, i])
-        columns[f"{label} moment {_AXES[axis]} [N m]"] = float(moment)
+        columns[f"{label} moment {COMPONENTS[axis]} [N m]"] = float(moment)
     return columns
 
 
