@@ -25,6 +25,7 @@ VALUES: list[Any] = [
     "../../x", "/dev/null", "%s{}", [], [1.0], [1.0, 0.5], [[]], [0.0, 0.0], [1.0, 1.0, 1.0], {},
     {"x": 1.0}, {"x": "1e3*t"}, {"w": 1}, {"type": "lattice"}, {"type": "box"}, {"type": 3},
     {"type": "neo-hookean"}, {"type": "consistent", "gradient": "consistent"},
+    "stress xx", "von-mises", "resultant", {"from": [0.0, 0.0], "to": [1.0, 0.5]},
 ]  # fmt: skip
 
 WORDS = [
@@ -34,6 +35,7 @@ WORDS = [
     "label", "tags", "lengths", "x", "y", "z", "rate", "strength", "density", "poissons_ratio",
     "youngs_modulus", "displacement", "velocity", "traction", "acceleration", "axis", "at",
     "load_steps", "radius", "points", "file", "seed", "amount", "parts", "on_boundary", "silence",
+    "probe", "quantity", "point", "line", "from", "to", "count", "account", "about",
 ]  # fmt: skip
 
 PARTS = [
@@ -49,6 +51,27 @@ PARTS = [
 
 SCENES = [
     SCENE_TOML,
+    SCENE_TOML
+    + """
+[[probe]]
+label = "tip"
+quantity = "displacement"
+point = [1.0, 0.25]
+[[probe]]
+label = "end"
+quantity = "von-mises"
+where = "right"
+[[probe]]
+label = "cut"
+quantity = "stress xy"
+line = {from = [0.5, 0.0], to = [0.5, 0.5], count = 5}
+body = "block"
+[[probe]]
+label = "hold"
+quantity = "resultant"
+account = "clamp left"
+about = [0.0, 0.25]
+""",
     SCENE_TOML.replace('gradient = "corrected"', 'gradient = "consistent"').replace(
         "[integrator]", '[[effect]]\ntype = "hourglass-control"\n\n[integrator]'
     ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -30,9 +31,26 @@ def test_first_kernel_shows_the_example_plugin() -> None:
 
 
 def test_the_scenes_shown_can_be_built_and_the_static_one_run() -> None:
-    moving, static = (Scene.from_toml(text) for text in blocks("docs/scenes.md", "toml"))
+    moving, static, _ = (Scene.from_toml(text) for text in blocks("docs/scenes.md", "toml"))
     assert Simulation.builder(moving).build().steps > 0
     assert solve(Simulation.builder(static).build()).effort["residual [-]"] < 1e-9
+
+
+def test_the_probes_shown_measure_what_is_said(tmp_path, monkeypatch) -> None:
+    (code,) = blocks("docs/scenes.md", "python")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cantilever.toml").write_text(blocks("docs/scenes.md", "toml")[-1])
+    names: dict[str, Any] = {}
+    exec(compile(code, "docs/scenes.md", "exec"), names)
+    final = names["result"].final
+    assert final["root force y [N]"] == pytest.approx(1.0, abs=5e-7)
+    assert final["root moment z [N m]"] == pytest.approx(0.5, abs=5e-6)
+    assert final["top fibre maximum at X [m]"] == 0.1
+    assert final["top fibre maximum stress xx [Pa]"] / 240.0 - 1.0 == pytest.approx(14e-4, abs=5e-5)
+    assert names["moments"][-1] == final["root moment z [N m]"]
+    # The profile is that of bending, and the values are those of the probe.
+    assert names["profile"][[0, -1]] == pytest.approx([-150.0, 150.0], rel=0.01)
+    assert names["values"].displacement[0, 1] == pytest.approx(final["tip displacement y [m]"])
 
 
 def test_the_scenes_shown_are_sound() -> None:

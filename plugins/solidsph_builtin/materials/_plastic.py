@@ -14,7 +14,7 @@ from solidsph.maths.arrays import Scalar, Tensor
 from solidsph.maths.tensors import identity
 from solidsph_builtin.materials._flow import metric
 from solidsph_builtin.materials._isochoric import energy_of, stress_of, tangent_of
-from solidsph_builtin.materials._symmetric import names
+from solidsph_builtin.materials._symmetric import component_count, components, names
 from solidsph_builtin.materials._wide import narrowed, widened, widened_change
 
 PLASTIC_STRAIN = "plastic strain [-]"
@@ -25,6 +25,12 @@ def initial_history(dimension: int, added: Mapping[str, float]) -> Mapping[str, 
     diagonal = {"xx": 1.0, "yy": 1.0, "zz": 1.0}
     inverse = {f"inverse plastic metric {a} [-]": diagonal.get(a, 0.0) for a in names(dimension)}
     return {**inverse, PLASTIC_STRAIN: 0.0, **added, "dissipated energy [J/m^3]": 0.0}
+
+
+def history_in_space(history: History, dimension: int) -> History:
+    """Internal variables in three dimensions; det C_p = 1 gives the metric across."""
+    like = ((0.0,) * dimension,) * dimension
+    return (*components(metric(history, like)), *history[component_count(dimension) :])
 
 
 def energy(F: Tensor, params: tuple[float, ...]) -> Scalar:

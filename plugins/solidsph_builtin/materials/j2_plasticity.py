@@ -101,6 +101,9 @@ class J2Plasticity(HistoryMaterial):
     def initial_history(self, dimension: int) -> Mapping[str, float]:
         return _plastic.initial_history(dimension, {})
 
+    def history_in_space(self, history: History, dimension: int) -> History:
+        return _plastic.history_in_space(history, dimension)
+
     energy = staticmethod(_plastic.energy)
     first_piola = staticmethod(_plastic.first_piola)
     tangent = staticmethod(_plastic.tangent)

@@ -62,12 +62,14 @@ class Assembler:
         self._placed.stop_if_any()
         model = self._model()
         terms = self._terms(model)
+        probes = self._probes(model, terms)
         initial, steps = self._start_and_steps(model, terms)
         dynamics = self._dynamics(model, terms, steps)
         histories = [b for b in model.bodies if isinstance(b.material, HistoryMaterial)]
         if histories:
             terms.append(HistoryFields(histories, model.particles.count))
-        self._problems.add(name_clashes(reference_observation(initial, model, terms), terms))
+        at_rest = reference_observation(initial, model, terms)
+        self._problems.add(name_clashes(at_rest, [*terms, *probes]))
         self._problems.stop_if_any()
         built = kind(
             scene=self._scene,
@@ -81,6 +83,7 @@ class Assembler:
             steps=steps,
             parts=tuple(self._placed.used),
             manager=self._manager,
+            probes=tuple(probes),
         )
         self._check_built(built)
         return built
@@ -117,6 +120,20 @@ class Assembler:
             for label, part in several.items():
                 terms += self._problems.attempt(bind, kind, part, model, label) or []
         return terms
+
+    def _probes(self, model: DiscreteModel, terms: Sequence[Term]) -> list[Term]:
+        """Bound probes."""
+        if not self._parts.probes:
+            return []
+        from solidsph.assembly.probes import bind_probe  # loaded only for [[probe]]
+
+        accounts = {t.label for t in terms if isinstance(t, (Load, Constraint))}
+        missing = {*self._placed.labels} - {term.label for term in terms}  # not bound, and noted
+        attempts = [
+            self._problems.attempt(bind_probe, probe, model, accounts | missing)
+            for probe in self._parts.probes
+        ]
+        return [bound for bound in attempts if bound is not None]
 
     def _start_and_steps(self, model: DiscreteModel, terms: Sequence[Term]) -> tuple[State, int]:
         """Initial state and number of steps, after checks that the terms fit each other."""

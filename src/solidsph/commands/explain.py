@@ -98,6 +98,8 @@ def _text(facts: Facts, titles: Mapping[str, str], *, verbose: bool) -> Iterator
                 shown = [r for r in scene[title] if verbose or r["quantity"] not in INTERNALS]
                 yield Table.of(title, shown, ("quantity", "value", "why"), {"quantity": ""})
         yield _effects_table(scene["effects"], verbose=verbose)
+        if scene["probes"]:
+            yield Table.of("probes", scene["probes"], ("probe", "measures", "at"))
         if scene["warnings"]:
             keys = ("name", "found", "expected", "remedy")
             yield Table.of("warnings", scene["warnings"], keys, {"name": "warning"})
@@ -151,6 +153,10 @@ def _explained(
         "work": work_rows(prediction.work),
         "cost": prediction_rows(prediction),
         "silenced": list(scene.silence),
+        "probes": [
+            {"probe": probe.label, "measures": probe.quantity, "at": probe.place}
+            for probe in scene.probes
+        ],
     }
 
 

@@ -35,6 +35,15 @@ class HistoryMaterial(Material):
     def initial_history(self, dimension: int) -> Mapping[str, float]:
         """Internal variables "quantity [unit]" of the virgin state, in the order of h."""
 
+    def history_in_space(self, history: History, dimension: int) -> History:
+        """Internal variables in three dimensions, of the same uniaxial or plane strain.
+
+        With them the law gives the stress across the plane. By default the variables of the same
+        names; those that only three dimensions have are as at the start.
+        """
+        own = dict(zip(self.initial_history(dimension), history, strict=True))
+        return tuple(own.get(name, start) for name, start in self.initial_history(3).items())
+
     @staticmethod
     @abstractmethod
     def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:

@@ -8,11 +8,11 @@ from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from solidsph.errors import RecordError
 from solidsph.maths.arrays import Array
@@ -32,6 +32,9 @@ from solidsph.results.layout import (
 )
 from solidsph.results.layout_checks import Tree, check_first, check_rest, check_values
 from solidsph.results.time_series import TimeSeries
+
+if TYPE_CHECKING:
+    from solidsph.probes.values import Values
 
 T = TypeVar("T")
 
@@ -188,6 +191,35 @@ class Record:
             known = ", ".join(self.field_names) or "none"
             raise RecordError(f"no field {name!r} in {self.path}; {hint}fields: {known}")
         return self._fields[name]
+
+    def at(self, points: ArrayLike, output: int = -1, *, body: str | None = None) -> Values:
+        """Displacement, velocity, F and stress at any points of the undeformed bodies.
+
+        By interpolation of the second order up to the surface, as `Result.at` gives them.
+
+        Args:
+            points: reference positions, (m, d) or (d,) [m].
+            output: the output, from the end if negative.
+            body: the body, where several touch; the one in which a point is deepest if None.
+
+        Raises:
+            SceneError: a point lies outside of every body.
+            RecordError: the shapes of the bodies cannot be made from the scene in the record.
+            IndexError: there is no such output.
+        """
+        from solidsph.probes.values import values_at  # loaded only when asked for
+        from solidsph.results.recorded_shapes import recorded_shapes
+
+        stress = self.field("cauchy_stress")[output]
+        return values_at(
+            recorded_shapes(self.scene, self.folder),
+            self.particles,
+            points,
+            body,
+            positions=self.positions[output],
+            velocities=self.field("velocity")[output],
+            stress=lambda chosen: stress[chosen],
+        )
 
     @property
     def count(self) -> int:

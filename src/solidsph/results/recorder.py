@@ -127,7 +127,8 @@ class Recorder:
             )
 
     def _history(self, simulation: BuiltScene, observation: Observation) -> dict[str, float]:
-        return history(observation, self._initial_energy, simulation.terms)
+        terms = (*simulation.terms, *simulation.probes)
+        return history(observation, self._initial_energy, terms)
 
 
 def _outputs(record: Record, until: float) -> Iterator[Output]:

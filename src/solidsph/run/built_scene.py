@@ -6,11 +6,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import attrs
 import numpy as np
 import pluggy
+from numpy.typing import ArrayLike
 
 from solidsph.errors import BuildError, DivergedError, SceneError
 from solidsph.interfaces.discrete_model import DiscreteModel
@@ -25,6 +26,9 @@ from solidsph.run.dynamics import Dynamics
 from solidsph.run.outcome import Result
 from solidsph.run.restart_point import RestartPoint
 from solidsph.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from solidsph.probes.values import Values
 
 
 @attrs.frozen(eq=False)
@@ -43,6 +47,7 @@ class BuiltScene(ABC):
     parts: tuple[Entry, ...]  # every plugin used
     manager: pluggy.PluginManager
     halvings: int = 0  # of the step of the scene
+    probes: Sequence[Term] = ()  # which only report
 
     @abstractmethod
     def run(
@@ -123,6 +128,29 @@ class BuiltScene(ABC):
         if inverted.any():
             raise self.diverged(state, "the volume has vanished or turned inside out")
         return observation
+
+    def values_at(self, state: State, points: ArrayLike, body: str | None = None) -> Values:
+        """Displacement, velocity, F and stress of a state at any points of the reference bodies.
+
+        Args:
+            state: of this scene.
+            points: reference positions, (m, d) or (d,) [m].
+            body: the body, where several touch; the one in which a point is deepest if None.
+
+        Raises:
+            SceneError: a point lies outside of every body.
+        """
+        from solidsph.probes.values import cauchy_stress, values_at  # loaded only when asked for
+
+        return values_at(
+            {own.name: own.shape for own in self.model.bodies},
+            self.particles,
+            points,
+            body,
+            positions=state.positions,
+            velocities=state.velocities,
+            stress=lambda chosen: cauchy_stress(self.dynamics.observe(state), chosen),
+        )
 
     def diverged(self, state: State, cause: str) -> DivergedError:
         """The error of a motion that cannot continue from `state`, after the hook of failures."""

@@ -55,6 +55,7 @@ def run_motion(
             seconds=clock.perf_counter() - start,
             effort={"steps": state.step, "step size [s]": simulation.step_size, **loop.effort},
             notes=() if since is None else since.notes,
+            values_at=simulation.values_at,
         )
 
     try:

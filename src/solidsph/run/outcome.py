@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
+from numpy.typing import ArrayLike
 
+from solidsph.errors import SceneError
 from solidsph.model.particles import State
+
+if TYPE_CHECKING:
+    from solidsph.probes.values import Values
 
 FINISHED, INTERRUPTED = "finished", "interrupted"
 """Outcomes of a completed run, and of one interrupted by the user."""
@@ -32,3 +37,32 @@ class Result:
     effort: Mapping[str, Any]  # further costs: "quantity [unit]" -> number or bool
     final: Mapping[str, float] = attrs.field(factory=dict)  # last row of the record's history
     notes: Sequence[str] = ()  # events of the run, as in the record
+    _values_at: Callable[[State, ArrayLike, str | None], Values] | None = None
+
+    def at(self, points: ArrayLike, *, body: str | None = None) -> Values:
+        """Displacement, velocity, F and stress at any points of the undeformed bodies, at the end.
+
+        By interpolation of the second order up to the surface.
+
+        Args:
+            points: reference positions, (m, d) or (d,) [m].
+            body: the body, where several touch; the one in which a point is deepest if None.
+
+        Raises:
+            SceneError: a point lies outside of every body.
+        """
+        if self._values_at is None:
+            raise SceneError(
+                "this result has come without its simulation; read values at points from its "
+                "record, with Record.at"
+            )
+        return self._values_at(self.state, points, body)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the simulation, which does not travel between processes."""
+        kept = {field.name: getattr(self, field.name) for field in attrs.fields(type(self))}
+        return {**kept, "_values_at": None}
+
+    def __setstate__(self, kept: Mapping[str, Any]) -> None:
+        for name, value in kept.items():
+            object.__setattr__(self, name, value)

@@ -55,6 +55,7 @@ class Parts:
     shapes: Mapping[str, Shape]
     materials: Mapping[str, Material]
     sets: Mapping[str, Particles]
+    probes: Sequence[Any] = ()
 
 
 class PartMaker:
@@ -80,8 +81,10 @@ class PartMaker:
         handlers = self._labelled("boundaries", scene.boundaries)
         effects = self._labelled("effects", scene.effects)
         problems.add(check_effects(effects))
-        bodies = self._body_parts()
-        return Parts(kernel, cover, formulation, integrator, engine, handlers, effects, *bodies)
+        bodies, probes = self._body_parts(), self._probes()
+        return Parts(
+            kernel, cover, formulation, integrator, engine, handlers, effects, *bodies, probes
+        )
 
     def _make(self, kind: str, wanted: PartLike) -> Any:
         part = self.problems.attempt(construct, kind, wanted)
@@ -149,6 +152,31 @@ class PartMaker:
         count = self._repeated[label] = self._repeated.get(label, 1) + 1
         candidate = f"{label}'" if count == 2 else f"{label} {count}"
         return candidate if candidate not in self.labels else self._unused(label)
+
+    def _probes(self) -> Sequence[Any]:
+        """Probes, not yet bound to bodies."""
+        if not self._scene.probes:
+            return ()
+        from solidsph.probes.words import probe_of  # loaded only for [[probe]]
+
+        labels: set[str] = set()
+        probes = []
+        for entry in self._scene.probes:
+            label = entry.label
+            if not isinstance(label, str) or not label.strip() or not label.isprintable():
+                self.problems.add(
+                    [f"a probe has no label; add label = ..., its columns' name, got {label!r}"]
+                )
+                continue
+            if len(label) > _LONGEST_LABEL:
+                self.problems.add([f"a probe's label has over {_LONGEST_LABEL} characters"])
+            if label in labels:
+                self.problems.add([f"two probes are labelled {label!r}; give each its own label"])
+            labels.add(label)
+            words = attrs.asdict(entry, recurse=False)
+            del words["label"]
+            probes.append(self.problems.attempt(probe_of, label, words))
+        return [probe for probe in probes if probe is not None]
 
     def _body_parts(
         self,

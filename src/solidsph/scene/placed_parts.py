@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import attrs
 import numpy as np
@@ -98,6 +99,15 @@ class PlacedParts:
         for where in dict.fromkeys(place for place in places if isinstance(place, str)):
             if not wrong.intersection(re.findall(r"\w+", where.replace("-", "_"))):
                 self.problems.attempt(select, particles, where)
+        for probe in self.parts.probes:
+            self.problems.attempt(self._check_probe, probe)
+
+    def _check_probe(self, probe: Any) -> None:
+        from solidsph.probes.probe import named  # loaded only for [[probe]]
+
+        assert self.placed is not None
+        with named(probe):
+            probe.check_place(self.parts.shapes, self.placed[0])
 
     def _tagged(self, particles: Particles) -> tuple[Particles, Conditions]:
         """Particles with the tags that the scene adds, and the conditions of these tags."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Self
 
 import attrs
@@ -17,6 +17,7 @@ from solidsph.scene.scene_data import (
     ImposedScene,
     InitialScene,
     PartLike,
+    ProbeScene,
     SleepScene,
     StaticsScene,
 )
@@ -84,6 +85,22 @@ class SceneBuilder(ABC):
     ) -> Self:
         """Set initial displacement [m] and velocity [m/s]; a later call overrides."""
         return self._append("initial", InitialScene(where, displacement, velocity))
+
+    def probe(
+        self,
+        *,
+        label: str,
+        quantity: str,
+        point: Sequence[float] | None = None,
+        line: Mapping[str, Any] | None = None,
+        where: Where | None = None,
+        account: str | None = None,
+        about: Sequence[float] | None = None,
+        body: str | None = None,
+    ) -> Self:
+        """Add a measurement; its columns of the history begin with `label`."""
+        entry = ProbeScene(label, quantity, point, line, where, account, about, body)
+        return self._append("probes", entry)
 
     def integrator(
         self,

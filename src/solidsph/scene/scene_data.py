@@ -46,6 +46,32 @@ class InitialScene:
 
 
 @attrs.frozen
+class ProbeScene:
+    """A measurement: a quantity at one place, which becomes columns of the history."""
+
+    label: str | None = None  # the beginning of its columns; every probe has one
+    quantity: str | None = None  # a name, with a component or without: "stress xy"
+    point: Sequence[float] | None = None  # of the undeformed body [m]
+    line: Mapping[str, Any] | None = None  # {from = [0, 0], to = [1, 0], count = 101}
+    where: Where | None = None  # a part of the surface
+    account: str | None = None  # the label of a boundary or an effect
+    about: Sequence[float] | None = None  # point of a moment [m]; the origin if None
+    body: str | None = None  # that contains the point or the line, where several touch
+
+    @property
+    def place(self) -> str:
+        """Where it measures, in words."""
+        found = []
+        for name in ("point", "line", "where", "account", "about", "body"):
+            value = getattr(self, name)
+            if isinstance(value, Mapping):
+                value = " ".join(f"{word} {part}" for word, part in value.items())
+            if value is not None:
+                found.append(f"{name} {value}")
+        return ", ".join(found)
+
+
+@attrs.frozen
 class StaticsScene:
     """Parameters of an equilibrium; see `statics.equilibrium`."""
 
@@ -85,6 +111,7 @@ class SceneData:
     boundaries: Sequence[ImposedScene] = ()
     effects: Sequence[ImposedScene] = ()
     initial: Sequence[InitialScene] = ()
+    probes: Sequence[ProbeScene] = ()
     integrator: PartLike | None = None  # DEFAULT_INTEGRATOR if None
     sleep: SleepScene | None = None  # None: no region sleeps
     statics: StaticsScene | None = None  # None: a motion, no equilibrium

@@ -21,6 +21,7 @@ from solidsph.scene.scene_data import (
     BodyScene,
     ImposedScene,
     InitialScene,
+    ProbeScene,
     SceneData,
     SleepScene,
     StaticsScene,
@@ -41,6 +42,7 @@ _SECTIONS = {
     "boundary": "[[boundary]]",
     "effect": "[[effect]]",
     "initial": "[[initial]]",
+    "probe": "[[probe]]",
     "integrator": "[integrator]",
     "sleep": "[sleep]",
     "statics": "[statics]",
@@ -128,6 +130,7 @@ def _scene(table: Mapping[str, Any], problems: Problems) -> tuple[dict[str, Any]
         ("boundary", "boundaries", _imposed),
         ("effect", "effects", _imposed),
         ("initial", "initial", _initial),
+        ("probe", "probes", _probe),
     ):
         entries = problems.attempt(_list, table, key) or []
         several = [problems.attempt(read_entry, entry, key, problems) for entry in entries]
@@ -191,6 +194,10 @@ def _imposed(entry: Any, what: str, problems: Problems) -> ImposedScene:
 
 def _initial(entry: Any, what: str, problems: Problems) -> Any:
     return _simple(entry, what, InitialScene, problems)
+
+
+def _probe(entry: Any, what: str, problems: Problems) -> Any:
+    return _simple(entry, what, ProbeScene, problems)
 
 
 def _simple(entry: Any, what: str, kind: type[Any], problems: Problems) -> Any:

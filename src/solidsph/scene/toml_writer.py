@@ -44,6 +44,7 @@ def toml_of(scene: SceneData) -> str:
         "boundary": _imposed("boundaries", scene.boundaries),
         "effect": _imposed("effects", scene.effects),
         "initial": [attrs.asdict(entry) for entry in scene.initial] or None,
+        "probe": [attrs.asdict(entry) for entry in scene.probes] or None,
     }
     return tomli_w.dumps({key: _plain(v, key) for key, v in table.items() if v is not None})
 

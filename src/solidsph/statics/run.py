@@ -51,4 +51,5 @@ def run_statics(
             "stable": result.stable,
         },
         notes=() if since is None else since.notes,
+        values_at=simulation.values_at,
     )
