@@ -25,7 +25,7 @@ _DEPENDENT = 1e-10
 
 # Sums are wrong where more than this part of the worst is missing; weights change so many supports
 # around.
-_WRONG = 1e-8
+_WRONG = 1e-11
 _AROUND = 2
 _SMALLEST = 1e-300
 

@@ -133,9 +133,10 @@ def test_parts_are_integrated(discretisation: object) -> None:
     before, after = np.abs(sums(plain)) / area, np.abs(sums(mended)) / area
     # Beside a surface the sums miss even on a lattice, by much of what a surface particle owns.
     assert before[inside].max() > 0.1
-    # Forces inside cancel as well as the linear system is solved; at the surface to the part
+    # Forces inside cancel to rounding, which large multipliers amplify to some 1e-9, and the patch
+    # test asks for 1e-8; at the surface to the part
     # that the area of a particle is free to miss.
-    assert after[inside].max() < 1e-9
+    assert after[inside].max() < 1e-8
     assert after.max() < 0.3 * before.max()
 
 
