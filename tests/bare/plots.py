@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import ceil
+from math import ceil, floor, log10
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -33,6 +33,8 @@ def draw(studies: Sequence[Study], folder: Path) -> Path:
         across = study.scene.across
         panel.set_xticks([1.0 / (n - 1) for n in across], [str(n) for n in across])
         panel.minorticks_off()
+        lowest, highest = panel.get_ylim()
+        panel.set_ylim(10.0 ** floor(log10(lowest)), 10.0 ** ceil(log10(highest)))
         panel.set_xlabel("particles across")
         panel.set_title(study.scene.name, fontsize=10)
         panel.grid(alpha=0.3)

@@ -22,7 +22,8 @@ from tests.bare.study import HEADING, Study, studied
 def test_a_bare_scene(name: str) -> None:
     study = studied(name)
     print(*study.rows(), f"[{study.seconds:.1f} s]", sep="\n")
-    assert list(study.faults()) == []
+    faults = list(study.faults())
+    assert not faults, "\n".join(faults)
 
 
 @pytest.mark.validation
