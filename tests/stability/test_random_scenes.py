@@ -5,6 +5,7 @@ from __future__ import annotations
 import attrs
 import pytest
 
+from tests.stability import random_scenes
 from tests.stability.random_scenes import BOUNDED, REFUSED, Words, campaign, drawn, outcome
 
 
@@ -67,6 +68,14 @@ def test_what_a_weight_puts_in_is_no_growth() -> None:
     """It falls from rest: all its energy is put in."""
     falls = {"type": "body-force", "acceleration": {"y": -9.81}}
     assert outcome(attrs.evolve(plain(), effects=[falls], speed=0.0, held=False)) == BOUNDED
+
+
+def test_energy_that_nothing_put_in_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same fall, of which the ledger is not told that a weight drives it."""
+    falls = {"type": "body-force", "acceleration": {"y": -9.81}}
+    monkeypatch.setattr(random_scenes, "_DRIVES", ())
+    found = outcome(attrs.evolve(plain(), effects=[falls], held=False))
+    assert "times the energy put in at step 200" in found
 
 
 def test_a_seed_draws_one_scene() -> None:
