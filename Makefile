@@ -16,7 +16,7 @@ TWO := -n 2 --dist loadfile --no-loadscope-reorder
 # Some hundred processes import the package: each would compile its modules anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test validate gallery frontiers bench bench-page lint format clean
+.PHONY: demo test validate bare gallery frontiers bench bench-page lint format clean
 
 demo: $(STAMP)  ## the paper's headline experiment: table, record and picture
 	$(BIN)/solidsph run tensile-instability
@@ -27,6 +27,9 @@ test: $(STAMP) lint  ## lint, types and every test but the slow physics
 
 validate: $(STAMP)  ## the slow physics, every combination, and many more examples of properties
 	$(BIN)/pytest $(TWO) -m "validation or examples" --hypothesis-profile thorough -rP
+
+bare: $(STAMP)  ## scenes that name nothing of the scheme: their errors as a table, and plots over spacing
+	$(BIN)/python -m tests.bare results/bare
 
 bench: $(STAMP)  ## against a plain C loop, whole steps, memory, throughput along every axis, the updated form
 	$(BIN)/python benchmarks/bench.py

@@ -46,7 +46,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 # Rooms whose files take longest.
-LONG = ("engines", "results", "studies", "testing", "cases")
+LONG = ("bare", "engines", "results", "studies", "testing", "cases")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

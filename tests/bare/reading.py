@@ -1,0 +1,68 @@
+"""Values between particles: a quadratic field fitted to those around a point."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial import cKDTree
+
+from solidsph.maths.arrays import Array
+from tests.bare.scene import Fields
+
+# The fit takes what lies within so many spacings of a point, and at least twice as many particles
+# as it has coefficients: at corners the former are too few.
+_REACH = 2.5
+_LEAST = 2
+
+
+def at(rest: Fields, values: Array, points: Array) -> Array:
+    """`values` (n, ...) of the particles at `points` (k, d), inside the body or on its surface."""
+    return fitted(rest.places, rest.spacing, values, np.atleast_2d(points))
+
+
+def fitted(X: Array, spacing: float, values: Array, points: Array) -> Array:
+    """Moving least squares of the second degree, weighed by a Gaussian of one spacing's width."""
+    tree, (n, d) = cKDTree(X), X.shape
+    least = min(n, _LEAST * (1 + d + d * (d + 1) // 2))
+    rows = []
+    for point, near in zip(points, tree.query_ball_point(points, _REACH * spacing), strict=True):
+        chosen = near if len(near) >= least else tree.query(point, k=least)[1]
+        offsets = (X[chosen] - point) / spacing
+        weights = np.exp(-0.25 * np.sum(offsets**2, axis=1))[:, None]  # the root of the Gaussian
+        first, second = np.triu_indices(d)
+        terms = np.hstack(
+            [np.ones((len(offsets), 1)), offsets, offsets[:, first] * offsets[:, second]]
+        )
+        wanted = values[chosen].reshape(len(offsets), -1)
+        rows.append(np.linalg.lstsq(weights * terms, weights * wanted, rcond=1e-8)[0][0])
+    return np.array(rows).reshape(len(points), *values.shape[1:])
+
+
+def mean_on(rest: Fields, values: Array, start: Array, end: Array, count: int = 41) -> Array:
+    """Mean of `values` along the straight line between two points, by the trapezoidal rule."""
+    parts = np.linspace(0.0, 1.0, count)
+    points = np.outer(1.0 - parts, start) + np.outer(parts, end)
+    return np.asarray(np.trapezoid(at(rest, values, points), parts, axis=0))
+
+
+def zigzag(rest: Fields, values: Array) -> float:
+    """What neighbours differ by beyond the smooth field around them, over the range of `values`.
+
+    Root mean square over the body of twice the distance of a particle's value from the field
+    fitted to it and its neighbours: where values alternate by a, they differ by 2 a. A linear
+    field would count the curvature of the solution as well.
+    """
+    smooth = fitted(rest.places, rest.spacing, values, rest.places)
+    return float(2.0 * np.sqrt(np.mean((values - smooth) ** 2)) / np.ptp(values))
+
+
+def period_of(times: Array, values: Array, guess: float) -> float:
+    """Period [s] of the sine, zero at the start, that fits `values` (t,) best."""
+    scale = float(np.abs(values).max())
+
+    def misfit(p: Array) -> Array:
+        return np.asarray(p[1] * np.sin(2.0 * pi * times / (p[0] * guess)) - values / scale)
+
+    return float(least_squares(misfit, [1.0, 1.0], xtol=1e-12, ftol=1e-12).x[0] * guess)

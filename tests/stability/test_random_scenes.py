@@ -1,0 +1,83 @@
+"""Whatever parts a scene is made of: it stays bounded with the default step, or is refused."""
+
+from __future__ import annotations
+
+import attrs
+import pytest
+
+from tests.stability import random_scenes
+from tests.stability.random_scenes import BOUNDED, REFUSED, Words, campaign, drawn, outcome
+
+
+def assert_all_sound(count: int) -> None:
+    counts, wrong = campaign(count)
+    print(dict(counts))
+    assert not wrong, f"{len(wrong)} of {count}; again by drawn(seed):\n" + "\n".join(wrong)
+    assert counts[REFUSED] < 0.4 * count  # or it says little
+
+
+def test_random_scenes() -> None:
+    assert_all_sound(25)
+
+
+@pytest.mark.validation
+def test_a_thousand_random_scenes() -> None:
+    assert_all_sound(1000)
+
+
+# --- The judgement -------------------------------------------------------------------------------
+
+
+def plain(seed: int = 0) -> Words:
+    """A scene of parts that suit each other, for the rest as it is drawn."""
+    return attrs.evolve(
+        drawn(seed),
+        dimension=2,
+        shape={"type": "box", "lengths": [1.0, 0.6]},
+        spacing=0.1,
+        discretisation="lattice",
+        kernel="cubic-spline",
+        cover=2.2,
+        gradient="corrected",
+        divergence="variational",
+        material={
+            "type": "neo-hookean",
+            "youngs_modulus": 1e6,
+            "poissons_ratio": 0.3,
+            "density": 1e3,
+        },
+        effects=[],
+        speed=0.01,
+        waves=1,
+    )
+
+
+def test_a_sound_scene_is_bounded() -> None:
+    assert outcome(plain()) == BOUNDED
+
+
+def test_a_step_beyond_the_critical_one_is_not() -> None:
+    assert outcome(plain(), time_step_factor=4.0) != BOUNDED
+
+
+def test_parts_that_do_not_fit_are_refused() -> None:
+    assert outcome(attrs.evolve(plain(), cover=0.5)) == REFUSED
+
+
+def test_what_a_weight_puts_in_is_no_growth() -> None:
+    """It falls from rest: all its energy is put in."""
+    falls = {"type": "body-force", "acceleration": {"y": -9.81}}
+    assert outcome(attrs.evolve(plain(), effects=[falls], speed=0.0, held=False)) == BOUNDED
+
+
+def test_energy_that_nothing_put_in_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same fall, of which the ledger is not told that a weight drives it."""
+    falls = {"type": "body-force", "acceleration": {"y": -9.81}}
+    monkeypatch.setattr(random_scenes, "_DRIVES", ())
+    found = outcome(attrs.evolve(plain(), effects=[falls], held=False))
+    assert "times the energy put in at step 200" in found
+
+
+def test_a_seed_draws_one_scene() -> None:
+    assert drawn(7) == drawn(7)
+    assert drawn(7) != drawn(8)
