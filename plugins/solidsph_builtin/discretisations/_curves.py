@@ -68,7 +68,7 @@ def _with_ends(surface: Surface, lengths: Array, curve: Indices, corners: Array)
     if len(corners):
         gaps, nearest = cKDTree(corners).query(points[[0, -1]])
         at = gaps <= _TO_CORNER * lengths[curve[[0, -1]]]
-        ends[at] = corners[nearest[at]]
+        ends[at] = corners[np.asarray(nearest)[at]]
     return np.concatenate([ends[:1], points, ends[1:]])
 
 

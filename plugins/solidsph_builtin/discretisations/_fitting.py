@@ -70,7 +70,8 @@ def fitted(
         raise refusal(
             discretisation,
             f"the body is too thin for the spacing {spacing:g} m: a particle would have the volume "
-            f"{volumes.min():.3g} m^{shape.dimension}; use a finer spacing, or 'conforming-lattice'",
+            f"{volumes.min():.3g} m^{shape.dimension}; use a finer spacing, or another "
+            "discretisation, such as 'conforming-lattice'",
         )
     faces = given.faces
     owners = np.unique(np.concatenate([face.particles for face in faces.values()]))
@@ -107,7 +108,8 @@ def fitted_volumes(
     depth = disturbed + 2.0 * reach
     near = shape.signed_distance(positions) > -depth
     points, weights = _quadrature(discretisation, shape, spacing, depth + reach)
-    integrated = Fit(positions, spacing, _lattice_of(discretisation, shape, spacing, positions)).positive_integrals(points, weights)
+    grid = _lattice_of(discretisation, shape, spacing, positions)
+    integrated = Fit(positions, spacing, grid).positive_integrals(points, weights)
     return with_moments(positions, np.where(near, integrated, volumes), near, shape, spacing)
 
 
@@ -160,7 +162,8 @@ def fitted_faces(
     surface = sampled(discretisation, shape, spacing / _FINER[d])
     names = np.array(surface.faces)
     outer = np.unique(np.concatenate([face.particles for face in given.values()]))
-    X, fit = positions[outer], Fit(positions[outer], spacing, _lattice_of(discretisation, shape, spacing, positions))
+    X = positions[outer]
+    fit = Fit(X, spacing, _lattice_of(discretisation, shape, spacing, positions))
     faces = {}
     for name in given:
         own = np.flatnonzero(names == name)

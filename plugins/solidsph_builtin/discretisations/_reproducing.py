@@ -18,9 +18,11 @@ from solidsph.maths.arrays import Array, Indices
 from solidsph_builtin.discretisations._grid import Grid
 from solidsph_builtin.discretisations._surroundings import Surroundings
 
-# Radius of the fit, in spacings. On a lattice its integrals are then those of Gregory's rule of the
-# second order, 5/12, 13/12, 1 from the surface inwards, which integrates cubics exactly. With 2.2 they
-# are 3/8, 7/6, 23/24, 1, but in the corner of a box 0.003 of a cell, here 0.059.
+# Radius of the fit, in spacings. On a lattice the integrals are then those of Gregory's rule with
+# first differences, 5/12, 13/12, 1 from the surface inwards: beside a surface the fit is linear,
+# since it has two rows of particles there. With 2 it is quadratic, and the rule 3/8, 7/6, 23/24, 1;
+# but then a corner of a box in space has 0.006 of a cell, in place of 0.058, and a stable step to
+# match, and the stress at a curved surface is no better.
 RADIUS = 1.8
 
 # Particles within the radius, at most: a lattice has 4, 14 and 33, scattered ones more.
@@ -107,7 +109,7 @@ class Fit:
         count = near.shape[1]
         places = lattice.places(self.particles[near.ravel()]).reshape(near.shape)
         steps = places - lattice.home(points[first])[:, None]
-        steps = np.where(values != 0.0, steps, np.take_along_axis(steps, np.zeros((len(first), 1), dtype=np.intp), 1))
+        steps = np.where(values != 0.0, steps, steps[:, :1])
         for start in range(0, len(points), _POINTS_AT_ONCE * count):
             some = slice(start, start + _POINTS_AT_ONCE * count)
             there = lattice.numbers[lattice.home(points[some])[:, None] + steps[kind[some]]]
@@ -125,7 +127,9 @@ class Fit:
         return _functions(self._tree, RADIUS * self.spacing, points, degree)
 
 
-def _functions(tree: cKDTree, radius: float, points: Array, degree: Indices) -> tuple[Array, Indices]:
+def _functions(
+    tree: cKDTree, radius: float, points: Array, degree: Indices
+) -> tuple[Array, Indices]:
     """N_p at `points` (m, d) by fits up to some `degree` (m,), both (m, k): the values and the
     particles p."""
     count = min(_MOST[tree.m], tree.n)
@@ -176,7 +180,9 @@ def _first_column(moments: Array) -> Array:
         pivot = M[j, j] - np.einsum("km,km->m", lower[j, :j] ** 2, pivots[:j])
         known[j] = pivot > _DETERMINED * M[j, j]
         pivots[j] = np.where(known[j], pivot, 1.0)
-        rest = M[j + 1 :, j] - np.einsum("ikm,km->im", lower[j + 1 :, :j], lower[j, :j] * pivots[:j])
+        rest = M[j + 1 :, j] - np.einsum(
+            "ikm,km->im", lower[j + 1 :, :j], lower[j, :j] * pivots[:j]
+        )
         lower[j + 1 :, j] = np.where(known[j], rest / pivots[j], 0.0)
     # Of the unit vector along the first axis: forwards, then backwards.
     x = np.zeros((size, m))

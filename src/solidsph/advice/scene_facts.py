@@ -28,6 +28,7 @@ from solidsph.registry.construct import construct
 from solidsph.run.built_scene import BuiltScene
 from solidsph.scene.default_cover import cover_of
 from solidsph.scene.scene import Scene
+from solidsph.scene.scheme import completed
 
 # Particles of a body that are checked to be in its shape.
 _SAMPLES = 400
@@ -171,7 +172,7 @@ class SceneFacts:
     @cached_property
     def fits_surface(self) -> bool:
         """True if the gradient is corrected for each body, so that sums are right at surfaces."""
-        formulation: Formulation = construct("formulations", self.scene.formulation)
+        formulation: Formulation = construct("formulations", completed(self.scene).formulation)
         return type(formulation.gradient).of_body is not Gradient.of_body
 
     @cached_property

@@ -35,7 +35,7 @@ from solidsph.registry import registry
 from solidsph.registry.construct import construct
 from solidsph.scene.default_cover import cover_of
 from solidsph.scene.scene import Scene
-from solidsph.scene.scene_data import DEFAULT_INTEGRATOR, BodyScene
+from solidsph.scene.scheme import completed, scheme_of
 from solidsph.simulation import Simulation
 from solidsph.statics import critical_step
 from solidsph.statics.freedoms import freedoms
@@ -210,11 +210,12 @@ def _too_large(scene: Scene, prediction: Prediction) -> Facts:
 
 
 def _named_parts(scene: Scene) -> tuple[registry.Entry, ...]:
-    """The parts that a scene names, without those inside them."""
+    """The parts that a scene and its scheme name, without those inside them."""
+    scene = completed(scene)
     named: list[tuple[str, Any]] = [
         ("kernels", scene.kernel),
         ("formulations", scene.formulation),
-        ("integrators", scene.integrator or DEFAULT_INTEGRATOR),
+        ("integrators", scene.integrator),
         *(("boundaries", boundary.part) for boundary in scene.boundaries),
         *(("effects", effect.part) for effect in scene.effects),
     ]
@@ -243,16 +244,19 @@ _SINGLE = {"kernels": "kernel", "formulations": "formulation", "integrators": "i
 
 
 def _why(scene: Scene, entry: registry.Entry) -> str:
-    default = False
+    """Why a part is used: what its scheme says of it, or that the scene names it."""
+    scheme = scheme_of(scene)
     if entry.kind in _SINGLE:
-        field = getattr(attrs.fields(Scene), _SINGLE[entry.kind])
-        default = getattr(scene, field.name) == field.default
+        chosen = getattr(scene, _SINGLE[entry.kind]) is None
     elif entry.kind == "discretisations":
-        usual = attrs.fields(BodyScene).discretisation.default
-        default = all(body.discretisation == usual for body in scene.bodies.values())
+        chosen = all(body.discretisation is None for body in scene.bodies.values())
     elif entry.kind in ("gradients", "divergences"):
-        return "part of the formulation"
-    return "the default: the scene names no other" if default else "named by the scene"
+        chosen = entry.name == scheme.formulation[registry.singular(entry.kind)]
+        if not chosen:
+            return "part of the formulation"
+    else:
+        chosen = False
+    return f"{scene.scheme} scheme: {scheme.why[entry.kind]}" if chosen else "named by the scene"
 
 
 def _numbers(simulation: Simulation) -> list[Row]:

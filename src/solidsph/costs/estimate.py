@@ -28,7 +28,8 @@ from solidsph.interfaces.smoothing_kernel import UNIT_SPHERE
 from solidsph.registry.construct import construct
 from solidsph.scene.default_cover import cover_of
 from solidsph.scene.scene import Scene
-from solidsph.scene.scene_data import DEFAULT_INTEGRATOR, BodyScene
+from solidsph.scene.scene_data import BodyScene, PartLike
+from solidsph.scene.scheme import SCHEMES, completed
 
 # Random points to estimate the volume of a shape that has no formula for it.
 _POINTS = 1 << 15
@@ -54,11 +55,12 @@ def estimate_work(scene: Scene) -> Work:
     Raises:
         SceneError: a part is unknown, or its parameters are wrong.
     """
+    scene = completed(scene)
     cover = cover_of(scene)
     bodies = [_body(scene, body, cover) for body in scene.bodies.values()]
     d = len(bodies[0].cells)
     formulation: Formulation = construct("formulations", scene.formulation)
-    integrator: Integrator = construct("integrators", scene.integrator or DEFAULT_INTEGRATOR)
+    integrator: Integrator = construct("integrators", scene.integrator)
     effects: list[Effect] = [construct("effects", entry.part) for entry in scene.effects]
     n = round(sum(body.particles for body in bodies))
     pairs = round(sum(body.pairs for body in bodies))
@@ -121,10 +123,13 @@ def _body(scene: Scene, body: BodyScene, cover: float) -> BodyEstimate:
 
 
 def _on_a_lattice(body: BodyScene) -> bool:
-    """Whether the body has the default discretisation, with whatever parameters."""
-    wanted = body.discretisation
-    name = wanted.get("type") if isinstance(wanted, Mapping) else wanted
-    return bool(name == attrs.fields(BodyScene).discretisation.default)
+    """Whether the body has the discretisation of a scheme, with whatever parameters."""
+    names = [_name(scheme.discretisation) for scheme in SCHEMES.values()]
+    return _name(body.discretisation) in names
+
+
+def _name(part: PartLike | None) -> object:
+    return part.get("type") if isinstance(part, Mapping) else part
 
 
 def ball(cover: float, dimension: int) -> float:

@@ -17,6 +17,7 @@ from solidsph.interfaces.smoothing_kernel import check_profile, profile_slope
 from solidsph.maths.arrays import Array
 from solidsph.registry.construct import construct
 from solidsph.scene.scene_data import SceneData
+from solidsph.scene.scheme import completed
 
 # Least wave number ratio at the default cover. This is the ratio of the paper's kernel at 3.5
 # spacings, rounded down; it gives 2.6 for the cubic spline.
@@ -40,6 +41,7 @@ def cover_of(scene: SceneData) -> float:
     Raises:
         SceneError, PluginError: the kernel cannot be made, or its profile is not a weight.
     """
+    scene = completed(scene)
     if scene.cover is not None:
         return scene.cover
     return kernel_cover(construct("kernels", scene.kernel))

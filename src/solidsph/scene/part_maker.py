@@ -27,12 +27,13 @@ from solidsph.scene.checks.returned import check_particles
 from solidsph.scene.checks.terms import check_effects
 from solidsph.scene.default_cover import cover_of
 from solidsph.scene.scene_data import (
-    DEFAULT_INTEGRATOR,
+    RECOMMENDED,
     BodyScene,
     ImposedScene,
     PartLike,
     SceneData,
 )
+from solidsph.scene.scheme import completed
 
 # Up to this number, particles of a scene with mistakes are made to check its places too.
 _FEW = 1e6
@@ -71,7 +72,11 @@ class PartMaker:
 
     def parts(self) -> Parts:
         """All parts of the scene."""
-        scene, problems = self._scene, self.problems
+        problems = self.problems
+        scene = problems.attempt(completed, self._scene)
+        if scene is None:  # with any scheme its own parts are checked
+            scene = completed(attrs.evolve(self._scene, scheme=RECOMMENDED))
+        self._scene = scene
         problems.add(check_numbers(scene))
         kernel = self._make("kernels", scene.kernel)
         cover = None if kernel is None else problems.attempt(cover_of, scene)
@@ -95,8 +100,8 @@ class PartMaker:
     def _integrator(self) -> Any:
         """The integrator, or the default, which does not count as used in statics."""
         if self._scene.statics is None:
-            return self._make("integrators", self._scene.integrator or DEFAULT_INTEGRATOR)
-        return self.problems.attempt(construct, "integrators", DEFAULT_INTEGRATOR)
+            return self._make("integrators", self._scene.integrator)
+        return self.problems.attempt(construct, "integrators", self._scene.integrator)
 
     def _engine(self) -> Any:
         """The engine. Built-in ones do not count as used, since they change no result."""

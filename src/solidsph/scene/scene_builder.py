@@ -45,7 +45,7 @@ class SceneBuilder(ABC):
         *,
         shape: PartLike,
         spacing: float,
-        discretisation: PartLike = "lattice",
+        discretisation: PartLike | None = None,
         material: PartLike | None = None,
         tags: Mapping[str, Where] | None = None,
     ) -> Self:
@@ -55,6 +55,10 @@ class SceneBuilder(ABC):
             raise SceneError(f"two bodies are called {name!r}; give each its own name")
         body = BodyScene(shape, spacing, discretisation, material, dict(tags or {}))
         return self._set(bodies={**bodies, name: body})
+
+    def scheme(self, scheme: str) -> Self:
+        """Choose the scheme, which names the parts that the scene does not."""
+        return self._set(scheme=scheme)
 
     def kernel(self, kernel: PartLike, *, cover: float | None = None, **parameters: Any) -> Self:
         """Choose the kernel and its cover, the support radius in particle spacings."""

@@ -23,7 +23,7 @@ class BodyScene:
 
     shape: PartLike
     spacing: float  # [m]
-    discretisation: PartLike = "lattice"
+    discretisation: PartLike | None = None  # that of the scheme if None
     material: PartLike | None = None  # that of the scene if None
     tags: Mapping[str, Where] = attrs.field(factory=dict)  # named sets of its particles
 
@@ -88,7 +88,8 @@ class SleepScene:
     slabs: int = 160  # regions across the longest side of the body
 
 
-DEFAULT_INTEGRATOR = "velocity-verlet"
+RECOMMENDED = "recommended"
+"""The scheme of a scene that names none; see `solidsph.scene.scheme`."""
 
 # No run of more steps ends; a scene that asks for them has wrong units.
 MOST_STEPS = 1e10
@@ -104,15 +105,16 @@ class SceneData:
     bodies: Mapping[str, BodyScene]
     duration: float  # [s]
     title: str = ""
-    kernel: PartLike = "modified-mollifier"
-    cover: float | None = None  # support radius [spacings]; derived from the kernel if None
+    scheme: str = RECOMMENDED  # what chooses the parts that are None
+    kernel: PartLike | None = None
+    cover: float | None = None  # support radius [spacings]
     material: PartLike | None = None
-    formulation: PartLike = "total-lagrangian"
+    formulation: PartLike | None = None
     boundaries: Sequence[ImposedScene] = ()
     effects: Sequence[ImposedScene] = ()
     initial: Sequence[InitialScene] = ()
     probes: Sequence[ProbeScene] = ()
-    integrator: PartLike | None = None  # DEFAULT_INTEGRATOR if None
+    integrator: PartLike | None = None
     sleep: SleepScene | None = None  # None: no region sleeps
     statics: StaticsScene | None = None  # None: a motion, no equilibrium
     time_step_factor: float = 0.5  # of the CFL step

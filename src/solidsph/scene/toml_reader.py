@@ -47,7 +47,7 @@ _SECTIONS = {
     "sleep": "[sleep]",
     "statics": "[statics]",
 }
-_SCALARS = ("title", "duration", "outputs", "engine", "energy_tolerance", "silence")
+_SCALARS = ("title", "scheme", "duration", "outputs", "engine", "energy_tolerance", "silence")
 _KEYS = (*_SCALARS, *_SECTIONS)
 
 # Fields of a scene that stand in the table of a part.

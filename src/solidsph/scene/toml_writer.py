@@ -11,7 +11,7 @@ import tomli_w
 from solidsph.errors import SceneError
 from solidsph.registry.construct import describe
 from solidsph.scene.scene_data import (
-    DEFAULT_INTEGRATOR,
+    RECOMMENDED,
     BodyScene,
     ImposedScene,
     PartLike,
@@ -29,15 +29,16 @@ def toml_of(scene: SceneData) -> str:
     usual = attrs.fields(SceneData).energy_tolerance.default
     table = {
         "title": scene.title or None,
+        "scheme": scene.scheme if scene.scheme != RECOMMENDED else None,
         "duration": scene.duration,
         "outputs": scene.outputs,
         "engine": engine if isinstance(engine, str) else _part("engines", engine),
         "energy_tolerance": None if tolerance == usual else tolerance,
         "silence": scene.silence or None,
         "body": {name: _body(body) for name, body in scene.bodies.items()},
-        "kernel": {**_part("kernels", scene.kernel), "cover": scene.cover},
+        "kernel": _kernel(scene),
         "material": _optional("materials", scene.material),
-        "formulation": _part("formulations", scene.formulation),
+        "formulation": _optional("formulations", scene.formulation),
         "integrator": _integrator(scene) if scene.statics is None else None,
         "statics": scene.statics and attrs.asdict(scene.statics),
         "sleep": scene.sleep and attrs.asdict(scene.sleep),
@@ -53,15 +54,20 @@ def _body(body: BodyScene) -> dict[str, Any]:
     return {
         "shape": _part("shapes", body.shape),
         "spacing": body.spacing,
-        "discretisation": _part("discretisations", body.discretisation),
+        "discretisation": _optional("discretisations", body.discretisation),
         "material": _optional("materials", body.material),
         "tags": body.tags or None,
     }
 
 
+def _kernel(scene: SceneData) -> Mapping[str, Any] | None:
+    kernel = _optional("kernels", scene.kernel) or {}
+    return {**kernel, "cover": scene.cover} if kernel or scene.cover is not None else None
+
+
 def _integrator(scene: SceneData) -> dict[str, Any]:
     name = "time_step_factor" if scene.time_step is None else "time_step"
-    integrator = _part("integrators", scene.integrator or DEFAULT_INTEGRATOR)
+    integrator = _optional("integrators", scene.integrator) or {}
     return {**integrator, name: getattr(scene, name)}
 
 

@@ -19,21 +19,24 @@ from solidsph.model.particles import State
 from solidsph.registry.construct import construct
 from solidsph.scene.default_cover import cover_of, kernel_cover
 from solidsph.scene.scene import Scene
-from solidsph.scene.scene_data import DEFAULT_INTEGRATOR, PartLike
+from solidsph.scene.scene_data import PartLike
+from solidsph.scene.scheme import SCHEMES, completed
 from solidsph.simulation import Simulation
+
+_USUAL = SCHEMES["corrected"]
 
 # Defaults by kind of part. The material is a soft solid; in units of its wave speed only Poisson's
 # ratio matters.
 _DEFAULTS: Mapping[str, Any] = {
-    "kernels": "modified-mollifier",
-    "formulations": "total-lagrangian",
+    "kernels": _USUAL.kernel,
+    "formulations": _USUAL.formulation,
     "materials": {
         "type": "neo-hookean",
         "youngs_modulus": 1e6,
         "poissons_ratio": 0.3,
         "density": 1000.0,
     },
-    "integrators": DEFAULT_INTEGRATOR,
+    "integrators": _USUAL.integrator,
 }
 
 # Duration in transits of a spacing; rounding so many steps to a whole number has no influence.
@@ -91,6 +94,7 @@ class Scheme:
         Raises:
             SceneError: the scene names no material.
         """
+        scene = completed(scene)
         body = next(iter(scene.bodies.values()))
         material = scene.material if body.material is None else body.material
         if material is None:
@@ -101,7 +105,7 @@ class Scheme:
             formulation=scene.formulation,
             material=material,
             effects=tuple(effect.part for effect in scene.effects),
-            integrator=scene.integrator or DEFAULT_INTEGRATOR,
+            integrator=scene.integrator,
             spacing=body.spacing,
             time_step_factor=scene.time_step_factor,
         )

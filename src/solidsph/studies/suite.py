@@ -19,6 +19,7 @@ from solidsph.registry.construct import construct
 from solidsph.results.record import Record
 from solidsph.run.outcome import FINISHED
 from solidsph.scene.scene import Scene
+from solidsph.scene.scheme import completed
 from solidsph.studies.case import Case, Measurement, Trial
 from solidsph.studies.case_run import SceneRun, open_records, run_scenes
 from solidsph.studies.variant import with_settings
@@ -144,7 +145,7 @@ def _graded(
 
 def _has_energy(scene: Scene) -> bool:
     """Whether its forces conserve energy, as those of an adjoint divergence do."""
-    adjoint: bool = construct("formulations", scene.formulation).divergence.adjoint
+    adjoint: bool = construct("formulations", completed(scene).formulation).divergence.adjoint
     return adjoint
 
 

@@ -15,6 +15,7 @@ from solidsph.registry.construct import describe
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import ImposedScene, PartLike
+from solidsph.scene.scheme import completed
 from solidsph.studies.case import Case, Measurement
 
 
@@ -85,7 +86,7 @@ class Variant(Case):
 
 
 def _with_formulation(scene: Scene, value: Any, key: str) -> Scene:
-    table = _table("formulations", scene.formulation)
+    table = _table("formulations", completed(scene).formulation)
     return attrs.evolve(scene, formulation={**table, key: value})
 
 
