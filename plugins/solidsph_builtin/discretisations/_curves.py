@@ -10,6 +10,7 @@ from solidsph.maths.arrays import Array, Indices
 from solidsph_builtin.discretisations._features import meetings, smooth
 from solidsph_builtin.discretisations._feet import on_boundary
 from solidsph_builtin.discretisations._nearest import thinned
+from solidsph_builtin.shapes._sampling import cells_along
 
 # Spacing over the size of the pieces into which the boundary is divided to find it.
 _FINER = 4.0
@@ -79,6 +80,6 @@ def _is_closed(line: Array, lengths: Array) -> bool:
 def _evenly(line: Array, spacing: float, *, closed: bool) -> Array:
     """Points in equal steps along a polygonal `line` (m, 2), its ends included, (k, 2) [m]."""
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    steps = max(1, round(way[-1] / spacing))
+    steps = cells_along(float(way[-1]), spacing)
     places = np.linspace(0.0, way[-1], steps + 1)[: steps + (not closed)]
     return np.stack([np.interp(places, way, line[:, axis]) for axis in range(2)], axis=1)

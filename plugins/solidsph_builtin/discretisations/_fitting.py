@@ -22,7 +22,7 @@ from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._pieces import finest_pieces
 from solidsph_builtin.discretisations._reproducing import RADIUS, Fit
-from solidsph_builtin.discretisations._surface import area_vectors, closed, sampled
+from solidsph_builtin.discretisations._surface import area_vectors, sampled
 
 # Samples of the surface along a spacing, over those that an assignment to particles needs.
 _FINER = {1: 1.0, 2: 4.0, 3: 1.0}
@@ -78,6 +78,7 @@ def fitted(
     # Areas of particles inside are those of whom the surface is nearest to.
     if np.abs(shape.signed_distance(X[owners])).max(initial=0.0) <= _ON_BOUNDARY * spacing:
         faces = fitted_faces(discretisation, shape, spacing, X, faces)
+        faces = agreeing(faces, X[real], volumes[real])
     areas = area_vectors(faces, given.count, shape.dimension)
     return attrs.evolve(given, volumes=volumes, faces=faces, area_vectors=areas)
 
@@ -178,7 +179,47 @@ def fitted_faces(
         vectors, about_middle = found[some, :d], found[some, d:-1].reshape(-1, d, d)
         moments = about_middle - vectors[:, :, None] * (X[some] - middle)[:, None, :]
         faces[name] = Face(outer[some], vectors, found[some, -1], moments)
-    return closed(faces)
+    return faces
+
+
+def agreeing(faces: Mapping[str, Face], positions: Array, volumes: Array) -> dict[str, Face]:
+    """Faces with areas scaled so that the divergence theorem holds for polynomials.
+
+    The sum of f(X) A over the surface is that of V grad f over the body, for all f of the second
+    degree. So a uniform stress is in balance with its loads, to the last digit. Areas change by the
+    least relative amounts, and keep their direction.
+    """
+    owners = np.concatenate([face.particles for face in faces.values()])
+    vectors = np.concatenate([face.area_vectors for face in faces.values()])
+    sizes = np.concatenate([np.abs(face.areas) for face in faces.values()])
+    d = positions.shape[1]
+    middle = volumes @ positions / volumes.sum()
+    scale = float(np.abs(positions - middle).max()) or 1.0
+    X = (positions - middle) / scale
+    upper = np.triu_indices(d)
+    f = np.hstack([np.ones((len(X), 1)), X, X[:, upper[0]] * X[:, upper[1]]])
+    slopes = np.zeros((f.shape[1], d))
+    slopes[1 : 1 + d] = np.eye(d) * volumes.sum()
+    for row, (i, j) in enumerate(zip(*upper, strict=True), start=1 + d):
+        slopes[row, i] += volumes @ X[:, j]
+        slopes[row, j] += volumes @ X[:, i]
+    sums = (f[owners, :, None] * vectors[:, None, :]).reshape(len(owners), -1)
+    missing = (slopes / scale).ravel() - sums.sum(axis=0)
+    if np.abs(missing).max() <= _ROUNDING * sizes.sum():
+        return dict(faces)
+    # By a change c of each area, with the least sum of |A| c^2.
+    scaled = sums / np.sqrt(sizes)[:, None]
+    change = np.linalg.lstsq(scaled.T, missing, rcond=1e-8)[0] / np.sqrt(sizes)
+    parts = np.split(1.0 + change, np.cumsum([face.particles.size for face in faces.values()])[:-1])
+    return {
+        name: Face(
+            face.particles,
+            face.area_vectors * part[:, None],
+            face.areas * part,
+            face.moments * part[:, None, None],
+        )
+        for (name, face), part in zip(faces.items(), parts, strict=True)
+    }
 
 
 def with_moments(

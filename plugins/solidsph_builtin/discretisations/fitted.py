@@ -58,7 +58,7 @@ class Fitted(Discretisation):
         grid = grid_over(self, shape, spacing, on_boundary=True)
         surface = sampled(self, shape, spacing)
         size = mean_spacing(grid, spacing)
-        X, onto, irregular = self._arranged(shape, grid, size)
+        X, onto, irregular = self._arranged(shape, grid, spacing, size)
         outer = np.flatnonzero(onto)
         owners = nearest(cKDTree(X[outer]), surface.points)
         owners = attrs.evolve(owners, particles=outer[owners.particles])
@@ -67,10 +67,14 @@ class Fitted(Discretisation):
         given = without_ghosts(X, whole, size, owned)
         return fitted(self, shape, spacing, given, _MOVES * size if irregular else 0.0)
 
-    def _arranged(self, shape: Shape, grid: Grid, size: float) -> tuple[Array, Mask, bool]:
+    def _arranged(
+        self, shape: Shape, grid: Grid, spacing: float, size: float
+    ) -> tuple[Array, Mask, bool]:
         """Positions (n, d) [m], whether they are on the boundary (n,), and whether any particle is
         off the lattice."""
-        outer = even_points(shape, size) if shape.dimension == 2 else outermost(shape, grid, size)
+        outer = (
+            even_points(shape, spacing) if shape.dimension == 2 else outermost(shape, grid, size)
+        )
         outer, at_lattice = _snapped(outer, grid)
         distance = in_chunks(grid.size, lambda n: shape.signed_distance(grid.positions(n)))
         inside = np.flatnonzero(distance < -_CLEAR * size)

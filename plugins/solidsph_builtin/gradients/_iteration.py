@@ -22,11 +22,13 @@ from solidsph_builtin.gradients.quadratic import closeness
 _DEPENDENT = 1e-10
 _SMALLEST = 1e-300
 
-# The largest sum that may be left, as a part of the largest that was missing, and the most steps,
-# by dimension. In space a hundred leave a few hundredths, and the torque of a bar is as exact as
-# with none left, to a thousandth.
+# The largest sum that may be left, as a part of the largest that was missing.
 _LEFT = 1e-2
-_MOST_STEPS = {1: 1000, 2: 1000, 3: 100}
+
+# Steps, at least and at most, and pairs times steps: half a minute in space. There sixty steps
+# leave some hundredths, and the torque of a bar is as exact as with none left, to a thousandth.
+_FEWEST, _MOST = 60, 2000
+_PAIR_STEPS = 2e8
 
 
 def solved(
@@ -78,7 +80,7 @@ def solved(
         lambda x: product(*sums, tests, x) + all_soft[:, :, None] * x,
         np.linalg.inv(blocks),
         wanted,
-        _MOST_STEPS[d],
+        int(np.clip(_PAIR_STEPS / np.count_nonzero(kept), _FEWEST, _MOST)),
     )
 
 
@@ -96,21 +98,26 @@ def _conjugate_gradients(
 ) -> Array:
     """The x (n, k, d) for which `product` of x is about `wanted`, each of the d by itself.
 
-    `inverse` (n, k, k) is that of the diagonal blocks.
+    `inverse` (n, k, k) is that of the diagonal blocks. On the way to the solution what is left may
+    grow; the x with the least is returned.
     """
-    largest = float(np.abs(wanted).max())
+    largest = least = float(np.abs(wanted).max())
     x, r = np.zeros_like(wanted), wanted.copy()
+    best = x.copy()
     z = inverse @ r
     p, along = z.copy(), np.sum(r * z, axis=(0, 1))
     for _ in range(steps):
-        if np.abs(r).max() <= _LEFT * largest:
+        if least <= _LEFT * largest:
             break
         gained = product(p)
         step = along / np.maximum(np.sum(p * gained, axis=(0, 1)), _SMALLEST)
         x += step * p
         r -= step * gained
+        left = float(np.abs(r).max())
+        if left < least:
+            least, best[:] = left, x
         z = inverse @ r
         now = np.sum(r * z, axis=(0, 1))
         p = z + now / np.maximum(along, _SMALLEST) * p
         along = now
-    return x
+    return best

@@ -71,8 +71,8 @@ class Consistent(Gradient):
     and up to two supports from there: deep inside a lattice they stay as they were.
 
     The system is solved once, when the body is built: by a factorisation if it is small, else by
-    conjugate gradients over the fixed pairs, which leave a hundredth of what was missing in the
-    plane, and in space what a hundred steps leave, some hundredths.
+    conjugate gradients over the fixed pairs, to a hundredth of what was missing or for half a
+    minute.
     """
 
     of: Gradient = attrs.field(factory=Quadratic, metadata={"part": "gradients"})

@@ -73,11 +73,11 @@ class PartMaker:
     def parts(self) -> Parts:
         """All parts of the scene."""
         problems = self.problems
+        problems.add(check_numbers(self._scene))
         scene = problems.attempt(completed, self._scene)
         if scene is None:  # with any scheme its own parts are checked
             scene = completed(attrs.evolve(self._scene, scheme=RECOMMENDED))
         self._scene = scene
-        problems.add(check_numbers(scene))
         kernel = self._make("kernels", scene.kernel)
         cover = None if kernel is None else problems.attempt(cover_of, scene)
         formulation = self._make("formulations", scene.formulation)

@@ -1,0 +1,128 @@
+"""Particles that follow the surface of any shape."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+from solidsph.interfaces.shape import Shape
+from solidsph.maths.arrays import Array
+from solidsph.model.particles import Particles
+from solidsph_builtin.discretisations.fitted import Fitted
+from solidsph_builtin.discretisations.lattice import Lattice
+from solidsph_builtin.shapes.annulus import Annulus
+from solidsph_builtin.shapes.ball import Ball
+from solidsph_builtin.shapes.box import Box
+from solidsph_builtin.shapes.difference import Difference
+from solidsph_builtin.shapes.disc import Disc
+from solidsph_builtin.shapes.polygon import Polygon
+
+TAPERED = Polygon(vertices=((0.0, 0.0), (4.8, 4.4), (4.8, 6.0), (0.0, 4.4)))
+QUARTER = Difference(Box(lengths=(1.0, 1.0)), [Disc(radius=0.31)])
+
+
+@given(
+    sides=st.lists(st.floats(0.5, 2.0), min_size=1, max_size=3),
+    origin=st.floats(-3.0, 3.0),
+)
+def test_a_box_has_the_particles_of_a_lattice_to_the_last_bit(
+    sides: list[float], origin: float
+) -> None:
+    box = Box(lengths=sides, origin=[origin] * len(sides))
+    found = Fitted().particles(box, 0.2)
+    lattice = Lattice(on_boundary=True).particles(box, 0.2)
+    assert np.array_equal(found.positions, lattice.positions)
+    assert found.tags.keys() == lattice.tags.keys()
+    for tag in found.tags:
+        assert np.array_equal(found.tags[tag], lattice.tags[tag])
+
+
+@pytest.mark.parametrize(
+    ("shape", "spacing"),
+    [
+        (Annulus(inner_radius=0.5, outer_radius=1.0), 0.07),
+        (QUARTER, 0.05),
+        (QUARTER, 0.0333),
+        (TAPERED, 0.2),
+        (Difference(Box(lengths=(1.0, 1.0)), [Disc(radius=0.2, centre=(0.5, 0.5))]), 0.05),
+    ],
+)
+def test_in_the_plane_distances_are_even(shape: Shape, spacing: float) -> None:
+    particles = Fitted().particles(shape, spacing)
+    gaps = nearest(particles.positions) / spacing
+    # Where two edges meet at an acute angle, particles on them are closer.
+    assert gaps.min() > 0.8
+    assert gaps.max() < 1.25
+    on_surface = particles.tags["surface"]
+    depth = -shape.signed_distance(particles.positions)
+    assert np.abs(depth[on_surface]).max() < 1e-9 * spacing
+    assert depth[~on_surface].min() > 0.4 * spacing
+    assert particles.volumes.min() > 0.0
+
+
+def test_along_a_circle_steps_are_equal() -> None:
+    particles = Fitted().particles(Annulus(inner_radius=0.5, outer_radius=1.0), 0.07)
+    for face, radius in (("inner", 0.5), ("outer", 1.0)):
+        x, y = particles.positions[particles.tags[face]].T
+        assert np.hypot(x, y) == pytest.approx(radius)
+        steps = np.diff(np.sort(np.arctan2(y, x))) * radius
+        assert len(steps) + 1 == round(2.0 * np.pi * radius / 0.07)
+        # The circle is sampled by chords, of which an arc is longer by 1e-5.
+        assert steps.max() < steps.min() * (1.0 + 1e-4)
+
+
+def test_corners_have_particles() -> None:
+    particles = Fitted().particles(TAPERED, 0.2)
+    gaps = cKDTree(particles.positions).query(np.array(TAPERED.vertices))[0]
+    assert gaps.max() < 1e-9
+    quarter = Fitted().particles(QUARTER, 0.05)
+    # Where an arc meets a straight side, as well as planes through samples of the arc meet it.
+    assert cKDTree(quarter.positions).query([[0.31, 0.0], [0.0, 0.31]])[0].max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("shape", "spacing", "volume"),
+    [
+        (Annulus(inner_radius=0.5, outer_radius=1.0), 0.07, np.pi * 0.75),
+        (QUARTER, 0.05, 1.0 - np.pi * 0.31**2 / 4.0),
+        (TAPERED, 0.2, 14.4),
+        (Ball(radius=1.0), 0.25, 4.0 * np.pi / 3.0),
+    ],
+)
+def test_the_divergence_theorem_holds_for_quadratic_functions(
+    shape: Shape, spacing: float, volume: float
+) -> None:
+    """The sum of f A is that of V grad f: a uniform stress is in balance with its loads."""
+    particles = Fitted().particles(shape, spacing)
+    X, V, A = particles.positions, particles.volumes, particles.area_vectors
+    assert V.sum() == pytest.approx(volume, rel=2e-3)  # the surface is sampled by flat pieces
+    size = np.abs(A).sum()
+    assert np.abs(A.sum(axis=0)).max() < 1e-12 * size
+    d = shape.dimension
+    assert np.abs(X.T @ A - V.sum() * np.eye(d)).max() < 1e-11 * size
+    f = X[:, 0] * X[:, 1]
+    slope = np.zeros(d)
+    slope[:2] = V @ X[:, 1], V @ X[:, 0]
+    assert np.abs(f @ A - slope).max() < 1e-11 * size
+
+
+def test_a_ball_is_covered() -> None:
+    """In space particles on the surface do not move along it: their distances vary more."""
+    ball = Ball(radius=1.0)
+    particles = Fitted().particles(ball, 0.2)
+    gaps = nearest(particles.positions) / 0.2
+    assert gaps.min() > 0.5
+    assert gaps.max() < 1.25
+    assert particles.volumes.min() > 0.0
+    assert np.abs(second_moment(particles) - 4.0 * np.pi / 15.0).max() < 4e-3
+
+
+def second_moment(particles: Particles) -> Array:
+    return np.asarray(particles.volumes @ particles.positions**2)
+
+
+def nearest(X: Array) -> Array:
+    return np.asarray(cKDTree(X).query(X, k=[2])[0][:, 0])
