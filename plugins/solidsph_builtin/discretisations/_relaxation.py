@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -22,10 +24,17 @@ _SEARCH = 5
 _SOFT = 1e-3
 
 
-def relaxed(positions: Array, free: Mask, spacing: float) -> Array:
+def relaxed(
+    positions: Array,
+    free: Mask,
+    spacing: float,
+    steps: int = _STEPS,
+    onto: Callable[[Array], Array] = lambda moved: moved,
+) -> Array:
     """`positions` (n, d) after repulsion has moved those that are `free` (n,), (n, d) [m].
 
-    The force of a neighbour at q reaches is (1 - q)^2 / q. In a lattice the forces cancel.
+    The force of a neighbour at q reaches is (1 - q)^2 / q. In a lattice the forces cancel. After
+    each step the free ones are put `onto` a surface that they must not leave.
     """
     X = positions.copy()
     if not free.any():
@@ -34,8 +43,8 @@ def relaxed(positions: Array, free: Mask, spacing: float) -> Array:
     # Others only hold the free ones in place.
     near = cKDTree(X[free]).query(X)[0] < reach + 2.0 * _SEARCH * _STEP * spacing
     some = np.flatnonzero(near)
-    x, moves = X[some], free[some]
-    for step in range(_STEPS):
+    x, moves = X[some].copy(), free[some]
+    for step in range(steps):
         if step % _SEARCH == 0:
             pairs = cKDTree(x).query_pairs(
                 reach + 2.0 * _SEARCH * _STEP * spacing, output_type="ndarray"
@@ -54,6 +63,6 @@ def relaxed(positions: Array, free: Mask, spacing: float) -> Array:
         )
         length = np.linalg.norm(way, axis=1, keepdims=True)
         way *= _STEP * spacing / np.maximum(length, 1.0)
-        x = np.where(moves[:, None], x + way, x)
+        x[moves] = onto(x[moves] + way[moves])
     X[some] = x
     return X

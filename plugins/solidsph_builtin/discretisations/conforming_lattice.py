@@ -58,7 +58,8 @@ class ConformingLattice(Discretisation):
         grid = grid_over(self, shape, spacing, on_boundary=True)
         distance = in_chunks(grid.size, lambda n: shape.signed_distance(grid.positions(n)))
         surface = sampled(self, shape, spacing)
-        numbers, onto, positions, changed = _arranged(shape, grid, distance, spacing)
+        found = _arranged(shape, grid, distance, spacing)
+        numbers, onto, positions = found.numbers, found.onto, found.positions
         if not numbers.size:
             raise refusal(
                 self,
@@ -66,7 +67,7 @@ class ConformingLattice(Discretisation):
                 f"a smaller spacing (its bounding box measures {grid.lengths.tolist()} m)",
             )
         volumes = fitted(
-            _volumes(shape, grid, distance, changed, numbers, positions),
+            _volumes(shape, grid, distance, found.changed, numbers, positions),
             grid.cell_volume,
             shape.volume(),
         )
@@ -80,18 +81,27 @@ class ConformingLattice(Discretisation):
         return without_ghosts(positions, volumes, mean_spacing(grid, spacing), owned)
 
 
-def outermost(shape: Shape, grid: Grid, spacing: float) -> Array:
-    """The particles on the boundary of `shape`, (m, d) [m], by a `grid` with points on it."""
+def outermost(shape: Shape, grid: Grid, spacing: float) -> tuple[Array, Mask]:
+    """The particles on the boundary of `shape`, (m, d) [m], by a `grid` with points on it, and
+    which of them are on no edge or corner, (m,)."""
     distance = in_chunks(grid.size, lambda n: shape.signed_distance(grid.positions(n)))
-    _, onto, positions, _ = _arranged(shape, grid, distance, spacing)
-    return positions[onto]
+    found = _arranged(shape, grid, distance, spacing)
+    return found.positions[found.onto], found.on_smooth[found.onto]
 
 
-def _arranged(
-    shape: Shape, grid: Grid, distance: Array, spacing: float
-) -> tuple[Indices, Mask, Array, Mask]:
-    """Numbers of the lattice points that are particles (n,), whether they are on the boundary (n,),
-    their positions (n, d) [m], and which points of the whole lattice have moved (size,)."""
+@attrs.frozen(eq=False)
+class _Arrangement:
+    """Lattice points that are particles."""
+
+    numbers: Indices  # (n,)
+    onto: Mask  # (n,) whether they are on the boundary
+    on_smooth: Mask  # (n,) and there on no edge or corner
+    positions: Array  # (n, d) [m]
+    changed: Mask  # (size,) points of the whole lattice that have moved, or are no particles
+
+
+def _arranged(shape: Shape, grid: Grid, distance: Array, spacing: float) -> _Arrangement:
+    """The particles of a lattice, given the distances (size,) [m] of its points."""
     d = shape.dimension
     surface = shape.surface(spacing / _FINER[d])
     reach = gap(surface)
@@ -123,12 +133,14 @@ def _arranged(
     positions[crossed] = moved
     onto = np.zeros(grid.size, dtype=np.bool_)
     onto[crossed[stays]] = True
+    on_smooth = np.zeros(grid.size, dtype=np.bool_)
+    on_smooth[crossed[stays & (rank == 1)]] = True
     is_particle = inside.copy()
     is_particle[crossed] = stays
     changed = np.zeros(grid.size, dtype=np.bool_)
     changed[crossed] = ~still | ~stays
     numbers = np.flatnonzero(is_particle)
-    return numbers, onto[numbers], positions[numbers], changed
+    return _Arrangement(numbers, onto[numbers], on_smooth[numbers], positions[numbers], changed)
 
 
 def _feet(

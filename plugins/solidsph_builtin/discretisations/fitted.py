@@ -15,6 +15,7 @@ from solidsph.model.particles import Particles
 from solidsph_builtin.discretisations._cells import mean_spacing
 from solidsph_builtin.discretisations._checks import check_spacing
 from solidsph_builtin.discretisations._curves import even_points
+from solidsph_builtin.discretisations._feet import on_boundary
 from solidsph_builtin.discretisations._fitting import fitted
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._nearest import nearest
@@ -27,6 +28,8 @@ from solidsph_builtin.discretisations.conforming_lattice import outermost
 _CLEAR = 0.5
 # Depth to which particles move, beside places where the boundary is off the lattice.
 _MOVES = 4.0
+# Steps of particles along a curved surface in space.
+_ALONG = 40
 # Particles this close to a point of the lattice are there.
 _AT = 1e-6
 # Particles that the others push closer to the boundary than this are left out.
@@ -72,10 +75,7 @@ class Fitted(Discretisation):
     ) -> tuple[Array, Mask, bool]:
         """Positions (n, d) [m], whether they are on the boundary (n,), and whether any particle is
         off the lattice."""
-        outer = (
-            even_points(shape, spacing) if shape.dimension == 2 else outermost(shape, grid, size)
-        )
-        outer, at_lattice = _snapped(outer, grid)
+        outer, at_lattice = _snapped(_outer(shape, grid, spacing, size), grid)
         distance = in_chunks(grid.size, lambda n: shape.signed_distance(grid.positions(n)))
         inside = np.flatnonzero(distance < -_CLEAR * size)
         inner = grid.positions(inside)
@@ -91,6 +91,22 @@ class Fitted(Discretisation):
             X, onto = X[onto_or_inside], onto[onto_or_inside]
         order = _order(X, grid)
         return X[order], onto[order], bool(len(off))
+
+
+def _outer(shape: Shape, grid: Grid, spacing: float, size: float) -> Array:
+    """Particles on the boundary, (m, d) [m]."""
+    if shape.dimension == 2:
+        return even_points(shape, spacing)
+    start, on_smooth = outermost(shape, grid, size)
+    outer, at_lattice = _snapped(start, grid)
+    surface = shape.surface(size)
+    return relaxed(
+        outer,
+        on_smooth & ~at_lattice,
+        size,
+        _ALONG,
+        lambda moved: on_boundary(shape, surface, moved, size),
+    )
 
 
 def _snapped(points: Array, grid: Grid) -> tuple[Array, Mask]:
