@@ -24,6 +24,7 @@ from solidsph.registry.registry import Entry
 from solidsph.run.dynamics import Dynamics
 from solidsph.run.outcome import Result
 from solidsph.run.restart_point import RestartPoint
+from solidsph.run.safe_step import SafeStep
 from solidsph.scene.scene import Scene
 
 
@@ -43,6 +44,7 @@ class BuiltScene(ABC):
     parts: tuple[Entry, ...]  # every plugin used
     manager: pluggy.PluginManager
     halvings: int = 0  # of the step of the scene
+    safe: SafeStep | None = None  # at the start; None if nothing vibrates, or nothing moves
 
     @abstractmethod
     def run(
