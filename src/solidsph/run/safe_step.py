@@ -18,9 +18,9 @@ from solidsph.run.linear_response import LinearResponse
 from solidsph.run.spectral_bound import spectral_bound
 
 # Vectors of the iteration, each an evaluation of the forces; and the share of the squared frequency
-# by which the bound may be too large. Of 108 blocks in 1, 2 and 3D, with every gradient, covers of 2
-# to 3.5, on lattices and jittered, with six starts each, it takes 15 on average. Where corners or
-# jitter make many nearly equal modes, the bound is up to 0.7 % too small, hence the margin.
+# by which the bound may be too large. Of 108 blocks in 1, 2 and 3D, with every gradient, covers of
+# 2 to 3.5, on lattices and jittered, with six starts each, it takes 15 on average. Where corners
+# or jitter make many nearly equal modes, the bound is up to 0.7 % too small, hence the margin.
 _LEAST, _MOST, _GAP = 8, 30, 0.002
 _MARGIN = 1.01
 
