@@ -39,7 +39,7 @@ class MovingScheme(Scheme, Protocol):
     @property
     def integrator(self) -> str: ...  # name
     @property
-    def time_step_factor(self) -> float: ...  # of the CFL step
+    def time_step_factor(self) -> float: ...  # of the largest step
 
 
 def with_scheme(builder: SceneBuilder, scheme: Scheme) -> SceneBuilder:

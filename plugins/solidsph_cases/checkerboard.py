@@ -57,7 +57,7 @@ class Checkerboard(Case):
     hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.05)  # of the CFL step
+    time_step_factor: float = number(default=0.05)  # of the largest step
     energy_tolerance: float = number(default=1e-3)  # largest change that passes [-]
 
     def __attrs_post_init__(self) -> None:

@@ -65,7 +65,7 @@ class CollidingBars(Case):
     gradient: str = "corrected"
     hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
-    time_step_factor: float = number(default=0.5)  # of the CFL step
+    time_step_factor: float = number(default=0.5)  # of the largest step
 
     def __attrs_post_init__(self) -> None:
         check_count("colliding-bars", "particles", self.particles, 10)

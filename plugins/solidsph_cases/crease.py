@@ -61,7 +61,7 @@ class Crease(Case):
     hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.2)  # of the CFL step
+    time_step_factor: float = number(default=0.2)  # of the largest step
 
     def __attrs_post_init__(self) -> None:
         check_count("crease", "across", self.across, 7)

@@ -65,7 +65,7 @@ class Csm3(Case):
     hourglass: float = number(default=0.0)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.6)  # of the CFL step
+    time_step_factor: float = number(default=0.6)  # of the largest step
     tolerance: float = number(default=0.01)  # largest error that passes [-]
 
     def __attrs_post_init__(self) -> None:

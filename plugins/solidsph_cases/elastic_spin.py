@@ -61,7 +61,7 @@ class ElasticSpin(Case):
     hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.4)  # of the CFL step
+    time_step_factor: float = number(default=0.4)  # of the largest step
     momentum_tolerance: float = number(default=1e-10)  # relative change that passes [-]
     energy_tolerance: float = number(default=1e-3)  # relative drift that passes [-]
 

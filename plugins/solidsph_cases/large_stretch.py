@@ -92,7 +92,7 @@ class LargeStretch(Case):
     gradient: str = "consistent"
     hourglass: float = number(default=0.0)  # strength [-]; 0 names none
     engine: str = "auto"
-    time_step_factor: float = number(default=0.5)  # of the CFL step
+    time_step_factor: float = number(default=0.5)  # of the largest step
     tolerance: float = number(default=0.02)  # largest error of the mean stress that passes [-]
 
     def __attrs_post_init__(self) -> None:

@@ -82,7 +82,7 @@ class NonlinearBar(Case):
     hourglass: float = number(default=0.0)  # strength [-]; 0 names none
     engine: str = "auto"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.5)  # of the CFL step
+    time_step_factor: float = number(default=0.5)  # of the largest step
     plateau_tolerance: float = number(default=0.02)  # largest error of a stress that passes [-]
     speed_tolerance: float = number(default=0.01)  # and of a speed
 

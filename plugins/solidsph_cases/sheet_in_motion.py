@@ -102,7 +102,7 @@ class SheetInMotion(Case):
     hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.3)  # of the CFL step; particles crowd as they move
+    time_step_factor: float = number(default=0.3)  # of the largest step; particles crowd
     tolerance: float = number(default=0.02)  # largest error that passes [-]
     peak_tolerance: float = number(default=0.1)  # of the stress at rest, as in `sheet-convergence`
 

@@ -59,7 +59,7 @@ class SlidingBlock(Case):
     gradient: str = "corrected"
     hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
-    time_step_factor: float = number(default=0.5)  # of the CFL step
+    time_step_factor: float = number(default=0.5)  # of the largest step
 
     def __attrs_post_init__(self) -> None:
         check_count("sliding-block", "along", self.along, 6)

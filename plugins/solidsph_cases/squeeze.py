@@ -63,7 +63,7 @@ class Squeeze(Case):
     hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
-    # Of the CFL step of the unloaded block: waves are faster in it the more it is squeezed.
+    # Of the largest step of the unloaded block: waves are faster in it the more it is squeezed.
     time_step_factor: float = number(default=0.05)
     tolerance: float = number(default=0.01)  # largest error of a stress that passes [-]
 

@@ -61,7 +61,7 @@ class StiffnessJump(Case):
     gradient: str = "corrected"
     hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
-    time_step_factor: float = number(default=0.5)  # of the CFL step
+    time_step_factor: float = number(default=0.5)  # of the largest step
     tolerance: float = number(default=0.03)  # largest error of the period that passes [-]
 
     def __attrs_post_init__(self) -> None:

@@ -67,7 +67,7 @@ class TaylorBar(Case):
     hourglass: float = number(default=0.05)  # strength [-]; 0 adds none
     engine: str = "compiled"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.12)  # of the CFL step at the start
+    time_step_factor: float = number(default=0.12)  # of the largest step at the start
     tolerance: float = number(default=0.005)  # how far off the published range passes [-]
     energy_tolerance: float = number(default=1e-3)  # of the energy at the start [-]
 

@@ -47,7 +47,7 @@ class ThinStrip(Case):
     hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.3)  # of the CFL step
+    time_step_factor: float = number(default=0.3)  # of the largest step
     energy_tolerance: float = number(default=5e-3)  # largest change that passes [-]
 
     def __attrs_post_init__(self) -> None:

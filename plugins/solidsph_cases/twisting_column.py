@@ -72,7 +72,7 @@ class TwistingColumn(Case):
     hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.3)  # of the CFL step
+    time_step_factor: float = number(default=0.3)  # of the largest step
     energy_tolerance: float = number(default=0.01)  # largest change that passes [-]
     axis_tolerance: float = number(default=0.01)  # sway of the axis over the side that passes [-]
 

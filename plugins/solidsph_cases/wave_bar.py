@@ -99,7 +99,7 @@ class WaveBar(Case):
     hourglass: float = number(default=0.0)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.5)  # of the CFL step
+    time_step_factor: float = number(default=0.5)  # of the largest step
 
     def __attrs_post_init__(self) -> None:
         for count in (self.particles, *self.convergence):
@@ -336,7 +336,7 @@ class SmoothPulse(Case):
     hourglass: float = number(default=0.0)  # strength [-]; 0 adds none
     engine: str = "auto"
     integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.5)  # of the CFL step
+    time_step_factor: float = number(default=0.5)  # of the largest step
 
     @property
     def _case(self) -> WaveBar:

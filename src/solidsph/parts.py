@@ -83,8 +83,8 @@ from solidsph.registry.construct import construct
 from solidsph.registry.parameters import check_positive, formula, number, optional_number
 from solidsph.results.record import Record
 from solidsph.run.built_scene import BuiltScene
+from solidsph.run.cfl_step import lattice_frequency
 from solidsph.run.hooks import implementation as hookimpl
-from solidsph.run.stable_step import lattice_frequency
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.studies.case import Case, Curves, Measurement, Trial

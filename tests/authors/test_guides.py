@@ -27,7 +27,7 @@ GUIDES = [page for page in PAGES if page != "first-kernel"]  # that one has a di
 
 # What a page leaves out of its scene.
 REST: Mapping[str, Any] = {
-    "duration": 2e-3,
+    "duration": 6e-3,
     "outputs": 2,
     "body": {"block": {"shape": {"type": "box", "lengths": [1.0, 1.0]}, "spacing": 0.125}},
     "material": {"type": "neo-hookean", **SOFT},

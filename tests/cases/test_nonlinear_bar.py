@@ -179,7 +179,7 @@ def test_shocks_need_viscosity_and_fans_hardly(coarse: CaseResult) -> None:
     }
     assert max(viscous.values()) < 0.01
     assert bare["push-0.3"].value > 0.4
-    assert bare["push-0.5"].verdict == "diverged"
+    assert bare["push-0.5"].value > 1.0
     # Pulled, the end particle alone rings, from the jump of its velocity at the start.
     for v in (0.1, 0.3, 0.5):
         assert bare[f"pull-{v}"].value < 0.7 * bare[f"push-{v}"].value

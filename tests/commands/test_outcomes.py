@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from solidsph import Record
+from solidsph.assembly import step_size
 from solidsph.cli import main
 from tests.helpers.scenes import SCENE_TOML
 from tests.watch.test_soundness import column, plain
@@ -104,7 +105,9 @@ def test_writing_a_scene_is_told(said: Any) -> None:
     assert (code, told["files"]) == (0, ["again.toml"])
 
 
-def test_the_column_by_the_command(said: Any) -> None:
-    code, told, _ = said("run", written(column().scene().to_toml()))
+def test_the_column_by_the_command(said: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(step_size, "safe_step", lambda *scene: None)  # the CFL step is too long
+    long_steps = column().integrator("velocity-verlet", time_step_factor=0.5)
+    code, told, _ = said("run", written(long_steps.scene().to_toml()))
     assert (code, told["outcome"]) == (1, "unsound")
     assert "critical step" in told["error"]

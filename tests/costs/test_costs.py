@@ -32,7 +32,7 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.plan import CompilationUnit, SumMethod
 from solidsph.interfaces.terms import Load
-from solidsph.run.stable_step import stable_step
+from solidsph.run.cfl_step import cfl_step
 from solidsph.system.cache import CACHE
 from tests.commands.test_cli import solidsph
 from tests.helpers.scenes import SCENE_TOML, SOFT
@@ -483,8 +483,8 @@ def test_shares_are_of_what_the_effects_add() -> None:
     # The stable step is 2 over the sum of frequency and rates, of which damping has 9 1/s.
     viscous = bar().effect("artificial-viscosity").build()
     assert found["mass-damping"].step == pytest.approx(
-        stable_step(simulation.integrator, simulation.dynamics.loads, simulation.model.bodies)
-        / stable_step(viscous.integrator, viscous.dynamics.loads, viscous.model.bodies)
+        cfl_step(simulation.integrator, simulation.dynamics.loads, simulation.model.bodies)
+        / cfl_step(viscous.integrator, viscous.dynamics.loads, viscous.model.bodies)
     )
     assert found["v"].step < 0.9 < found["mass-damping"].step < 1.0
     assert without(simulation, "v").step_size == simulation.step_size

@@ -354,7 +354,7 @@ def test_a_run_is_the_same_by_either_engine(d: int) -> None:
     ends = []
     for name in ("matrix", "compiled"):
         simulation = builder.engine(name).build()
-        assert simulation.steps > 80
+        assert simulation.steps > 60
         ends.append(simulation.run().state.positions)
     start = simulation.particles.positions
     # More than a list of neighbours allows, 0.05 of the support radius.

@@ -47,7 +47,7 @@ EMPTY = (
     ("[integrator]", '[[initial]]\nwhere = "X > 9"\n[integrator]'),
     "where = 'X > 9' matches no particle",
 )
-STEP = ('type = "central-difference"', "time_step = 1.0"), "exceeds the CFL step"
+STEP = ('type = "central-difference"', "time_step = -1.0"), "time_step must be positive"
 SPACING = ("spacing = 0.125", 'spacing = "fine"'), "body.block.spacing must be a number"
 SHAPE = ('type = "box"', 'type = "boxx"'), "unknown shape 'boxx'"
 NAME = ('title = "a block', 'engine = "steam"\ntitle = "a block'), "unknown engine 'steam'"

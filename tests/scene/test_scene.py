@@ -111,7 +111,7 @@ def test_a_scene_of_functions_runs_but_has_no_file_form() -> None:
         # parts that do not fit each other
         ("cover = 3.0", "cover = 1.4", "cover = 1.4 is too small in 2D"),
         ("cover = 3.0", "cover = 1e9", ""),
-        ('type = "central-difference"', 'time_step = 1.0', "exceeds the CFL step"),
+        ('type = "central-difference"', 'time_step = 1.0', "exceeds the critical step"),
         ('where = "left"', 'where = "X > 7"', "matches no particle"),
         ('where = "left"', 'where = "X + 1"', "is a number, not a condition"),
         ('where = "left"', 'where = "X < Q"', "unknown name 'Q'"),

@@ -167,9 +167,7 @@ def test_the_free_body_has_its_surface() -> None:
     expected = 2.0 / whole.highest_frequency / scheme.transit
     assert found.free.critical_step == pytest.approx(expected, rel=1e-12)
     assert found.free.rigid_modes == 3
-    assert found.largest_factor == min(found.critical_step, found.free.critical_step) / (
-        found.rule_step
-    )
+    assert found.of_cfl == min(found.critical_step, found.free.critical_step) / (found.rule_step)
 
 
 def test_a_sum_without_differences_resists_a_translation_and_lets_another_motion_go() -> None:

@@ -8,6 +8,7 @@ import attrs
 import pytest
 
 from solidsph import SceneError
+from solidsph.assembly import step_size
 from solidsph.costs.count import count_work
 from solidsph.registry import registry
 from solidsph.scene.scene import Scene
@@ -67,8 +68,11 @@ def test_a_point_counts_what_no_machine_changes() -> None:
     assert merge_repeats([one, two]).seconds == (*one.seconds, *two.seconds)
 
 
-def test_what_goes_wrong_is_a_point_too() -> None:
+def test_what_goes_wrong_is_a_point_too(monkeypatch: pytest.MonkeyPatch) -> None:
     case = Csm3(across=3, duration=0.05, engine="matrix")
+    too_long = run_point(case, {"time_step": 1.8e-4})
+    assert "exceeds the critical step" in too_long.outcome
+    monkeypatch.setattr(step_size, "safe_step", lambda *scene: None)  # the CFL step is longer
     diverged = run_point(case, {"time_step": 1.8e-4})
     assert not diverged.finished
     assert "diverged" in diverged.outcome

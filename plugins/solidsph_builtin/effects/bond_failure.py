@@ -19,7 +19,7 @@ from solidsph.interfaces.terms import FieldTerm, Load, Observation, StressTerm
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.regions import Where
 from solidsph.registry.parameters import check_positive, number
-from solidsph.run.stable_step import lattice_frequency
+from solidsph.run.cfl_step import lattice_frequency
 from solidsph_builtin.effects._breaking import Bonds, BreakingForces
 from solidsph_builtin.effects._gradients import in_the_reference
 

@@ -15,7 +15,7 @@ from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.terms import Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.registry.parameters import number
-from solidsph.run.stable_step import lattice_frequency
+from solidsph.run.cfl_step import lattice_frequency
 
 # Largest damping rate, relative to the highest frequency of a lattice: no relevant motion is that
 # fast, and the rate costs at most a tenth of the time step.

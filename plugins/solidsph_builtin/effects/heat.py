@@ -24,7 +24,7 @@ from solidsph.maths.tensors import particles_first
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import Where
 from solidsph.registry.parameters import check_positive, formula, number
-from solidsph.run.stable_step import lattice_frequency
+from solidsph.run.cfl_step import lattice_frequency
 from solidsph_builtin.effects._gradients import BodyGradient, in_the_reference, real_pairs
 
 # Step of the explicit rule for the temperature, relative to its largest stable step.

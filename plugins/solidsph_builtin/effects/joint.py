@@ -162,6 +162,8 @@ def _squares(ends: Indices, directions: Array, count: int) -> Array:
 @final
 @attrs.frozen(eq=False)
 class _Springs(PairLoad, EnergyTerm):
+    acts_always: ClassVar[bool] = True
+
     label: str
     pairs: PairTable
     reference: Array  # X (n, d)

@@ -7,7 +7,6 @@ other, and all problems are reported together.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import ceil
 from typing import TypeVar
 
 import numpy as np
@@ -16,7 +15,7 @@ import pluggy
 from solidsph.assembly.binding import bind
 from solidsph.assembly.body import make_body
 from solidsph.assembly.initial_state import initial_state, reference_observation
-from solidsph.assembly.step_size import step_size
+from solidsph.assembly.step_size import expected_steps, with_its_step
 from solidsph.engines.history import HistoryFields, modified
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.history import HistoryMaterial
@@ -86,7 +85,8 @@ class Assembler:
             probes=tuple(probes),
         )
         self._check_built(built)
-        return built
+        stepped: S | None = self._problems.attempt(with_its_step, built)
+        return self._problems.settled(stepped)
 
     def _model(self) -> DiscreteModel:
         """All bodies in discrete form."""
@@ -136,13 +136,13 @@ class Assembler:
         return [bound for bound in attempts if bound is not None]
 
     def _start_and_steps(self, model: DiscreteModel, terms: Sequence[Term]) -> tuple[State, int]:
-        """Initial state and number of steps, after checks that the terms fit each other."""
+        """Initial state and expected number of steps, after checks that the terms fit."""
         scene, problems = self._scene, self._problems
         integrator = problems.settled(self._parts.integrator)
         formulation = problems.settled(self._parts.formulation)
         loads = _loads(terms)
         # A term that could not be bound would only reduce the stable step.
-        step = problems.attempt(step_size, scene, integrator, loads, model.bodies)
+        steps = problems.attempt(expected_steps, scene, integrator, loads, model.bodies)
         self._placed.stop_if_any()
         constraints = _constraints(terms, model.particles)
         problems.add(check_constraints(constraints, model.particles))
@@ -151,8 +151,7 @@ class Assembler:
         problems.add(check_history(model.bodies, scene, self._placed.labels))
         initial = problems.attempt(initial_state, scene, model.particles)
         self._placed.stop_if_any()
-        steps = max(1, ceil(scene.duration / problems.settled(step) * (1.0 - 1e-12)))
-        return problems.settled(initial), steps
+        return problems.settled(initial), problems.settled(steps)
 
     def _dynamics(self, model: DiscreteModel, terms: Sequence[Term], steps: int) -> Dynamics:
         """Equation of motion, with the internal forces that the engine prepares."""

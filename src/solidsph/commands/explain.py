@@ -33,6 +33,7 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.plan import Compilation
 from solidsph.registry import registry
 from solidsph.registry.construct import construct
+from solidsph.run.cfl_step import cfl_step
 from solidsph.scene.default_cover import cover_of
 from solidsph.scene.scene import Scene
 from solidsph.scene.scheme import completed, scheme_of
@@ -287,14 +288,16 @@ def _numbers(simulation: Simulation) -> list[Row]:
 
 def _of_motion(simulation: Simulation) -> Iterator[tuple[str, Any, str]]:
     scene = simulation.scene
-    step = f"{scene.time_step_factor:g} of the CFL step, by wave speed and spacing"
+    limit = cfl_step(simulation.integrator, simulation.dynamics.loads, simulation.model.bodies)
+    of = "the CFL step, by wave speed and spacing, as the critical step is longer"
+    if simulation.safe is not None and simulation.safe.step <= limit:
+        of = "the critical step"
+    step = f"{scene.time_step_factor:g} of {of}"
     if scene.time_step is not None:
         step = "set by the scene"
-    yield "time step [s]", simulation.step_size, step
+    yield "time step [s]", simulation.step_size, f"{step}; cut where bodies grow stiffer"
     margin = critical_step(simulation).margin
     source = "from the highest frequency of the discrete system at the start"
-    if margin < 1.0:
-        source = "BELOW 1: the run will blow up; take a smaller time_step_factor"
     yield "critical step over it", margin, source
     yield "steps", simulation.steps, f"for {scene.duration:g} s"
     if (sleep := scene.sleep) is not None:

@@ -14,7 +14,8 @@ from solidsph.costs.work import Work
 from solidsph.engines.history import modified
 from solidsph.interfaces.forces_modifier import ForcesModifier
 from solidsph.interfaces.terms import StressTerm
-from solidsph.run.stable_step import stable_step
+from solidsph.run.cfl_step import cfl_step
+from solidsph.run.safe_step import safe_step
 from solidsph.simulation import Simulation
 
 
@@ -23,7 +24,7 @@ class Share:
     """Contribution of one effect to the cost of a run."""
 
     time: float  # fraction of the steps' time that the run saves without it, at equal step [-]
-    step: float  # stable step with the effect over that without it [-]
+    step: float  # largest step with the effect over that without it [-]
 
 
 def effect_shares(simulation: Simulation, machine: Calibration) -> Mapping[str, Share]:
@@ -45,7 +46,7 @@ def effect_shares(simulation: Simulation, machine: Calibration) -> Mapping[str, 
         rest = steps(reduced, reduced_work, others)
         shares[label] = Share(
             time=1.0 - rest / total if total > 0.0 else 0.0,
-            step=_stable_step(simulation) / _stable_step(reduced),
+            step=_largest_step(simulation) / _largest_step(reduced),
         )
     return shares
 
@@ -67,6 +68,11 @@ def without(simulation: Simulation, label: str) -> Simulation:
     )
 
 
-def _stable_step(simulation: Simulation) -> float:
-    loads, bodies = simulation.dynamics.loads, simulation.model.bodies
-    return stable_step(simulation.integrator, loads, bodies)
+def _largest_step(simulation: Simulation) -> float:
+    """The largest step that a scene takes [s]."""
+    dynamics, integrator = simulation.dynamics, simulation.integrator
+    largest = cfl_step(integrator, dynamics.loads, simulation.model.bodies)
+    if simulation.scene.statics is None:
+        safe = safe_step(dynamics, integrator, simulation.initial)
+        largest = largest if safe is None else min(largest, safe.step)
+    return largest

@@ -2,7 +2,9 @@
 
 The number of particles is the volume over that of a cell; pairs are those of full supports, minus
 those that surfaces cut off. Ghosts and the rates of effects are neglected. For a lattice many
-supports wide, the error is within 1 % for particles and 5 % for pairs.
+supports wide, the error is within 1 % for particles and 5 % for pairs. The step is a factor of the
+CFL step: the critical one needs the forces. Where it is the shorter, as with 'consistent' and
+'quadratic', a run has more steps than estimated.
 """
 
 from __future__ import annotations

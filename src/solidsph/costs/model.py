@@ -26,6 +26,10 @@ _UNFITTED = {
 _ANEW = (SumMethod.PRODUCTS_ANEW, SumMethod.FORMULAS, SumMethod.WEIGHTS)
 
 
+# Evaluations of the forces by which a motion's build finds its step: the mean of `run.safe_step`.
+_OF_THE_STEP = 15
+
+
 @attrs.frozen
 class Built:
     """Measured cost of a build."""
@@ -93,7 +97,7 @@ def predict(
     new = attrs.evolve(work, compilations=work.compilations - frozenset(compiled))
     return Prediction(
         work=work,
-        build=_total(terms.build_terms(new), machine) if built is None else built.seconds,
+        build=_building(new, machine, extra) if built is None else built.seconds,
         compiling=_total(terms.compile_terms(new), machine),
         steps=_stepping(work, machine) + work.evaluations * extra,
         outputs=work.outputs * _total(terms.output_terms(work), machine)
@@ -111,6 +115,13 @@ def step_seconds(work: Work, machine: Calibration, threads: int | None = None) -
     # Memory bandwidth is a lower bound; a copy both reads and writes, hence the factor.
     copying = machine.copying if count == 1 else machine.copying_shared
     return max(single - shared + shared / terms.speedup(count), 0.5 * copying * work.touched)
+
+
+def _building(work: Work, machine: Calibration, extra: float) -> float:
+    seconds = _total(terms.build_terms(work), machine)
+    if work.loop is not Loop.NEWTON:
+        seconds += _OF_THE_STEP * (step_seconds(work, machine) + extra)
+    return seconds
 
 
 def _stepping(work: Work, machine: Calibration) -> float:

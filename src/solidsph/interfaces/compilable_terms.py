@@ -217,6 +217,7 @@ class HourglassLoad(Load):
     """Forces of the hourglass energy (`interfaces.hourglass_energy`), body by body."""
 
     is_counted: ClassVar[bool] = True
+    acts_always: ClassVar[bool] = True
     supports: ClassVar[float] = 4.0  # the gradients of the partners of neighbours
 
     @property

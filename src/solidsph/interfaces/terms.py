@@ -153,6 +153,10 @@ class Load(Term):
     is_counted: ClassVar[bool] = False
     """True if `operations` is the complete cost of an evaluation; other loads are timed."""
 
+    acts_always: ClassVar[bool] = False
+    """True if its stiffness is there in every state, so that the spectrum of a scene shows it. For
+    other loads, such as contact, the stable step adds what `stiffness_rate` declares."""
+
     @property
     def stiffness_rate(self) -> float:
         """Highest angular frequency that its stiffness adds [rad/s]; for the stable step."""

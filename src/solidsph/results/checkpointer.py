@@ -40,6 +40,7 @@ class Checkpointer:
         self._is_ours = is_resumed  # the checkpoint; otherwise it is of a run that is replaced
         self._recorded: os.stat_result | None = None  # identity of the record's file
         self._state: State | None = None
+        self._simulation: BuiltScene | None = None  # that reached it; a run may cut its step
         self._kept: Mapping[str, Array] = {}
         self._environment: Mapping[str, str] = {}  # once it has been asked for
         self._is_written = False
@@ -50,7 +51,7 @@ class Checkpointer:
     def solidsph_resume(self, simulation: BuiltScene, observation: Observation) -> None:
         # At once: the end of the run, or its step, may differ from those in the older checkpoint.
         self._take(simulation, observation)
-        self._write(simulation)
+        self._write()
 
     @implementation(trylast=True)
     def solidsph_step_end(self, simulation: BuiltScene, observation: Observation) -> None:
@@ -61,21 +62,22 @@ class Checkpointer:
             self._is_ours = True
         self._take(simulation, observation)
         if self._is_due(observation.state):
-            self._write(simulation)
+            self._write()
 
     @implementation
-    def solidsph_finish(self, simulation: BuiltScene, outcome: str) -> None:
+    def solidsph_finish(self, outcome: str) -> None:
         if self._is_written or not self._is_recorded:
             return
         try:
-            self._write(simulation)
+            self._write()
         except RecordError:
             if is_over(outcome):
                 raise
             # Otherwise the error that stopped the run is the one to report.
 
     def _take(self, simulation: BuiltScene, observation: Observation) -> None:
-        self._state, self._is_written = observation.state, False
+        self._state, self._simulation = observation.state, simulation
+        self._is_written = False
         if self._recorded is None:  # the recorder comes before
             self._recorded = self._record.stat()
         kept: dict[str, Array] = {}
@@ -94,8 +96,9 @@ class Checkpointer:
         cost = self._cost if self._cost is not None else _WRITING + _BYTE * _size(state)
         return (clock.perf_counter() - self._last) * SHARE >= cost
 
-    def _write(self, simulation: BuiltScene) -> None:
-        if self._state is None or simulation.scene.statics is not None:
+    def _write(self) -> None:
+        simulation = self._simulation
+        if self._state is None or simulation is None or simulation.scene.statics is not None:
             return  # load steps depend on those before; an equilibrium starts from the first
         begun = clock.perf_counter()
         self._environment = self._environment or run_environment(simulation)

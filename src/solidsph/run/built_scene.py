@@ -25,6 +25,7 @@ from solidsph.registry.registry import Entry
 from solidsph.run.dynamics import Dynamics
 from solidsph.run.outcome import Result
 from solidsph.run.restart_point import RestartPoint
+from solidsph.run.safe_step import SafeStep
 from solidsph.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ class BuiltScene(ABC):
     manager: pluggy.PluginManager
     halvings: int = 0  # of the step of the scene
     probes: Sequence[Term] = ()  # which only report
+    safe: SafeStep | None = None  # at the start; None if nothing vibrates, or nothing moves
 
     @abstractmethod
     def run(

@@ -14,6 +14,7 @@ from solidsph.run.outcome import Result
 from solidsph.run.restart_point import RestartPoint
 from solidsph.run.session import session
 from solidsph.run.step_by_step import steps_of
+from solidsph.run.step_follower import StepFollower
 
 
 def time_loop(simulation: BuiltScene) -> TimeLoop:
@@ -54,12 +55,13 @@ def run_motion(
             record=None,
             seconds=clock.perf_counter() - start,
             effort={"steps": state.step, "step size [s]": simulation.step_size, **loop.effort},
-            notes=() if since is None else since.notes,
+            notes=[*(() if since is None else since.notes), *follower.cuts],
             values_at=simulation.values_at,
         )
 
+    follower = StepFollower(simulation)
     try:
-        with session(simulation, listeners):
+        with session(simulation, [follower, *listeners]):
             loop = time_loop(simulation)
             if since is None or since.state is None:
                 state = simulation.start()
@@ -71,13 +73,19 @@ def run_motion(
                 hook.solidsph_resume(
                     simulation=simulation, observation=observation, kept=since.kept
                 )
-            for stop in simulation.output_steps():
-                if stop <= state.step:
-                    continue
+            while state.step < simulation.steps:
+                before = simulation
+                simulation, state = follower.followed(simulation, state, observation)
+                if simulation is not before:
+                    loop = time_loop(simulation)
+                output = next(step for step in simulation.output_steps() if step > state.step)
                 try:
-                    state = loop.advance(state, stop)
+                    state = loop.advance(state, follower.next_check(state, output))
                 except StepError as failed:
                     raise simulation.diverged(failed.state, failed.cause) from failed
+                if state.step < output:
+                    observation = simulation.dynamics.observe(state)
+                    continue
                 observation = simulation.observe(state)
                 hook.solidsph_step_end(simulation=simulation, observation=observation)
             simulation.dynamics.internal.note(simulation.plan.compilations)

@@ -114,7 +114,7 @@ class SceneBuilder(ABC):
         time_step: float | None = None,
         **parameters: Any,
     ) -> Self:
-        """Choose the integrator, and the step as a factor of the CFL step or in seconds."""
+        """Choose the integrator, and the step as a factor of the critical step or in seconds."""
         self._set(integrator=_part(integrator, parameters))
         return self._set_given(time_step_factor=time_step_factor, time_step=time_step)
 

@@ -91,6 +91,16 @@ class SleepScene:
 RECOMMENDED = "recommended"
 """The scheme of a scene that names none; see `solidsph.scene.scheme`."""
 
+DEFAULT_FACTOR = 0.7
+"""The `time_step_factor` of a scene that names none.
+
+A step of 1 / sqrt(2) of the critical one takes four steps to the fastest vibration, one of sqrt(3)
+/ 2 three: there nonlinear forces feed it. At 0.7 the critical step may fall by a sixth before the
+run cuts its own. Errors do not depend on it: the deflection of a swinging beam differs from that
+of a tenth of the step by 3e-5 to 5e-5 of its largest at 0.3 to 0.95 of the critical step, the front
+of a suddenly stopped bar is as sharp at any.
+"""
+
 # No run of more steps ends; a scene that asks for them has wrong units.
 MOST_STEPS = 1e10
 
@@ -117,7 +127,7 @@ class SceneData:
     integrator: PartLike | None = None
     sleep: SleepScene | None = None  # None: no region sleeps
     statics: StaticsScene | None = None  # None: a motion, no equilibrium
-    time_step_factor: float = 0.5  # of the CFL step
+    time_step_factor: float = DEFAULT_FACTOR  # of the critical step, and at most of the CFL step
     time_step: float | None = None  # [s]; overrides the factor
     outputs: int = 200  # recorded states after the first
     engine: PartLike = "auto"

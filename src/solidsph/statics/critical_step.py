@@ -9,6 +9,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 from solidsph.run.built_scene import BuiltScene
+from solidsph.run.safe_step import stable_step_of
 
 # Differences over this fraction of a spacing; the error of central differences is its square.
 _RELATIVE_STEP = 1e-3
@@ -87,14 +88,12 @@ def highest_frequency(simulation: BuiltScene, state: State | None = None) -> flo
 def critical_step(simulation: BuiltScene, state: State | None = None) -> StableStep:
     """Largest stable step from the spectrum, compared with the step of the scene.
 
-    Damping enters by the rates that effects declare, as in the CFL step.
+    Damping, and loads that the state may not show, enter by the rates that they declare.
     """
     frequency = highest_frequency(simulation, state)
-    rate = sum(load.damping_rate for load in simulation.dynamics.loads)
-    limit = simulation.integrator.stability_limit
-    total = frequency + rate
+    loads = simulation.dynamics.loads
     return StableStep(
         highest_frequency=frequency,
-        step=limit / total if total > 0.0 else float("inf"),
+        step=stable_step_of(frequency**2, simulation.integrator, loads),
         in_use=simulation.step_size,
     )

@@ -23,6 +23,7 @@ from solidsph.conformance.ellipticity import acoustic_tensors, least_stiffness
 from solidsph.errors import SceneError
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import components_first, particles_first
+from solidsph.run.cfl_step import cfl_step
 from solidsph.simulation import Simulation
 from solidsph.studies.dispersion import LatticeResponse, check_uniform, lattice_response
 from solidsph.studies.scheme import Scheme, deformation, stretched
@@ -108,7 +109,7 @@ class Certificate:
     growing: tuple[Wave, ...]  # local maxima of the growth rate, the fastest first
     fastest: Wave  # wave of the highest frequency
     critical_step: float  # largest stable step on the endless lattice [transits]
-    rule_step: float  # CFL step, that of time_step_factor = 1 [transits]
+    rule_step: float  # CFL step, the longest that a scene takes [transits]
     wavelengths: Array  # (m,) along the first axis [spacings]
     speeds: Array  # (m, d) over the exact ones: longitudinal first, then transverse [-]
     free: FreeBody | None  # only unstretched: otherwise a free body is not in equilibrium
@@ -124,8 +125,8 @@ class Certificate:
         return self.growing[0].growth_rate if self.growing else 0.0
 
     @property
-    def largest_factor(self) -> float:
-        """Largest stable time_step_factor, on the endless lattice and in the free body [-]."""
+    def of_cfl(self) -> float:
+        """Critical step over the CFL step, on the endless lattice and in the free body [-]."""
         steps = [self.critical_step, *([] if self.free is None else [self.free.critical_step])]
         return min(steps) / self.rule_step
 
@@ -327,7 +328,8 @@ def _response(scheme: Scheme, stretches: Sequence[float]) -> tuple[LatticeRespon
     state = stretched(simulation, stretches)
     response = lattice_response(simulation.dynamics, state)
     check_uniform(simulation.dynamics, state, response)
-    return response, simulation.step_size, rate
+    rule = cfl_step(simulation.integrator, simulation.dynamics.loads, simulation.model.bodies)
+    return response, rule, rate
 
 
 def _mean_stress(scheme: Scheme, F: Array) -> float:

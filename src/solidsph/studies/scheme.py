@@ -19,7 +19,7 @@ from solidsph.model.particles import State
 from solidsph.registry.construct import construct
 from solidsph.scene.default_cover import cover_of, kernel_cover
 from solidsph.scene.scene import Scene
-from solidsph.scene.scene_data import PartLike
+from solidsph.scene.scene_data import DEFAULT_FACTOR, PartLike
 from solidsph.scene.scheme import SCHEMES, completed
 from solidsph.simulation import Simulation
 
@@ -81,7 +81,7 @@ class Scheme:
     effects: Sequence[PartLike] = ()
     integrator: Integrator = attrs.field(default=_DEFAULTS["integrators"], converter=_integrator)
     spacing: float = 1.0  # [m]
-    time_step_factor: float = 0.5  # in use, of the CFL step [-]
+    time_step_factor: float = DEFAULT_FACTOR  # in use, as that of a scene [-]
 
     @cover.default
     def _own_cover(self) -> float:
@@ -140,7 +140,7 @@ class Scheme:
             dimension: 1, 2 or 3.
             layers: of particles on either side of the middle one, along each axis.
             boundaries: parts with the labels of their accounts; none by default.
-            time_step_factor: of the CFL step.
+            time_step_factor: as that of a scene.
             duration: in transits of a spacing, rounded up to whole steps.
 
         Raises:

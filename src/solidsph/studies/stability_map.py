@@ -11,6 +11,7 @@ import numpy as np
 from solidsph.errors import BuildError
 from solidsph.interfaces.formulation import Configuration
 from solidsph.maths.arrays import Array, Mask
+from solidsph.run.cfl_step import cfl_step
 from solidsph.studies.certificate import GROWS
 from solidsph.studies.dispersion import check_uniform, dispersion, lattice_response
 from solidsph.studies.scheme import Scheme, stretched
@@ -45,7 +46,8 @@ def stability_map(
         simulation = wider.simulation(1, [wider.depth(min(1.0, *stretches))])
         start = stretched(simulation, [1.0])
         check_uniform(simulation.dynamics, start, lattice_response(simulation.dynamics, start))
-        limit = scheme.integrator.stability_limit / simulation.step_size
+        loads, bodies = simulation.dynamics.loads, simulation.model.bodies
+        limit = scheme.integrator.stability_limit / cfl_step(simulation.integrator, loads, bodies)
         for column, stretch in enumerate(stretches):
             uniform = stretched(simulation, [stretch])
             try:

@@ -7,13 +7,12 @@ from math import inf
 from pathlib import Path
 
 import attrs
-import numpy as np
 
 from solidsph.errors import DivergedError, UnsoundError
-from solidsph.model.particles import State
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.outcome import Result
 from solidsph.run.restart_point import RestartPoint
+from solidsph.run.step_follower import restarted
 from solidsph.watch.symptom import Finding, Symptom
 from solidsph.watch.watchdog import SYMPTOMS, Watchdog
 
@@ -55,7 +54,8 @@ def run_watched(
         except (DivergedError, UnsoundError) as error:
             if len(notes) >= roll_backs:
                 raise
-            simulation = simulation.halved()
+            # The run may have cut its step by itself before.
+            simulation = (watchdog.simulation or simulation).halved()
             sound = watchdog.last_sound
             notes.append(
                 f"rolled back from t = {error.time:.9g} s to "
@@ -64,7 +64,7 @@ def run_watched(
             )
             since = RestartPoint(until=-inf, notes=tuple(notes))
             if sound is not None:
-                state = restarted(simulation, sound.state)
+                state = restarted(simulation, sound.state, sound.halvings)
                 since = attrs.evolve(since, state=state, kept=sound.kept, until=sound.state.time)
 
 
@@ -72,17 +72,3 @@ def _reason(error: DivergedError | UnsoundError) -> str:
     if isinstance(error, UnsoundError):
         return f"the energies did not add up, by {error.part:.3g} of the energy in play"
     return f"{error.cause} at particle {error.particle}"
-
-
-def restarted(simulation: BuiltScene, state: State) -> State:
-    """An output of the same scene with twice the step, as a start for this one."""
-    dynamics = simulation.dynamics
-    moved = attrs.evolve(
-        state,
-        step=2 * state.step,
-        positions=dynamics.place(state.time, state.positions),
-        velocities=dynamics.carry(state.time, state.velocities),
-    )
-    with np.errstate(all="ignore"):  # as in the steps that follow
-        begun = simulation.integrator.start(moved, dynamics, simulation.step_size)
-    return attrs.evolve(begun, work=dict(state.work))

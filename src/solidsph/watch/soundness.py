@@ -18,8 +18,8 @@ from solidsph.scene.scene_data import OFF
 
 _KEPT, _RISES = "soundness", "soundness rises"
 
-# A quarter of the energy in play at the default tolerance, a hundredth: see `Soundness`.
-_SWINGS = 25.0
+# All of the energy in play at the default tolerance, a hundredth: see `Soundness`.
+_SWINGS = 100.0
 
 # Residual over the energy in play at which no energy of a run means anything.
 _LOST = 1.0
@@ -51,8 +51,8 @@ class Soundness:
     A part of the residual comes and goes with the fastest vibrations: a leapfrog scheme keeps the
     energy less dt^2 / 8 times the sum of m a^2, and for linear forces keeps that exactly (Hairer,
     Lubich & Wanner 2003, the modified energy). It is no loss, and does not count as long as it is
-    no larger than it is for the shortest waves of a lattice at half the CFL step, (omega dt)^2 / 4
-    or a quarter; beyond that, something is faster than the step allows.
+    no larger than it is for the fastest vibrations at the critical step, (omega dt)^2 / 4 or all of
+    the energy; beyond that, something is faster than the step allows.
     """
 
     def __init__(self) -> None:
@@ -60,6 +60,7 @@ class Soundness:
         # Times [s], losses and residuals [J] there; each loss is larger than all before.
         self._rises = np.empty((0, 3))
         self._first_swing = np.nan  # at the first output [J]
+        self._swing, self._step = np.nan, np.nan  # at the last output [J], and its time step [s]
         self._share = 0.0  # at the last output: loss over the energy in play so far
 
     @implementation
@@ -67,7 +68,11 @@ class Soundness:
         self._accounts.add(observation)
         residual = self._accounts.residual
         swing = _swing(simulation, observation)
-        first = self._first_swing = swing if np.isnan(self._first_swing) else self._first_swing
+        if np.isnan(self._first_swing):
+            self._first_swing = swing
+        elif simulation.step_size != self._step:  # cut at the last output, and so is what swings
+            self._first_swing -= self._swing * (1.0 - (simulation.step_size / self._step) ** 2)
+        first, self._swing, self._step = self._first_swing, swing, simulation.step_size
         if residual < 0.0 and any(e.breaks_bonds for e in simulation.effects.values()):
             residual = 0.0  # bonds that fail take the energy between them away
         loss = min(abs(residual), max(abs(residual - swing + first), abs(residual) / _SWINGS))
@@ -87,8 +92,9 @@ class Soundness:
         self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
     ) -> None:
         if _KEPT in kept:
-            self._accounts = Accounts.from_array(np.atleast_1d(kept[_KEPT])[:-1])
-            self._first_swing = float(kept[_KEPT][-1])
+            values = np.atleast_1d(kept[_KEPT])
+            self._accounts = Accounts.from_array(values[:-3])
+            self._first_swing, self._swing, self._step = (float(value) for value in values[-3:])
             self._rises = kept.get(_RISES, np.empty(0))
             if self._rises.ndim != 2 or self._rises.shape[1] != 3:
                 raise RecordError(
@@ -97,11 +103,13 @@ class Soundness:
                 )
         else:  # the earlier run was not judged
             self._accounts.add(observation)
-            self._first_swing = _swing(simulation, observation)
+            self._first_swing = self._swing = _swing(simulation, observation)
+            self._step = simulation.step_size
 
     @implementation
     def solidsph_keep(self, kept: dict[str, Array]) -> None:
-        kept[_KEPT] = np.append(self._accounts.to_array(), self._first_swing)
+        swings = [self._first_swing, self._swing, self._step]
+        kept[_KEPT] = np.append(self._accounts.to_array(), swings)
         kept[_RISES] = self._rises
 
     def judge(self, simulation: BuiltScene) -> None:

@@ -38,6 +38,7 @@ class SoundOutput:
 
     state: State
     kept: Mapping[str, Array]
+    halvings: int  # of the step with which it was reached
 
 
 class Watchdog:
@@ -50,6 +51,7 @@ class Watchdog:
         findings: time [s] and finding, of every output that had one.
         last_sound: the last output without a finding and with energies that add up; or if there is
             none, without a failure.
+        simulation: what ran last, whose step may be shorter than at the start.
 
     Args:
         symptoms: what to look for.
@@ -66,6 +68,7 @@ class Watchdog:
     ) -> None:
         self.findings: list[tuple[float, Finding]] = []
         self.last_sound: SoundOutput | None = None
+        self.simulation: BuiltScene | None = None
         self._symptoms = tuple(symptoms)
         self._picture = picture
         self._on_finding = on_finding
@@ -74,15 +77,20 @@ class Watchdog:
         self._is_clean = False  # whether nothing at all was wrong with `last_sound`
 
     @implementation(tryfirst=True)  # an unusable checkpoint is reported before the record changes
-    def solidsph_resume(self, observation: Observation, kept: Mapping[str, Array]) -> None:
+    def solidsph_resume(
+        self, simulation: BuiltScene, observation: Observation, kept: Mapping[str, Array]
+    ) -> None:
+        self.simulation = simulation
         if _ACCOUNTS in kept:
             self._accounts = Accounts.from_array(kept[_ACCOUNTS])
         else:  # the earlier run had no watchdog
             self._accounts.add(observation)
-        self.last_sound, self._is_clean = SoundOutput(observation.state, kept), True
+        sound = SoundOutput(observation.state, kept, simulation.halvings)
+        self.last_sound, self._is_clean = sound, True
 
     @implementation
     def solidsph_step_end(self, simulation: BuiltScene, observation: Observation) -> None:
+        self.simulation = simulation
         self._accounts.add(observation)
         state = observation.state
         looks = (
@@ -102,7 +110,8 @@ class Watchdog:
         if is_clean or not self._is_clean:
             kept: dict[str, Array] = {}
             simulation.manager.hook.solidsph_keep(simulation=simulation, kept=kept)
-            self.last_sound, self._is_clean = SoundOutput(state, kept), is_clean
+            self.last_sound = SoundOutput(state, kept, simulation.halvings)
+            self._is_clean = is_clean
 
     def _is_due(self, symptom: Symptom, simulation: BuiltScene, step: int) -> bool:
         due = step - self._looked.get(symptom, 0) >= symptom.steps_between
@@ -117,6 +126,7 @@ class Watchdog:
 
     @implementation
     def solidsph_failure(self, simulation: BuiltScene, state: State, error: DivergedError) -> None:
+        self.simulation = simulation
         # The run has failed by itself; what it does not know is what came before.
         if self.findings:
             time, before = self.findings[-1]

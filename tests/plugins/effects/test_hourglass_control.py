@@ -311,6 +311,7 @@ def test_it_needs_the_reference_configuration() -> None:
 
 def test_it_shortens_the_step_as_it_stiffens() -> None:
     soft, stiff = (
-        box(2).effect("hourglass-control", strength=s).build().step_size for s in (0.1, 30.0)
+        box(2).effect("hourglass-control", strength=s).duration(1.0).build().step_size
+        for s in (0.1, 30.0)
     )
     assert stiff < 0.8 * soft

@@ -17,10 +17,10 @@ from solidsph.interfaces.terms import Load
 from solidsph.interfaces.time_loop import StepError, TimeLoop
 from solidsph.maths.arrays import Indices, Mask
 from solidsph.model.particles import State
+from solidsph.run.cfl_step import lattice_frequency
 from solidsph.run.dynamics import Dynamics
 from solidsph.run.sleeping.frozen import ASLEEP, Frozen
 from solidsph.run.sleeping.slabs import Slabs
-from solidsph.run.stable_step import lattice_frequency
 from solidsph.run.step_by_step import steps_of
 
 if TYPE_CHECKING:

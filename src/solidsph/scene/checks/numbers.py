@@ -27,7 +27,7 @@ def _motion(scene: SceneData) -> Iterator[str]:
     for name, value, unit in (
         ("duration", scene.duration, "s"),
         ("cover", scene.cover, "particle spacings"),
-        ("time_step_factor", scene.time_step_factor, "fractions of the CFL step"),
+        ("time_step_factor", scene.time_step_factor, "fractions of the critical step"),
         ("time_step", scene.time_step, "s"),
     ):
         if value is not None and not (isfinite(value) and value > 0.0):
@@ -38,7 +38,7 @@ def _motion(scene: SceneData) -> Iterator[str]:
             "spacings, usually 3"
         )
     if scene.time_step_factor > 1.0:
-        yield f"time_step_factor must not exceed 1, got {scene.time_step_factor}; 0.5 is usual"
+        yield f"time_step_factor must not exceed 1, got {scene.time_step_factor}; 0.7 is usual"
     if scene.outputs < 1:
         yield f"outputs must be at least 1, got {scene.outputs}; the last state is always recorded"
     tolerance: Any = scene.energy_tolerance

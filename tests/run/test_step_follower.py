@@ -1,0 +1,158 @@
+"""The step is cut where bodies grow stiffer, and a resumed run takes the same steps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import attrs
+import numpy as np
+import pytest
+
+from solidsph import DivergedError, Record, Simulation, resume
+from solidsph.results import checkpointer
+from solidsph.run import step_follower
+from solidsph.run.safe_step import safe_step
+from solidsph.run.step_follower import StepFollower
+from solidsph.scene.scene_builder import SceneBuilder
+from tests.helpers.resuming import OFTEN, Stop, assert_same_record
+from tests.helpers.scenes import box
+
+ON_SURFACE = "conforming-lattice"
+
+
+def pulled_sheet(cells: int, duration: float, outputs: int) -> SceneBuilder:
+    """A quarter of a sheet of rubber with a hole, pulled suddenly by half its modulus."""
+    hole = {"type": "disc", "radius": 0.2, "centre": [0.0, 0.0]}
+    whole = {"type": "box", "lengths": [1.0, 1.0]}
+    return (
+        Simulation.builder()
+        .body(
+            "sheet",
+            shape={"type": "difference", "of": whole, "minus": hole},
+            spacing=1.0 / cells,
+            discretisation={"type": "fitted-moments", "of": ON_SURFACE},
+        )
+        .kernel("cubic-spline", cover=2.6)
+        .material("neo-hookean", youngs_modulus=1e7, poissons_ratio=0.49, density=1000.0)
+        .formulation("total-lagrangian", gradient="consistent")
+        .boundary("symmetry", axis="x")
+        .boundary("symmetry", axis="y")
+        .boundary("traction", where="right", traction={"x": 5e6})
+        .duration(duration)
+        .outputs(outputs)
+    )
+
+
+@pytest.fixture(scope="module")
+def sheet() -> Simulation:
+    return pulled_sheet(8, 4e-3, 20).build()
+
+
+def test_a_body_that_grows_stiffer_gets_a_shorter_step(sheet: Simulation) -> None:
+    result = sheet.run()
+    (note,) = result.notes
+    assert "the step was cut" in note
+    assert result.effort["step size [s]"] == 0.5 * sheet.step_size
+    # Some steps were made before the cut, and count twice.
+    assert result.state.step == 2 * sheet.steps
+    assert result.state.time == pytest.approx(sheet.scene.duration, rel=1e-12)
+
+
+def test_the_step_stays_below_the_critical_one(sheet: Simulation) -> None:
+    parts = []
+
+    class Measured:
+        @step_follower.implementation
+        def solidsph_step_end(self, simulation, observation) -> None:
+            safe = safe_step(simulation.dynamics, simulation.integrator, observation.state)
+            parts.append(simulation.step_size / safe.step)
+
+    sheet.run(observers=[Measured()])
+    assert max(parts) < 1.0
+
+
+def test_without_it_the_run_diverges(monkeypatch: pytest.MonkeyPatch) -> None:
+    def keep(self, simulation, state, observation):
+        return simulation, state
+
+    monkeypatch.setattr(StepFollower, "followed", keep)
+    longer = pulled_sheet(8, 2e-2, 100).build()
+    with pytest.raises(DivergedError):
+        longer.run()
+
+
+@pytest.mark.parametrize("engine", ["matrix", "compiled"])
+def test_a_resumed_run_is_cut_as_one_without_a_break(
+    engine: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(checkpointer, "SHARE", OFTEN)
+    monkeypatch.setattr(step_follower, "_CHECKED", 7)  # between outputs as well
+    simulation = pulled_sheet(8, 4e-3, 6).engine(engine).build()
+    whole = tmp_path / "whole.h5"
+    result = simulation.run(record=whole)
+    assert result.notes
+    for output in range(1, 8):
+        path = tmp_path / f"{output}.h5"
+        with pytest.raises(KeyboardInterrupt):
+            simulation.run(record=path, observers=[Stop(output)])
+        again = resume(path, simulation=simulation)
+        assert np.array_equal(again.state.positions, result.state.positions)
+        assert again.state.step == result.state.step
+        assert_same_record(whole, path)
+
+
+def test_a_finished_run_that_was_cut_is_extended(sheet: Simulation, tmp_path: Path) -> None:
+    path = tmp_path / "sheet.h5"
+    first = sheet.run(record=path)
+    assert first.notes
+    longer = resume(path, until=1.25 * sheet.scene.duration)
+    assert longer.state.time == pytest.approx(1.25 * sheet.scene.duration, rel=0.01)
+    assert longer.effort["step size [s]"] <= 0.5 * sheet.step_size
+    with Record(path) as record:
+        assert record.outcome == "finished"
+        assert np.all(np.diff(record.times) > 0.0)
+
+
+def test_a_soft_body_that_swings_keeps_its_step_at_little_cost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    evaluations = 0
+    looked = step_follower.safe_step
+
+    def counted(*args, **kwargs):
+        nonlocal evaluations
+        evaluations += 1
+        return looked(*args, **kwargs)
+
+    monkeypatch.setattr(step_follower, "safe_step", counted)
+    simulation = (
+        box(2, 8)
+        .boundary("clamp", where="left")
+        .effect("hourglass-control")
+        .initial(velocity={"y": "2*X**2"})
+        .duration(1.0)
+        .outputs(50)
+        .build()
+    )
+    result = simulation.run()
+    assert not result.notes
+    # A look takes 30 evaluations at most, and most take 6.
+    assert evaluations * 12 < 0.05 * simulation.steps
+
+
+def test_a_step_that_is_too_long_from_the_start_stays_so() -> None:
+    """It is not cut behind the back of whoever has made it so."""
+    simulation = box(2, 6).initial(velocity={"x": "1e-3*X"}).build()
+    assert simulation.safe is not None
+    dynamics = attrs.evolve(simulation.dynamics, step_size=0.99 * simulation.safe.step)
+    steps = int(simulation.scene.duration / dynamics.step_size)
+    fixed = attrs.evolve(simulation, dynamics=dynamics, steps=steps)
+    assert not fixed.run().notes
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize("cells", [16, 32])
+def test_a_suddenly_pulled_sheet_is_sound(cells: int) -> None:
+    """It stretches by half, swings, and its critical step falls to a third or less."""
+    result = pulled_sheet(cells, 0.1, 200).build().run()
+    assert result.notes
