@@ -37,9 +37,9 @@ PRODUCTS = 3
 # products of squares, the corner of a box in space would have 0.006 of a cell, in place of 0.042.
 IN_LATTICE = Rule(radius=2.0, degree=PRODUCTS, determined=1e-8)
 
-# In bodies with scattered particles a fit by fewer of them serves better: with a radius of 2 the peak
-# stress at a hole is off by 13 % with 20 particles a side, with 1.8 by 3 %. Beside a surface that is
-# a linear fit, and on a plane one the rule 5/12, 13/12, 1.
+# In bodies with scattered particles a fit by fewer of them serves better: with a radius of 2 the
+# peak stress at a hole is off by 13 % with 20 particles a side, with 1.8 by 3 %. Beside a surface
+# that is a linear fit, and on a plane one the rule 5/12, 13/12, 1.
 SCATTERED = Rule(radius=1.8, degree=2, determined=1e-4)
 
 REACH = max(IN_LATTICE.radius, SCATTERED.radius)
