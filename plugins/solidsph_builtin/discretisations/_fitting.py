@@ -36,8 +36,9 @@ _ON_BOUNDARY = 1e-6
 # Moments that differ by less, as parts of the volume, are those of the body.
 _ROUNDING = 1e-12
 
-# Part of its volume that no particle loses for the sake of the moments.
-_MOST_LOST = 0.5
+# Part of its volume that no particle loses for the sake of the moments; where one were to lose much
+# more, the surface is not that of the body.
+_MOST_LOST, _ABSURD = 0.5, 2.0
 
 # Gauss's rule with two points, in cells from the middle.
 _GAUSS = 0.5 / sqrt(3.0)
@@ -253,9 +254,11 @@ def with_moments(
     rest = basis[:, 1 + d :] - basis[:, : 1 + d] @ along
     left = missing[1 + d :] - change @ basis[:, 1 + d :]
     change += free * _change(rest, free, left)
-    # In a body of few particles the change may be too much for one of them, and is made in part.
     lost = float(np.max(-change / volumes))
-    result: Array = volumes + change * min(1.0, _MOST_LOST / max(lost, _MOST_LOST))
+    if _MOST_LOST < lost < _ABSURD:
+        # In a body of few particles the change is too much for one of them, and is made in part.
+        change *= _MOST_LOST / lost
+    result: Array = volumes + change
     return result
 
 
