@@ -68,7 +68,9 @@ class Consistent(Gradient):
     with a_p such that polynomials up to the degree of the gradient, at most the second, keep what
     their gradients, and l and L from the sparse linear system of the sums: the least change, with
     each weight's change divided by its kernel weight w. Weights change only where sums are wrong,
-    and up to two supports from there: deep inside a lattice they stay as they were.
+    and up to two supports from there: deep inside a lattice they stay as they were. Those of a bar
+    all change: sums that are exact to the second degree at both ends need the fourth order between
+    them (Strand 1994).
 
     The system is solved once, when the body is built: by a factorisation if it is small, else by
     conjugate gradients over the fixed pairs, to a hundredth of what was missing or for half a
@@ -187,6 +189,8 @@ def _missing(particles: Particles, pairs: Pairs, weights: Array, length: float) 
 
 def _active(missing: Array, pairs: Pairs) -> Mask:
     """Particles around those with wrong sums, (n,)."""
+    if pairs.offsets.shape[1] == 1:  # the ends of a bar are not connected along its surface
+        return np.ones(len(missing), dtype=np.bool_)
     size = np.abs(missing).max(axis=(1, 2))
     active = size > _WRONG * size.max()
     for _ in range(_AROUND):
