@@ -124,6 +124,8 @@ class Consistent(Gradient):
         degree = self.exact_degree
         missing[:, 0] = _possible(missing[:, 0], particles.positions, surface, degree)
         active = _active(missing, found)
+        if particles.dimension == 1:
+            active[:] = True  # what the sums at one end lack, only those at the other can balance
         V = particles.volumes
         if missing.shape[0] * missing.shape[1] <= _FACTORISED[particles.dimension]:
             change = _Change.of(found, slopes, particles.cells, V, active, degree, length)
@@ -189,8 +191,6 @@ def _missing(particles: Particles, pairs: Pairs, weights: Array, length: float) 
 
 def _active(missing: Array, pairs: Pairs) -> Mask:
     """Particles around those with wrong sums, (n,)."""
-    if pairs.offsets.shape[1] == 1:  # the ends of a bar are not connected along its surface
-        return np.ones(len(missing), dtype=np.bool_)
     size = np.abs(missing).max(axis=(1, 2))
     active = size > _WRONG * size.max()
     for _ in range(_AROUND):
