@@ -21,7 +21,7 @@ from solidsph_builtin.discretisations._cells import cell_shares
 from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._pieces import finest_pieces
-from solidsph_builtin.discretisations._reproducing import RADIUS, Fit
+from solidsph_builtin.discretisations._reproducing import REACH, Fit
 from solidsph_builtin.discretisations._surface import area_vectors, sampled
 
 # Samples of the surface along a spacing, over those that an assignment to particles needs.
@@ -105,7 +105,7 @@ def fitted_volumes(
         disturbed: depth to which the particles are no lattice [m].
     """
     # The function of a particle further inside meets complete neighbourhoods only.
-    reach = RADIUS * spacing
+    reach = REACH * spacing
     depth = disturbed + 2.0 * reach
     near = shape.signed_distance(positions) > -depth
     points, weights = _quadrature(discretisation, shape, spacing, depth + reach)

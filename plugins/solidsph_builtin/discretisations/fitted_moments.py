@@ -21,7 +21,7 @@ class FittedMoments(Discretisation):
 
     The volume of a particle is the integral of the function that it has in a moving least squares
     fit, and its area is that over the surface. On a lattice with particles on the boundary these
-    are the weights of Gregory's rule, 5/12, 13/12, 1 from a face inwards. With cells that the
+    are the weights of Gregory's rule, 3/8, 7/6, 23/24, 1 from a face inwards. With cells that the
     surface cuts, a beam of five particles is some per cent too soft or too stiff, and so is a
     twisted bar with thirteen.
 

@@ -22,8 +22,9 @@ from solidsph_builtin.gradients.quadratic import closeness
 _DEPENDENT = 1e-10
 _SMALLEST = 1e-300
 
-# The largest sum that may be left, as a part of the largest that was missing.
-_LEFT = 1e-2
+# The largest sum that may be left, as a part of the largest that was missing: of all, and then of
+# the sums without their first moments.
+_LEFT, _LEFT_OF_SUMS = 1e-2, 1e-7
 
 # Steps, at least and at most, and pairs times steps: half a minute in space. There sixty steps
 # leave some hundredths, and the torque of a bar is as exact as with none left, to a thousandth.
@@ -76,12 +77,22 @@ def solved(
     all_soft = np.zeros(diagonal.shape)
     all_soft[active] = soft
     wanted = np.where(active[:, None, None], missing, 0.0)
-    return _conjugate_gradients(
-        lambda x: product(*sums, tests, x) + all_soft[:, :, None] * x,
-        np.linalg.inv(blocks),
-        wanted,
-        int(np.clip(_PAIR_STEPS / np.count_nonzero(kept), _FEWEST, _MOST)),
-    )
+    steps = int(np.clip(_PAIR_STEPS / np.count_nonzero(kept), _FEWEST, _MOST))
+
+    def softened(x: Array) -> Array:
+        result: Array = product(*sums, tests, x) + all_soft[:, :, None] * x
+        return result
+
+    def of_sums_alone(x: Array) -> Array:
+        return softened(np.concatenate([x, np.zeros_like(x, shape=(len(x), d, d))], axis=1))[:, :1]
+
+    multipliers = _conjugate_gradients(softened, np.linalg.inv(blocks), wanted, _LEFT, steps)
+    # The sums themselves must be right to more digits, for uniform stresses to be in balance.
+    left = (wanted - softened(multipliers))[:, :1]
+    inverse = 1.0 / blocks[:, :1, :1]
+    part = _LEFT_OF_SUMS * np.abs(wanted).max() / max(np.abs(left).max(), _SMALLEST)
+    multipliers[:, :1] += _conjugate_gradients(of_sums_alone, inverse, left, part, steps)
+    return multipliers
 
 
 def _inverse(moments: Array) -> Array:
@@ -94,12 +105,12 @@ def _inverse(moments: Array) -> Array:
 
 
 def _conjugate_gradients(
-    product: Callable[[Array], Array], inverse: Array, wanted: Array, steps: int
+    product: Callable[[Array], Array], inverse: Array, wanted: Array, part: float, steps: int
 ) -> Array:
-    """The x (n, k, d) for which `product` of x is about `wanted`, each of the d by itself.
+    """The x (n, k, d) for which `product` of x is `wanted` but for this `part` of its largest.
 
-    `inverse` (n, k, k) is that of the diagonal blocks. On the way to the solution what is left may
-    grow; the x with the least is returned.
+    `inverse` (n, k, k) is that of the diagonal blocks. Each of the d is solved by itself. On the
+    way to the solution what is left may grow; the x with the least is returned.
     """
     largest = least = float(np.abs(wanted).max())
     x, r = np.zeros_like(wanted), wanted.copy()
@@ -107,7 +118,7 @@ def _conjugate_gradients(
     z = inverse @ r
     p, along = z.copy(), np.sum(r * z, axis=(0, 1))
     for _ in range(steps):
-        if least <= _LEFT * largest:
+        if least <= part * largest:
             break
         gained = product(p)
         step = along / np.maximum(np.sum(p * gained, axis=(0, 1)), _SMALLEST)

@@ -14,7 +14,7 @@ _AT_SURFACE = 1e-9
 
 # The same for the first moments of all sums. A part of them is beyond reach, and others cost more
 # change than they are worth; of what was missing, half a per cent is left.
-_MOMENTS = 1e-5
+_MOMENTS = {1: 1e6, 2: 1e-5, 3: 1e-5}
 
 
 def softening(diagonal: Array, surface: Mask) -> Array:
@@ -22,6 +22,8 @@ def softening(diagonal: Array, surface: Mask) -> Array:
 
     `surface` (n,) tells the particles on the surface.
     """
-    soft = np.full(diagonal.shape, _MOMENTS * float(np.mean(diagonal[:, 1:])))
+    soft = np.full(
+        diagonal.shape, _MOMENTS[diagonal.shape[1] - 1] * float(np.mean(diagonal[:, 1:]))
+    )
     soft[:, 0] = np.where(surface, _AT_SURFACE * float(np.median(diagonal[:, 0])), 0.0)
     return soft

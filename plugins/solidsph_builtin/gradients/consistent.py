@@ -24,13 +24,14 @@ from solidsph_builtin.gradients.quadratic import Quadratic, closeness
 _DEPENDENT = 1e-10
 
 # Sums are wrong where more than this part of the worst is missing; weights change so many supports
-# around.
+# around. The two ends of a bar must be able to balance each other.
 _WRONG = 1e-11
-_AROUND = 2
+_AROUND = {1: 10_000, 2: 4, 3: 2}
 _SMALLEST = 1e-300
 
-# Multipliers of a body up to which the system is factorised, by dimension: for a second or two.
-_FACTORISED = {1: 100_000, 2: 6000, 3: 1200}
+# Multipliers of a body up to which the system is factorised, by dimension: for some seconds, or for
+# half a minute in a body of the plane that is not slender.
+_FACTORISED = {1: 1_000_000, 2: 30_000, 3: 1200}
 
 # Keeps the matrix regular in spite of smooth fields, which hardly change any weight; corrected by
 # iterative refinement.
@@ -191,8 +192,11 @@ def _active(missing: Array, pairs: Pairs) -> Mask:
     """Particles around those with wrong sums, (n,)."""
     size = np.abs(missing).max(axis=(1, 2))
     active = size > _WRONG * size.max()
-    for _ in range(_AROUND):
+    for _ in range(_AROUND[pairs.offsets.shape[1]]):
+        before = active
         active = pairs.row_sums(active[pairs.columns].astype(np.intp)) > 0
+        if np.array_equal(active, before):
+            break
     return np.asarray(active, dtype=np.bool_)
 
 

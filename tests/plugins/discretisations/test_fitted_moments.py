@@ -48,19 +48,21 @@ def test_without_the_fit_the_section_is_too_soft_or_too_stiff() -> None:
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_on_the_boundary_of_a_box_they_are_close_to_those_of_gregory(dimension: int) -> None:
-    """5/12, 13/12 and then whole cells, but for half a per cent that makes second moments exact."""
+def test_on_the_boundary_of_a_box_they_are_those_of_gregory(dimension: int) -> None:
+    """3/8, 7/6, 23/24 and then whole cells, to the last bit where nothing is to be done."""
     lattice, shape = Lattice(on_boundary=True), Box(lengths=(1.2, 1.0, 1.0)[:dimension])
     particles = FittedMoments(of=lattice).particles(shape, 0.1)
     V, X = particles.volumes / 0.1**dimension, particles.positions
     from_left = np.round(X[:, 0] / 0.1).astype(int)
     middle = np.all(np.abs(X[:, 1:] - 0.5) < 0.01, axis=1)
     along = V[middle][np.argsort(from_left[middle])]
-    assert np.allclose(along[:3], [5 / 12, 13 / 12, 1.0], atol=8e-3)
-    assert np.allclose(along, along[::-1], rtol=1e-9)
-    deep = shape.signed_distance(X) < -3.7 * 0.1
+    gregory = [3 / 8, 7 / 6, 23 / 24, *(7 * [1.0]), 23 / 24, 7 / 6, 3 / 8]
+    assert np.allclose(along, gregory, rtol=1e-9)
+    deep = shape.signed_distance(X) < -4.2 * 0.1
     assert deep.any()
     assert np.array_equal(particles.volumes[deep], lattice.particles(shape, 0.1).volumes[deep])
+    # In a corner almost the product of three of them.
+    assert V.min() > 0.75 * (3 / 8) ** dimension
 
 
 def test_at_an_edge_the_particles_around_it_share_a_face() -> None:
