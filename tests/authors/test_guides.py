@@ -184,6 +184,7 @@ def test_two_particles_on_a_spring_vibrate(guide) -> None:
     k, amplitude = 50.0, 0.1
     builder = (
         Simulation.builder()
+        .scheme("corrected")  # cells: two particles
         .body("pair", shape={"type": "interval", "length": 1.0}, spacing=0.5)
         .kernel("modified-mollifier", cover=3.0)
         .material("linear-elastic", youngs_modulus=1e-6, poissons_ratio=0.0, density=1.0)
@@ -282,6 +283,7 @@ def test_a_row_of_particles_has_a_regularised_gradient(guide) -> None:
         shape = {"type": "box", "lengths": [1.0, 0.1]}
         return (
             Simulation.builder()
+            .scheme("corrected")
             .body("row", shape=shape, spacing=0.1)
             .material("neo-hookean", **SOFT)
             .formulation("total-lagrangian", gradient=gradient)

@@ -106,6 +106,7 @@ traction = {{y = "1e3*min(t/0.008, 1)"}}
         "gradient = 'quadratic'",
         f"""
 title = "a neck between two notches, nowhere parallel"
+scheme = "corrected"
 duration = 0.01
 material = {RUBBER}
 [body.sheet]
@@ -148,6 +149,24 @@ acceleration = {y = -9.81}
         "gradient = 'quadratic', which needs 3",
         f"""
 title = "a steel ruler that swings, two particles thick"
+scheme = "corrected"
+duration = 0.1
+material = {STEEL}
+[body.ruler]
+shape = {{type = "box", lengths = [0.2, 0.01]}}
+spacing = 0.005
+[[boundary]]
+type = "clamp"
+where = "left"
+[[initial]]
+velocity = {{y = "0.5*(X/0.2)**2"}}
+""",
+    ),
+    Flawed(
+        "few-across",
+        "spacing = 0.00333",
+        f"""
+title = "a steel ruler of the recommended scheme, two spacings thick"
 duration = 0.1
 material = {STEEL}
 [body.ruler]
@@ -165,6 +184,7 @@ velocity = {{y = "0.5*(X/0.2)**2"}}
         "gradient = 'quadratic'",
         f"""
 title = "a thin ligament beside a hole"
+scheme = "corrected"
 duration = 0.01
 material = {RUBBER}
 [body.sheet]
@@ -209,6 +229,7 @@ traction = {{x = "2e4*min(t/0.01, 1)"}}
         "cover = 2.6, or add [[effect]] 'hourglass-control'",
         """
 title = "a spline as wide as the default of another kernel"
+scheme = "corrected"
 duration = 1.0
 statics = {}
 [body.bar]
@@ -256,7 +277,7 @@ traction = {{y = "-2e4*min(t/0.005, 1)"}}
     ),
     Flawed(
         "half-supports",
-        "ghosts = 4",
+        "ghosts = 3",
         """
 title = "a quarter of a sheet with a hole"
 duration = 1.0
@@ -290,6 +311,7 @@ traction = {x = 1000.0}
         "hourglass-control",
         """
 title = "a rubber bearing that is sheared"
+scheme = "corrected"
 duration = 0.05
 [material]
 type = "neo-hookean"
@@ -443,7 +465,7 @@ type = "clamp"
 where = "table and Y < 0.01"
 [[initial]]
 where = "block"
-displacement = {{y = -0.0001}}
+displacement = {{y = -0.0005}}
 [[effect]]
 type = "contact"
 """,
@@ -997,6 +1019,23 @@ where = "bottom"
 velocity = {x = "10*Y"}
 [[effect]]
 type = "hourglass-control"
+""",
+    """
+title = "a rubber column thrown to the side, by the recommended scheme"
+duration = 0.5
+[material]
+type = "neo-hookean"
+youngs_modulus = 17e6
+poissons_ratio = 0.3
+density = 1100.0
+[body.column]
+shape = {type = "box", lengths = [1.0, 3.0]}
+spacing = 0.125
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[initial]]
+velocity = {x = "10*Y"}
 """,
     f"""
 title = "two blocks far apart, each held"

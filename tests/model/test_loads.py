@@ -24,6 +24,7 @@ LOWER = {"type": "box", "lengths": [1.0, 0.8], "origin": [2.0, 0.0]}
 def scene(spacing: float = 0.1, shape: Mapping[str, Any] = SQUARE, **body: Any) -> SceneBuilder:
     return (
         Simulation.builder()
+        .scheme("corrected")  # cells, whose faces can be counted
         .body("one", shape=shape, spacing=spacing, **body)
         .kernel("modified-mollifier", cover=3.0)
         .material("neo-hookean", **SOFT)

@@ -114,7 +114,7 @@ def fitted_volumes(
     near = shape.signed_distance(positions) > -depth
     points, weights = _quadrature(discretisation, shape, spacing, depth + reach)
     grid = _lattice_of(discretisation, shape, spacing, positions)
-    integrated = Fit(positions, spacing, grid).positive_integrals(points, weights)
+    integrated = Fit(positions, spacing, grid).positive_integrals(points, weights, near)
     return with_moments(positions, np.where(near, integrated, volumes), near, shape, spacing)
 
 

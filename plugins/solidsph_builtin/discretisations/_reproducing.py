@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
-from solidsph.maths.arrays import Array, Indices
+from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph_builtin.discretisations._grid import Grid
 from solidsph_builtin.discretisations._surroundings import Surroundings
 
@@ -72,17 +72,17 @@ class Fit:
         weights (m, k)."""
         return self._integrals(points, weights, np.full(len(points), self._rule.degree))
 
-    def positive_integrals(self, points: Array, weights: Array) -> Array:
-        """The same with one weight for each point, (m,), and positive, (n,).
+    def positive_integrals(self, points: Array, weights: Array, wanted: Mask) -> Array:
+        """The same with one weight for each point, (m,), and positive where `wanted`, (n,).
 
-        Where a fit of the second degree would give a particle no positive integral, the points
+        Other particles may have functions that the points cover in part only. Where a fit of the second degree would give a particle no positive integral, the points
         around it get fits of lower degree.
         """
         degree = np.full(len(points), self._rule.degree)
         weights = weights[:, None]
         result = self._integrals(points, weights, degree)
         for lower in (1, 0):
-            poor = np.flatnonzero(result[:, 0] <= 0.0)
+            poor = np.flatnonzero(wanted & (result[:, 0] <= 0.0))
             if not poor.size:
                 break
             close = cKDTree(points).query_ball_point(self.particles[poor], REACH * self.spacing)

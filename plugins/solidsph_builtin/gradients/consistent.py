@@ -125,8 +125,8 @@ class Consistent(Gradient):
         degree = self.exact_degree
         missing[:, 0] = _possible(missing[:, 0], particles.positions, surface, degree)
         active = _active(missing, found)
-        if particles.dimension == 1:
-            active[:] = True  # what the sums at one end lack, only those at the other can balance
+        if not active.any():
+            return inner  # nothing is missing
         V = particles.volumes
         if missing.shape[0] * missing.shape[1] <= _FACTORISED[particles.dimension]:
             change = _Change.of(found, slopes, particles.cells, V, active, degree, length)

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from solidsph.advice.advice import Advice
 from solidsph.advice.scene_facts import SceneFacts
 from solidsph.interfaces.boundary import BoundaryHandler
-from solidsph.maths.arrays import Mask
+from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.regions import AXES, Where, names_used
 from solidsph.model.surface import Pieces
 from solidsph.registry.construct import construct
@@ -20,6 +20,10 @@ _SHOWN = 6  # faces of one load
 # Cosine from the normal, and distance over that of particles of two bodies that touch, within which
 # a particle of another body covers a piece of surface.
 _AHEAD, _TOUCHING = 0.75, 1.5
+
+# In spacings: particles closer than this are in one place. And the distance of a unit normal from
+# one turned round, below which the two are opposite.
+_SAME, _OPPOSITE = 1e-3, 0.5
 
 
 def several_faces(facts: SceneFacts) -> Iterator[Advice]:
@@ -110,9 +114,25 @@ def _covered(pieces: Pieces, chosen: Mask) -> bool:
         ahead = np.einsum("ki,ki->k", X[others][near] - X[owners], normals)
         facing = ahead > _AHEAD * gaps * np.linalg.norm(normals, axis=1)
         touching = gaps < _TOUCHING * 0.5 * (spacings[owners] + spacings[others][near])
-        if np.any(facing & touching):
+        if np.any(facing & touching) or _against(pieces, own, pieces.bodies != k):
             return True
     return False
+
+
+def _against(pieces: Pieces, own: Indices, others: Mask) -> bool:
+    """True if a piece of `own` and one of `others` (m,), opposite to it, have particles in one
+    place, as on faces of two bodies that touch and have particles on the surface."""
+    rest = np.flatnonzero(others & (pieces.areas > 0.0))
+    if not rest.size:
+        return False
+    X = pieces.particles.positions
+    size = _SAME * pieces.particles.spacings.min()
+
+    def signs(numbers: Indices, side: float) -> Array:
+        normals = pieces.area_vectors[numbers] / pieces.areas[numbers, None]
+        return np.hstack([X[pieces.owners[numbers]] / size, side * normals])
+
+    return bool((cKDTree(signs(rest, -1.0)).query(signs(own, 1.0))[0] < _OPPOSITE).any())
 
 
 def _remedy(where: Where, faces: list[str], names: frozenset[str]) -> str:

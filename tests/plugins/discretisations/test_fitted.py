@@ -18,6 +18,7 @@ from solidsph_builtin.shapes.ball import Ball
 from solidsph_builtin.shapes.box import Box
 from solidsph_builtin.shapes.difference import Difference
 from solidsph_builtin.shapes.disc import Disc
+from solidsph_builtin.shapes.interval import Interval
 from solidsph_builtin.shapes.polygon import Polygon
 
 TAPERED = Polygon(vertices=((0.0, 0.0), (4.8, 4.4), (4.8, 6.0), (0.0, 4.4)))
@@ -38,6 +39,15 @@ def test_a_box_has_the_particles_of_a_lattice_to_the_last_bit(
     assert found.tags.keys() == lattice.tags.keys()
     for tag in found.tags:
         assert np.array_equal(found.tags[tag], lattice.tags[tag])
+
+
+@given(cells=st.integers(8, 200), length=st.floats(0.1, 10.0))
+def test_volumes_of_a_bar_are_those_of_gregorys_rule(cells: int, length: float) -> None:
+    """3/8, 7/6, 23/24, 1 from either end, however many cells there are: to rounding."""
+    found = Fitted().particles(Interval(length=length), length / cells)
+    expected = np.ones(cells + 1)
+    expected[:3] = expected[:-4:-1] = 3.0 / 8.0, 7.0 / 6.0, 23.0 / 24.0
+    assert found.volumes * (cells / length) == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize(
