@@ -37,9 +37,9 @@ PRODUCTS = 3
 # products of squares, the corner of a box in space would have 0.006 of a cell, in place of 0.042.
 IN_LATTICE = Rule(radius=2.0, degree=PRODUCTS, determined=1e-8)
 
-# In bodies with scattered particles a fit by fewer of them serves better: with a radius of 2 the peak
-# stress at a hole is off by 13 % with 20 particles a side, with 1.8 by 3 %. Beside a surface that is
-# a linear fit, and on a plane one the rule 5/12, 13/12, 1.
+# In bodies with scattered particles a fit by fewer of them serves better: with a radius of 2 the
+# peak stress at a hole is off by 13 % with 20 particles a side, with 1.8 by 3 %. Beside a surface
+# that is a linear fit, and on a plane one the rule 5/12, 13/12, 1.
 SCATTERED = Rule(radius=1.8, degree=2, determined=1e-4)
 
 REACH = max(IN_LATTICE.radius, SCATTERED.radius)
@@ -75,8 +75,9 @@ class Fit:
     def positive_integrals(self, points: Array, weights: Array, wanted: Mask) -> Array:
         """The same with one weight for each point, (m,), and positive where `wanted`, (n,).
 
-        Other particles may have functions that the points cover in part only. Where a fit of the second degree would give a particle no positive integral, the points
-        around it get fits of lower degree.
+        Others, whose functions the points may cover in part only, get any value. Where a fit of the
+        second degree would give a particle no positive integral, the points around it get fits of
+        lower degree.
         """
         degree = np.full(len(points), self._rule.degree)
         weights = weights[:, None]
