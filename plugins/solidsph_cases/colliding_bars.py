@@ -103,7 +103,9 @@ class CollidingBars(Case):
                 if self.dimension == 1
                 else box(LENGTH, self.width, origin=[start, 0.0])
             )
-            builder = builder.body(name, shape=shape, spacing=LENGTH / self.particles)
+            builder = builder.body(
+                name, shape=shape, spacing=LENGTH / self.particles, discretisation="lattice"
+            )
         if self.dimension == 2:
             builder = builder.boundary("clamp", where="all", axes=["y"])
         builder = (

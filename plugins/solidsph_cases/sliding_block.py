@@ -76,8 +76,9 @@ class SlidingBlock(Case):
             "y": f"-{GRAVITY * cos(angle)!r}*{grows}",
         }
         title = f"{self.title} of {degrees:g} degrees"
+        shape, spacing = box(LENGTH, HEIGHT), LENGTH / self.along
         builder = (
-            solid(title, "block", box(LENGTH, HEIGHT), LENGTH / self.along, SOFT)
+            solid(title, "block", shape, spacing, SOFT, discretisation="lattice")
             .effect("body-force", acceleration=weight, label="gravity")
             .effect(
                 "rigid-wall",

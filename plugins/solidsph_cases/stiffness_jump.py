@@ -86,6 +86,7 @@ class StiffnessJump(Case):
                 name,
                 shape=box(LENGTH, self.across * LENGTH / self.along, origin=[start, 0.0]),
                 spacing=spacing,
+                discretisation="lattice",
                 material=describe("materials", material),
             )
         half = 0.5 * LENGTH / self.along

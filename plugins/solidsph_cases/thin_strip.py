@@ -61,7 +61,8 @@ class ThinStrip(Case):
     def scenes(self) -> Mapping[str, Scene]:
         c, length = SOFT.wave_speed, SPACING * self.along
         bump = f"exp(-(X - {0.5 * length!r})**2/{(0.15 * length) ** 2!r})"
-        builder = solid(self.title, "strip", box(length, SPACING * self.across), SPACING, SOFT)
+        shape = box(length, SPACING * self.across)
+        builder = solid(self.title, "strip", shape, SPACING, SOFT, discretisation="lattice")
         builder = builder.initial(velocity={"y": f"{self.speed * c!r}*{bump}"})
         return {"strip": in_motion(builder, self, self.transits * length / c, 200).scene()}
 

@@ -24,6 +24,7 @@ LENGTH, WIDTH = 10.0, 0.1  # of the bar, and of the pulse's standard deviation [
 def bar(particles: int = 1500) -> SceneBuilder:
     return (
         Simulation.builder()
+        .scheme("corrected")
         .body("bar", shape={"type": "interval", "length": LENGTH}, spacing=LENGTH / particles)
         .kernel("cubic-spline", cover=2.6)
         .material("linear-elastic", **UNIT)
@@ -93,6 +94,7 @@ def strip(engine: str = "matrix") -> SceneBuilder:
     """A strip whose left end is pushed, with loads of every kind that can sleep."""
     return (
         Simulation.builder()
+        .scheme("corrected")  # rows of particles that slabs can count
         .body("strip", shape={"type": "box", "lengths": [4.0, 0.3]}, spacing=0.05)
         .kernel("cubic-spline", cover=1.8)
         .material("neo-hookean", **UNIT)

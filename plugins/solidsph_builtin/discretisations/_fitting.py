@@ -36,6 +36,10 @@ _ON_BOUNDARY = 1e-6
 # Moments that differ by less, as parts of the volume, are those of the body.
 _ROUNDING = 1e-12
 
+# Part of its volume that no particle loses for the sake of the moments; where one were to lose much
+# more, the surface is not that of the body.
+_MOST_LOST, _ABSURD = 0.5, 2.0
+
 # Gauss's rule with two points, in cells from the middle.
 _GAUSS = 0.5 / sqrt(3.0)
 
@@ -249,7 +253,12 @@ def with_moments(
     along = np.linalg.lstsq(gram, basis[:, : 1 + d].T @ (free[:, None] * basis[:, 1 + d :]))[0]
     rest = basis[:, 1 + d :] - basis[:, : 1 + d] @ along
     left = missing[1 + d :] - change @ basis[:, 1 + d :]
-    result: Array = volumes + change + free * _change(rest, free, left)
+    change += free * _change(rest, free, left)
+    lost = float(np.max(-change / volumes))
+    if _MOST_LOST < lost < _ABSURD:
+        # In a body of few particles the change is too much for one of them, and is made in part.
+        change *= _MOST_LOST / lost
+    result: Array = volumes + change
     return result
 
 

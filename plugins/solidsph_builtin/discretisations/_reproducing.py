@@ -134,6 +134,7 @@ class Fit:
         for start in range(0, len(points), _POINTS_AT_ONCE * count):
             some = slice(start, start + _POINTS_AT_ONCE * count)
             there = lattice.numbers[lattice.home(points[some])[:, None] + steps[kind[some]]]
+            there = np.maximum(there, 0)  # where there is no particle, the value is zero
             result += self._sums(values[kind[some]], there, weights[some])
 
     def _sums(self, values: Array, near: Indices, weights: Array) -> Array:

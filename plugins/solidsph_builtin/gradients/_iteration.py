@@ -26,10 +26,10 @@ _SMALLEST = 1e-300
 # the sums without their first moments.
 _LEFT, _LEFT_OF_SUMS = 1e-2, 1e-7
 
-# Steps, at least and at most, and pairs times steps: half a minute in space. There sixty steps
+# Steps, at least and at most, and pairs times steps: some seconds in space. There sixty steps
 # leave some hundredths, and the torque of a bar is as exact as with none left, to a thousandth.
-_FEWEST, _MOST = 60, 2000
-_PAIR_STEPS = 2e8
+_FEWEST, _MOST = 40, 2000
+_PAIR_STEPS = 5e7
 
 
 def solved(

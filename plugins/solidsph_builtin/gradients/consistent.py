@@ -69,7 +69,9 @@ class Consistent(Gradient):
     with a_p such that polynomials up to the degree of the gradient, at most the second, keep what
     their gradients, and l and L from the sparse linear system of the sums: the least change, with
     each weight's change divided by its kernel weight w. Weights change only where sums are wrong,
-    and up to two supports from there: deep inside a lattice they stay as they were.
+    and up to two supports from there: deep inside a lattice they stay as they were. Those of a bar
+    all change: sums that are exact to the second degree at both ends need the fourth order between
+    them (Strand 1994).
 
     The system is solved once, when the body is built: by a factorisation if it is small, else by
     conjugate gradients over the fixed pairs, to a hundredth of what was missing or for half a

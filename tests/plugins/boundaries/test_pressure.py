@@ -20,7 +20,7 @@ def block(**pressure: object) -> SceneBuilder:
             "block",
             shape={"type": "box", "lengths": [1.0, 0.8]},
             spacing=0.1,
-            discretisation={"type": "lattice", "on_boundary": True},
+            discretisation="fitted",
         )
         .kernel("cubic-spline", cover=2.6)
         .formulation("total-lagrangian", gradient="consistent")

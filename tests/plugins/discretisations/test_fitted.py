@@ -26,15 +26,15 @@ QUARTER = Difference(Box(lengths=(1.0, 1.0)), [Disc(radius=0.31)])
 
 
 @given(
-    sides=st.lists(st.floats(0.5, 2.0), min_size=1, max_size=3),
+    sides=st.lists(st.floats(0.5, 1.5), min_size=1, max_size=3),
     origin=st.floats(-3.0, 3.0),
 )
 def test_a_box_has_the_particles_of_a_lattice_to_the_last_bit(
     sides: list[float], origin: float
 ) -> None:
     box = Box(lengths=sides, origin=[origin] * len(sides))
-    found = Fitted().particles(box, 0.2)
-    lattice = Lattice(on_boundary=True).particles(box, 0.2)
+    found = Fitted().particles(box, 0.25)
+    lattice = Lattice(on_boundary=True).particles(box, 0.25)
     assert np.array_equal(found.positions, lattice.positions)
     assert found.tags.keys() == lattice.tags.keys()
     for tag in found.tags:

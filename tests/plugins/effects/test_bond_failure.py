@@ -42,6 +42,7 @@ def bar(particles: int) -> SceneBuilder:
 
     return (
         Simulation.builder()
+        .scheme("corrected")  # the gradient that failed bonds can correct anew
         .body("bar", shape={"type": "interval", "length": 1.0}, spacing=1.0 / particles)
         .kernel("cubic-spline", cover=2.6)
         .material(MATERIAL)
@@ -99,6 +100,7 @@ def sheet() -> SceneBuilder:
     """A sheet with a notch half way up its left side, pulled up and down."""
     return (
         Simulation.builder()
+        .scheme("corrected")
         .body(
             "sheet",
             shape={

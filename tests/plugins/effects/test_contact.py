@@ -233,6 +233,7 @@ def test_a_body_that_folds_touches_itself() -> None:
     def closed(itself: list[str]) -> tuple[float, float]:
         builder = (
             Simulation.builder()
+            .scheme("corrected")  # rows half a spacing deep, which touch at one spacing
             .body("fork", shape=arms, spacing=0.025)
             .kernel("cubic-spline", cover=2.2)
             .material("neo-hookean", **SOFT)

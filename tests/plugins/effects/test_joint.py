@@ -39,6 +39,7 @@ def bars(
     first, second = lengths
     return (
         Simulation.builder()
+        .scheme("corrected")  # the springs of a joint stand for half a spacing of each body
         .body(
             "left-bar",
             shape={"type": "interval", "length": first},

@@ -21,7 +21,7 @@ def bar(particles: int = 81) -> SceneBuilder:
             "bar",
             shape={"type": "interval", "length": 1.0},
             spacing=1.0 / (particles - 1),
-            discretisation={"type": "lattice", "on_boundary": True},
+            discretisation="fitted",
         )
         .kernel("cubic-spline", cover=2.6)
         .formulation("total-lagrangian", gradient="consistent")

@@ -146,7 +146,7 @@ def test_a_wave_decays_by_the_complex_modulus() -> None:
             "bar",
             shape={"type": "interval", "length": 1.0},
             spacing=0.0125,
-            discretisation={"type": "lattice", "on_boundary": True},
+            discretisation="fitted",
         )
         .kernel("cubic-spline", cover=2.6)
         .formulation("total-lagrangian", gradient="consistent")
