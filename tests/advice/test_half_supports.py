@@ -22,15 +22,19 @@ GHOSTS = {"ghosts": 4, "ghost_faces": ["left", "bottom"]}
 def sheet(discretisation: Any, *, gradient: str = "corrected", whole: bool = False) -> SceneBuilder:
     """A sheet with a hole, pulled along x: a quarter, or the whole."""
     side, low = (2.0, -1.0) if whole else (1.0, 0.0)
-    builder = Simulation.builder().body(
-        "sheet",
-        shape={
-            "type": "difference",
-            "of": {"type": "box", "lengths": [side, side], "origin": [low, low]},
-            "minus": {"type": "disc", "radius": RADIUS},
-        },
-        spacing=1.0 / ACROSS,
-        discretisation=discretisation,
+    builder = (
+        Simulation.builder()
+        .scheme("corrected")
+        .body(
+            "sheet",
+            shape={
+                "type": "difference",
+                "of": {"type": "box", "lengths": [side, side], "origin": [low, low]},
+                "minus": {"type": "disc", "radius": RADIUS},
+            },
+            spacing=1.0 / ACROSS,
+            discretisation=discretisation,
+        )
     )
     builder.material("linear-elastic", youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
     builder.formulation("total-lagrangian", gradient=gradient)

@@ -107,7 +107,7 @@ def test_writing_a_scene_is_told(said: Any) -> None:
 
 def test_the_column_by_the_command(said: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(step_size, "safe_step", lambda *scene: None)  # the CFL step is too long
-    long_steps = column().integrator("velocity-verlet", time_step_factor=0.5)
+    long_steps = column().scheme("corrected").integrator("velocity-verlet", time_step_factor=0.5)
     code, told, _ = said("run", written(long_steps.scene().to_toml()))
     assert (code, told["outcome"]) == (1, "unsound")
     assert "critical step" in told["error"]

@@ -53,6 +53,10 @@ SHAPES: Mapping[int, Sequence[tuple[Mapping[str, Any], float]]] = {
 }
 """Bodies and spacings [m] by dimension: 60 to 300 particles."""
 
+# Its forces are no derivative of an energy: beside a surface and among scattered particles some
+# motions grow at any step, by a rate that does not depend on it.
+_UNSTABLE = ("plain",)
+
 # Those that act between bodies, and those whose examples suit another body than these.
 _BETWEEN = ("contact", "joint")
 _OWN_VALUES: Mapping[str, Mapping[str, Any]] = {
@@ -142,7 +146,7 @@ def drawn(seed: int) -> Words:
         kernel=rng.choice(registry.names("kernels")),
         cover=rng.randint(15, 55) / 10.0,
         gradient=rng.choice(registry.names("gradients")),
-        divergence=rng.choice(registry.names("divergences")),
+        divergence=rng.choice([n for n in registry.names("divergences") if n not in _UNSTABLE]),
         material=_material(rng),
         effects=[_example("effects", name) for name in rng.sample(effects, rng.randint(0, 2))],
         integrator=rng.choice(registry.names("integrators")),

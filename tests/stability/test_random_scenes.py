@@ -60,6 +60,17 @@ def test_a_step_beyond_the_critical_one_is_not() -> None:
     assert outcome(plain(), time_step_factor=4.0) != BOUNDED
 
 
+@pytest.mark.parametrize("time_step_factor", [0.7, 0.1])
+def test_the_plain_divergence_grows_at_any_step(time_step_factor: float) -> None:
+    """Why no scene is drawn with it: its forces are no derivative of an energy. Broken once to see
+    it: the same scene with the variational one is bounded."""
+    scattered = {"type": "jittered-lattice", "amplitude": 0.3, "seed": 1}
+    scene = attrs.evolve(plain(), discretisation=scattered, speed=0.03)
+    assert outcome(scene, time_step_factor=time_step_factor) == BOUNDED
+    grown = attrs.evolve(scene, divergence="plain")
+    assert outcome(grown, time_step_factor=time_step_factor) not in (BOUNDED, REFUSED)
+
+
 def test_parts_that_do_not_fit_are_refused() -> None:
     assert outcome(attrs.evolve(plain(), cover=0.5)) == REFUSED
 

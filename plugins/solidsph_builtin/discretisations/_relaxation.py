@@ -62,7 +62,8 @@ def relaxed(
             axis=1,
         )
         length = np.linalg.norm(way, axis=1, keepdims=True)
-        way *= _STEP * spacing / np.maximum(length, 1.0)
+        # Without any pair these are integers.
+        way = way * (_STEP * spacing / np.maximum(length, 1.0))
         x[moves] = onto(x[moves] + way[moves])
     X[some] = x
     return X

@@ -75,7 +75,7 @@ class Fit:
     def positive_integrals(self, points: Array, weights: Array, wanted: Mask) -> Array:
         """The same with one weight for each point, (m,), and positive where `wanted`, (n,).
 
-        Other particles may have functions that the points cover in part only. Where a fit of the
+        Others, whose functions the points may cover in part only, get any value. Where a fit of the
         second degree would give a particle no positive integral, the points around it get fits of
         lower degree.
         """

@@ -132,8 +132,8 @@ def _against(pieces: Pieces, own: Indices, others: Mask) -> bool:
         normals = pieces.area_vectors[numbers] / pieces.areas[numbers, None]
         return np.hstack([X[pieces.owners[numbers]] / size, side * normals])
 
-    gaps = np.asarray(cKDTree(signs(rest, -1.0)).query(signs(own, 1.0))[0])
-    return bool((gaps < _OPPOSITE).any())
+    gaps = cKDTree(signs(rest, -1.0)).query(signs(own, 1.0))[0]
+    return bool(np.any(gaps < _OPPOSITE))
 
 
 def _remedy(where: Where, faces: list[str], names: frozenset[str]) -> str:
