@@ -33,6 +33,7 @@ def column(**control: Any) -> SceneBuilder:
     step, and it gets stiffer as it bends."""
     return (
         Simulation.builder()
+        .scheme("corrected")
         .body("column", shape={"type": "box", "lengths": [1.0, 1.0, 6.0]}, spacing=0.25)
         .material("neo-hookean", youngs_modulus=17e6, poissons_ratio=0.45, density=1100.0)
         .formulation("total-lagrangian", gradient="quadratic")

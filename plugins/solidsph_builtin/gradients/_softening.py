@@ -9,8 +9,9 @@ from solidsph.maths.arrays import Array, Mask
 # How far the sums of surface particles may miss their area, relative to the change of the weights:
 # sampled areas may disagree with the volumes, and then no weights are exact. It must be small: a
 # multiplier that varies over n particles costs n^-6 of one that alternates, so that with 1e-6 the
-# loads on a side of 48 particles had errors large enough to spoil the second order.
-_AT_SURFACE = 1e-9
+# loads on a side of 48 particles had errors large enough to spoil the second order, and
+# with 1e-9 a uniform pressure on a block was balanced to 1.4e-6 only.
+_AT_SURFACE = 1e-11
 
 # The same for the first moments of all sums. A part of them is beyond reach, and others cost more
 # change than they are worth; of what was missing, half a per cent is left.
