@@ -12,10 +12,12 @@ SOFT = {"youngs_modulus": 1e6, "poissons_ratio": 0.3, "density": 1000.0}
 
 
 def box(d: int, cells: int = 6, **body: Any) -> SceneBuilder:
-    """A box of unit length with `cells` particles along each axis, without boundaries."""
+    """A box of unit length with `cells` particles along each axis, in the middles of their cells,
+    without boundaries."""
     shape = {"type": "interval", "length": 1.0} if d == 1 else {"type": "box", "lengths": [1.0] * d}
     return (
         Simulation.builder()
+        .scheme("corrected")
         .body("block", shape=shape, spacing=1.0 / cells, **body)
         .kernel("modified-mollifier", cover=3.0)
         .material("neo-hookean", **SOFT)
