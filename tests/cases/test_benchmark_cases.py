@@ -54,15 +54,17 @@ def test_csm1_approaches_the_reference_with_the_order_of_its_corners(
     clamp: str, tmp_path: Path
 ) -> None:
     coarse, fine = (
-        run_case(Csm1(clamp=clamp, across=across, tolerance=0.02, **QUADRATIC), tmp_path)
-        for across in (5, 9)
+        run_case(Csm1(clamp=clamp, across=across, tolerance=0.01, **QUADRATIC), tmp_path)
+        for across in (9, 17)
     )
     assert coarse.passed
+    # The corners of the clamp are singular: halving the spacing halves the error. Where the
+    # surface is curved and particles beside it stand irregularly, errors of a higher order
+    # outweigh that until the beam is finer.
+    most = {"straight": 2.3, "arc": 4.0}[clamp]
     for quantity, error in errors(fine).items():
-        # The corners of the clamp are singular: halving the spacing halves the error or, since
-        # the stiffer interior converges faster, does a little better.
-        assert 0.0 < error < 0.01
-        assert 1.7 < errors(coarse)[quantity] / error < 2.3
+        assert 0.0 < error < 0.005
+        assert 1.7 < errors(coarse)[quantity] / error < most
     check_pictures(fine)
 
 
@@ -80,11 +82,10 @@ def test_csm1_with_the_consistent_gradient(clamp: str, tmp_path: Path) -> None:
 
 def test_csm1_at_the_tip_between_two_particles(tmp_path: Path) -> None:
     """With an even number across, the tip is no particle; the error lies between the others."""
-    found = [
-        errors(run_case(Csm1(across=n, tolerance=0.1, **QUADRATIC), tmp_path))["tip: u_y"]
-        for n in (5, 6, 7)
-    ]
-    assert found[0] > found[1] > found[2]
+    found = [errors(run_case(Csm1("straight", across=n), tmp_path)) for n in (5, 6, 7)]
+    for quantity in ("tip: u_x", "tip: u_y"):
+        errors_of_it = [abs(one[quantity]) for one in found]
+        assert errors_of_it[0] > errors_of_it[1] > errors_of_it[2]
 
 
 def test_csm1_measures_what_a_softer_scheme_does_wrong(tmp_path: Path) -> None:

@@ -43,6 +43,7 @@ def bar(engine: str = "matrix", formulation: str = "total-lagrangian"):
     """Ten particles in a row; within 2.1 spacings there are two on either side."""
     return (
         Simulation.builder()
+        .scheme("corrected")
         .body("bar", shape={"type": "interval", "length": 1.0}, spacing=0.1)
         .kernel("modified-mollifier", cover=2.1)
         .material("neo-hookean", **SOFT)
@@ -61,6 +62,7 @@ def block(cells: int, d: int, cover: float = 2.6, **body):
     shape = {"type": "interval", "length": 1.0} if d == 1 else {"type": "box", "lengths": [1.0] * d}
     return (
         Simulation.builder()
+        .scheme("corrected")
         .body("block", shape=shape, spacing=1.0 / cells, **body)
         .kernel("cubic-spline", cover=cover)
         .material("neo-hookean", **SOFT)

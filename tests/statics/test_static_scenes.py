@@ -125,7 +125,7 @@ def test_the_command_line_finds_explains_and_draws_it(tmp_path: Path) -> None:
     facts = json.loads(solidsph("explain", "pull.toml", "--json", cwd=tmp_path).stdout)
     (scene,) = facts["scenes"].values()
     numbers = {row["quantity"]: row["value"] for row in scene["numbers"]}
-    assert numbers["free displacements"] == 2 * 28  # of 32 particles, four are clamped
+    assert numbers["free displacements"] == 2 * 40  # of 45 particles, five are clamped
     assert numbers["load steps"] == 3
     assert "time step [s]" not in numbers
     cost = {row["quantity"]: row["value"] for row in scene["cost"]}

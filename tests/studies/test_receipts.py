@@ -28,6 +28,7 @@ from solidsph.studies.receipts import (
 from tests.commands.test_cli import solidsph
 
 DAMPED = """
+scheme = "corrected"
 duration = 0.2
 outputs = 10
 [body.block]
@@ -57,6 +58,7 @@ label = "nothing"
 
 # A bar of 50 particles that meets a wall.
 BLOW = """
+scheme = "corrected"
 duration = 4e-4
 outputs = 10
 [body.bar]
