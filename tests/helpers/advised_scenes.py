@@ -207,6 +207,7 @@ traction = {{x = "1e4*min(t/0.005, 1)"}}
         "cover = 2.",
         f"""
 title = "a kernel cut too close"
+scheme = "corrected"
 duration = 0.02
 material = {RUBBER}
 [body.block]
@@ -465,7 +466,7 @@ type = "clamp"
 where = "table and Y < 0.01"
 [[initial]]
 where = "block"
-displacement = {{y = -0.0005}}
+displacement = {{y = -0.0003}}
 [[effect]]
 type = "contact"
 """,
@@ -787,6 +788,7 @@ traction = {y = 1e-3}
 """,
     f"""
 title = "a sheet with corners of 20 degrees, 0.36 wide"
+scheme = "corrected"
 duration = 0.01
 material = {RUBBER}
 [body.sheet]

@@ -340,7 +340,7 @@ def test_a_bushing_whose_inner_rim_is_turned_tells_its_torque() -> None:
         scene(
             0.05,
             {"type": "annulus", "inner_radius": a, "outer_radius": b},
-            discretisation="conforming-lattice",
+            discretisation="fitted",
         )
         .kernel("cubic-spline", cover=2.6)
         .material("linear-elastic", youngs_modulus=E, poissons_ratio=nu, density=1000.0)
@@ -357,7 +357,7 @@ def test_a_bushing_whose_inner_rim_is_turned_tells_its_torque() -> None:
     )
     report = reported(made)
     moment = 4.0 * np.pi * E / (2.0 * (1.0 + nu)) * B
-    # Ten particles across the wall, on its rims; 1.2 % with five.
+    # Ten spacings across the wall: 0.06 % off; 1.5 % with the volumes of a conforming lattice.
     assert report["shaft reaction moment z [N m]"] == pytest.approx(moment, rel=0.01)
     assert report["housing reaction moment z [N m]"] == pytest.approx(
         -report["shaft reaction moment z [N m]"], rel=1e-6

@@ -30,6 +30,7 @@ HOLE = {
 def built(shape: Any, cells: int = 10, **body: Any) -> Simulation:
     return (
         Simulation.builder()
+        .scheme("corrected")  # cells: no row of particles along the middle
         .body("block", shape=shape, spacing=1.0 / cells, **body)
         .kernel("modified-mollifier", cover=3.0)
         .material("neo-hookean", **SOFT)
