@@ -297,12 +297,16 @@ def _solved(matrix: csr_array, missing: Array, surface: Mask, active: Mask) -> A
     size = float(np.median(diagonal[0]))
     soft = softening(diagonal.T, surface[some]).T.ravel()
     softened = csr_array(matrix + diags_array(soft))
-    factors: Any = splu(
-        csc_array(softened + diags_array(np.full(unknown.size, _REGULAR * size))),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
+    regular = csc_array(softened + diags_array(np.full(unknown.size, _REGULAR * size)))
+    try:
+        factors: Any = splu(
+            regular,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError:  # exactly singular: bodies of a particle or two have nothing to change
+        raise _unsolved(1.0) from None
     wanted = missing[some].transpose(1, 0, 2).reshape(unknown.size, d)
     multipliers, left, unsolved = np.zeros_like(wanted), wanted, 1.0
     for _ in range(_REFINEMENTS):
@@ -312,13 +316,17 @@ def _solved(matrix: csr_array, missing: Array, surface: Mask, active: Mask) -> A
         if unsolved <= _SOLVED or unsolved > 0.9 * before:
             break
     if not unsolved <= _USELESS:
-        raise BuildError(
-            [
-                "gradient 'consistent': no change of the weights satisfies the sums (a part of "
-                f"{unsolved:.3g} of what is missing is left); a larger cover gives it more weights "
-                "to change, or use the wrapped gradient by itself"
-            ]
-        )
+        raise _unsolved(unsolved)
     result = np.zeros_like(missing)
     result[some] = multipliers.reshape(kinds, some.size, d).transpose(1, 0, 2)
     return result
+
+
+def _unsolved(left: float) -> BuildError:
+    return BuildError(
+        [
+            "gradient 'consistent': no change of the weights satisfies the sums (a part of "
+            f"{left:.3g} of what is missing is left); a larger cover or a finer spacing gives it "
+            "more weights to change, or take another gradient, such as 'corrected'"
+        ]
+    )
