@@ -80,7 +80,7 @@ class BondFailure(Effect):
             gradient = body.formulation.gradient
             if not isinstance(gradient, PointwiseGradient):
                 raise SceneError(
-                    f"bond-failure: gradient {type(gradient).__name__} of body {body.name!r} is "
+                    f"bond-failure: the gradient of body {body.name!r} is "
                     "not formed particle by particle, so that what failed bonds leave cannot be "
                     "corrected anew; use 'corrected'"
                 )

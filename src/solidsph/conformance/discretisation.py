@@ -236,9 +236,7 @@ def _owned(face: Face, tagged: Indices) -> bool:
     """Whether all tagged particles own some of a face, and others at most a hundredth of it."""
     sizes = np.abs(face.areas)
     others = ~np.isin(face.particles, tagged)
-    return bool(
-        np.isin(tagged, face.particles).all() and sizes[others].sum() <= 0.01 * sizes.sum()
-    )
+    return bool(np.isin(tagged, face.particles).all() and sizes[others].sum() <= 0.01 * sizes.sum())
 
 
 @KIT.errors(_ON_BOUNDARY)
