@@ -42,7 +42,10 @@ class Squeeze(Case):
     source = "uniform motion without acceleration; the law in closed form"
     sweep = {"particles": (7, 11, 15), "gradient": ("consistent", "quadratic", "corrected")}
     trials = {
-        "to J = 0.2, 2D": Trial(),
+        "to J = 0.2, 2D": Trial(
+            known="with the sums of linear stresses of 'consistent' particles leave the uniform "
+            "motion below J = 0.28; without them they hold to the end",
+        ),
         "to J = 0.2, 3D": Trial({"dimension": 3, "particles": 6}),
         "to J = 0.2, particles off by 10 %": Trial(
             {"jitter": 0.1},

@@ -120,8 +120,8 @@ def test_ramped_and_damped_it_ends_at_the_equilibrium(
     assert measured(outcome, "that over the same at equilibrium").value == pytest.approx(
         1.0, abs=1e-4
     )
-    # One per cent of discretisation, as above.
-    assert measured(outcome, "mean u_x at the end").value == pytest.approx(EXTENSION, rel=0.01)
+    # It is too stiff by 1.2 %, as in test_sheet_convergence.
+    assert measured(outcome, "mean u_x at the end").value == pytest.approx(EXTENSION, rel=0.0125)
     assert measured(outcome, "distance from (0, a)").value < 1.5
 
 
@@ -132,11 +132,14 @@ def test_a_sheet_that_still_moves_does_not_pass(records: Mapping[str, Record]) -
     assert not found.passed
 
 
-def test_stresses_off_their_references_do_not_pass(outcome: CaseResult) -> None:
-    """Two particles to the radius give 13 MPa of 17: the case says so, rather than passes."""
-    at_rest = measured(outcome, "principal Cauchy stress at (0, a)")
+def test_stresses_off_their_references_do_not_pass(records: Mapping[str, Record]) -> None:
+    """Two particles to the radius give 15.9 MPa of 16.7: a case that asks for more says so."""
+    strict = attrs.evolve(COARSE, peak_tolerance=0.03)
+    (at_rest,) = [
+        m for m in strict.measure(records) if "principal Cauchy stress at (0, a)" in m.quantity
+    ]
     assert at_rest.reference == pytest.approx(1e-6 * PEAK)
-    assert at_rest.verdict.startswith("NOT within 10 %")
+    assert at_rest.verdict.startswith("NOT within 3 %")
     assert not at_rest.passed
 
 
