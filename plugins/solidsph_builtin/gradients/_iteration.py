@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solidsph.maths.arrays import Array, Mask
+from solidsph.maths.arrays import Array
 from solidsph.model.neighbours import Pairs, row_starts
 from solidsph.model.particles import Particles
 from solidsph_builtin.gradients._passes import passes
@@ -36,7 +36,6 @@ def solved(
     pairs: Pairs,
     kernel_gradients: Array,
     particles: Particles,
-    active: Mask,
     degree: int,
     length: float,
     missing: Array,
@@ -47,7 +46,6 @@ def solved(
         pairs: all pairs of the body (m,).
         kernel_gradients: of the pairs, (m, d).
         particles: of the body.
-        active: those between which weights change, (n,).
         degree: of the polynomials whose gradients stay.
         length: unit of the offsets that L is multiplied by [m].
         missing: from the sums, (n, 1 + d, d).
@@ -55,7 +53,7 @@ def solved(
     d, V = particles.dimension, particles.volumes
     moments, diagonal_blocks, product = passes(d, degree)
     close = closeness(kernel_gradients, pairs.distances)
-    kept = active[pairs.rows] & active[pairs.columns] & (close > 0.0)
+    kept = close > 0.0
     sums = (
         row_starts(np.bincount(pairs.rows[kept], minlength=particles.count)),
         pairs.columns[kept].astype(np.int32),
@@ -71,26 +69,22 @@ def solved(
     for face in particles.faces.values():
         surface[face.particles] = True
     diagonal = np.einsum("nii->ni", blocks)
-    soft = softening(diagonal[active], surface[active])
-    diagonal[active] += soft
-    diagonal[~active] = 1.0
-    all_soft = np.zeros(diagonal.shape)
-    all_soft[active] = soft
-    wanted = np.where(active[:, None, None], missing, 0.0)
+    soft = softening(diagonal, surface)
+    diagonal += soft
     steps = int(np.clip(_PAIR_STEPS / np.count_nonzero(kept), _FEWEST, _MOST))
 
     def softened(x: Array) -> Array:
-        result: Array = product(*sums, tests, x) + all_soft[:, :, None] * x
+        result: Array = product(*sums, tests, x) + soft[:, :, None] * x
         return result
 
     def of_sums_alone(x: Array) -> Array:
         return softened(np.concatenate([x, np.zeros_like(x, shape=(len(x), d, d))], axis=1))[:, :1]
 
-    multipliers = _conjugate_gradients(softened, np.linalg.inv(blocks), wanted, _LEFT, steps)
+    multipliers = _conjugate_gradients(softened, np.linalg.inv(blocks), missing, _LEFT, steps)
     # The sums themselves must be right to more digits, for uniform stresses to be in balance.
-    left = (wanted - softened(multipliers))[:, :1]
+    left = (missing - softened(multipliers))[:, :1]
     inverse = 1.0 / blocks[:, :1, :1]
-    part = _LEFT_OF_SUMS * np.abs(wanted).max() / max(np.abs(left).max(), _SMALLEST)
+    part = _LEFT_OF_SUMS * np.abs(missing).max() / max(np.abs(left).max(), _SMALLEST)
     multipliers[:, :1] += _conjugate_gradients(of_sums_alone, inverse, left, part, steps)
     return multipliers
 

@@ -23,10 +23,6 @@ from solidsph_builtin.gradients.quadratic import Quadratic, closeness
 # neighbours do not determine; no condition can be imposed on those.
 _DEPENDENT = 1e-10
 
-# Sums are wrong where more than this part of the worst is missing; weights change so many supports
-# around. The two ends of a bar must be able to balance each other.
-_WRONG = 1e-11
-_AROUND = {1: 10_000, 2: 4, 3: 2}
 _SMALLEST = 1e-300
 
 # Multipliers of a body up to which the system is factorised, by dimension: for some seconds, or for
@@ -68,10 +64,9 @@ class Consistent(Gradient):
 
     with a_p such that polynomials up to the degree of the gradient, at most the second, keep what
     their gradients, and l and L from the sparse linear system of the sums: the least change, with
-    each weight's change divided by its kernel weight w. Weights change only where sums are wrong,
-    and up to two supports from there: deep inside a lattice they stay as they were. Those of a bar
-    all change: sums that are exact to the second degree at both ends need the fourth order between
-    them (Strand 1994).
+    each weight's change divided by its kernel weight w. All weights of a body change, if ever so
+    little deep inside: sums that are exact to the second degree at a surface need the fourth order
+    beside it (Strand 1994), and a change confined to a rim is large and costs half of the step.
 
     The system is solved once, when the body is built: by a factorisation if it is small, else by
     conjugate gradients over the fixed pairs, to a hundredth of what was missing or for half a
@@ -124,18 +119,17 @@ class Consistent(Gradient):
             surface[face.particles] = True
         degree = self.exact_degree
         missing[:, 0] = _possible(missing[:, 0], particles.positions, surface, degree)
-        active = _active(missing, found)
-        if not active.any():
-            return inner  # nothing is missing
+        if not missing.any():
+            return inner
         V = particles.volumes
         if missing.shape[0] * missing.shape[1] <= _FACTORISED[particles.dimension]:
-            change = _Change.of(found, slopes, particles.cells, V, active, degree, length)
-            multipliers = _solved(change.matrix(), missing, surface, active)
+            change = _Change.of(found, slopes, particles.cells, V, degree, length)
+            multipliers = _solved(change.matrix(), missing, surface)
         else:
             from solidsph_builtin.gradients._iteration import solved  # loads the compiler
 
-            multipliers = solved(found, slopes, particles, active, degree, length, missing)
-        return _OfBody(inner, V, active, multipliers, length)
+            multipliers = solved(found, slopes, particles, degree, length, missing)
+        return _OfBody(inner, V, multipliers, length)
 
 
 @final
@@ -145,7 +139,6 @@ class _OfBody(Gradient):
 
     of: Gradient
     volumes: Array  # (n,) of the body [m^d]
-    active: Mask  # (n,) between which weights change
     multipliers: Array  # (n, 1 + d, d) l and the columns of L
     length: float  # unit of the offsets that L is multiplied by [m]
 
@@ -155,16 +148,8 @@ class _OfBody(Gradient):
 
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
         plain = self.of.weights(pairs, kernel_gradients, volumes)
-        if not self.active[pairs.rows].any():
-            return plain
         change = _Change.of(
-            pairs,
-            kernel_gradients,
-            volumes,
-            self.volumes,
-            self.active,
-            self.exact_degree,
-            self.length,
+            pairs, kernel_gradients, volumes, self.volumes, self.exact_degree, self.length
         )
         return plain + change.weights(self.multipliers)
 
@@ -190,18 +175,6 @@ def _missing(particles: Particles, pairs: Pairs, weights: Array, length: float) 
     return missing
 
 
-def _active(missing: Array, pairs: Pairs) -> Mask:
-    """Particles around those with wrong sums, (n,)."""
-    size = np.abs(missing).max(axis=(1, 2))
-    active = size > _WRONG * size.max()
-    for _ in range(_AROUND[pairs.offsets.shape[1]]):
-        before = active
-        active = pairs.row_sums(active[pairs.columns].astype(np.intp)) > 0
-        if np.array_equal(active, before):
-            break
-    return np.asarray(active, dtype=np.bool_)
-
-
 @attrs.frozen(eq=False)
 class _Change:
     """Change of the weights of some rows with the multipliers."""
@@ -219,7 +192,6 @@ class _Change:
         kernel_gradients: Array,
         cells: Array,
         volumes: Array,
-        active: Mask,
         degree: int,
         length: float,
     ) -> _Change:
@@ -230,7 +202,6 @@ class _Change:
         squares = scaled[:, upper[0]] * scaled[:, upper[1]]
         basis = np.hstack([scaled, squares]) if degree > 1 else scaled
         w = closeness(kernel_gradients, pairs.distances) * cells[pairs.columns]
-        w = np.where(active[pairs.rows] & active[pairs.columns], w, 0.0)
         moments = pairs.row_sums((w[:, None, None] * basis[:, :, None]) * basis[:, None, :])
         sizes, directions = np.linalg.eigh(moments)
         known = sizes > _DEPENDENT * np.maximum(sizes[:, -1:], _SMALLEST)
@@ -287,17 +258,14 @@ def _possible(missing: Array, positions: Array, surface: Mask, degree: int) -> A
     return missing - change
 
 
-def _solved(matrix: csr_array, missing: Array, surface: Mask, active: Mask) -> Array:
+def _solved(matrix: csr_array, missing: Array, surface: Mask) -> Array:
     """Multipliers (n, 1 + d, d) whose change of the weights adds `missing` (n, 1 + d, d)."""
     n, kinds, d = missing.shape
-    some = np.flatnonzero(active)
-    unknown = (n * np.arange(kinds)[:, None] + some).ravel()
-    matrix = csr_array(matrix[unknown][:, unknown])
-    diagonal = matrix.diagonal().reshape(kinds, some.size)
+    diagonal = matrix.diagonal().reshape(kinds, n)
     size = float(np.median(diagonal[0]))
-    soft = softening(diagonal.T, surface[some]).T.ravel()
+    soft = softening(diagonal.T, surface).T.ravel()
     softened = csr_array(matrix + diags_array(soft))
-    regular = csc_array(softened + diags_array(np.full(unknown.size, _REGULAR * size)))
+    regular = csc_array(softened + diags_array(np.full(n * kinds, _REGULAR * size)))
     try:
         factors: Any = splu(
             regular,
@@ -307,7 +275,7 @@ def _solved(matrix: csr_array, missing: Array, surface: Mask, active: Mask) -> A
         )
     except RuntimeError:  # exactly singular: bodies of a particle or two have nothing to change
         raise _unsolved(1.0) from None
-    wanted = missing[some].transpose(1, 0, 2).reshape(unknown.size, d)
+    wanted = missing.transpose(1, 0, 2).reshape(n * kinds, d)
     multipliers, left, unsolved = np.zeros_like(wanted), wanted, 1.0
     for _ in range(_REFINEMENTS):
         multipliers = multipliers + factors.solve(left)
@@ -317,8 +285,7 @@ def _solved(matrix: csr_array, missing: Array, surface: Mask, active: Mask) -> A
             break
     if not unsolved <= _USELESS:
         raise _unsolved(unsolved)
-    result = np.zeros_like(missing)
-    result[some] = multipliers.reshape(kinds, some.size, d).transpose(1, 0, 2)
+    result: Array = multipliers.reshape(kinds, n, d).transpose(1, 0, 2)
     return result
 
 
