@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import attrs
 import pytest
 
 from solidsph import BuildError, Scene, Simulation
 from solidsph.registry.construct import construct
-from solidsph.scene.scheme import SCHEMES, completed
+from solidsph.scene.scheme import SCHEMES, completed, scheme_of
 from solidsph_builtin.discretisations.fitted import Fitted
 from solidsph_builtin.discretisations.lattice import Lattice
 from tests.helpers.scenes import SOFT
@@ -48,6 +49,14 @@ def test_particles_that_a_scene_names_may_be_off_the_surface() -> None:
     """There the sums of `consistent` have no known value."""
     body = bare(discretisation="lattice").model.bodies[0]
     assert type(body.formulation.gradient).__name__ == "Corrected"
+
+
+@pytest.mark.parametrize("effect", ["bond-failure", "heat"])
+def test_effects_that_suit_cell_centres_get_them(effect: str) -> None:
+    builder = Simulation.builder().body("b", shape=BOX, spacing=0.1).material("neo-hookean", **SOFT)
+    scene = builder.effect(effect).duration(1.0).scene()
+    assert scheme_of(scene) is SCHEMES["corrected"]
+    assert scheme_of(attrs.evolve(scene, scheme="paper")) is SCHEMES["paper"]
 
 
 def test_a_part_that_the_scene_names_stays() -> None:

@@ -49,6 +49,7 @@ class BondFailure(Effect):
     conserves_momentum: ClassVar[bool] = True
     answers: ClassVar[frozenset[Need] | None] = frozenset()
     breaks_bonds: ClassVar[bool] = True
+    at_cell_centres: ClassVar[bool] = True  # what is left of a correction is formed anew
 
     critical_stretch: float = number()  # [-]
     where: Where = "all"  # particles between which bonds may fail

@@ -64,6 +64,9 @@ class Heat(Effect):
     """
 
     conserves_momentum: ClassVar[bool] = True
+    # Between particles on a surface and those inside, whose volumes differ, it flows as through 1.7
+    # spacings more.
+    at_cell_centres: ClassVar[bool] = True
     answers: ClassVar[frozenset[Need] | None] = frozenset()
     uses_initial_pairs: ClassVar[bool] = True
 

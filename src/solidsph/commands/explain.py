@@ -257,7 +257,7 @@ def _why(scene: Scene, entry: registry.Entry) -> str:
             return "part of the formulation"
     else:
         chosen = False
-    return f"{scene.scheme} scheme: {scheme.why[entry.kind]}" if chosen else "named by the scene"
+    return f"{scheme.name} scheme: {scheme.why[entry.kind]}" if chosen else "named by the scene"
 
 
 def _numbers(simulation: Simulation) -> list[Row]:

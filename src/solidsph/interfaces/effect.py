@@ -35,6 +35,10 @@ class Effect(Part):
     uses_initial_pairs: ClassVar[bool] = False
     """True if it acts on the initial neighbour pairs even after they are severed."""
 
+    at_cell_centres: ClassVar[bool] = False
+    """True if its sums suit particles at the centres of cells, and a gradient that is formed particle
+    by particle: a scene gets the scheme `corrected` then, not the recommended one."""
+
     answers: ClassVar[frozenset[Need] | None] = None
     """Needs that it answers, from which `solidsph.advice` finds effects that are missing or not
     needed; empty if it serves another purpose. None is undeclared: no need is then reported."""

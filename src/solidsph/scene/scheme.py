@@ -6,12 +6,14 @@ A scheme is data. A scene chooses one by its name, `scheme = "paper"`, and may s
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, TypeVar
 
 import attrs
 
-from solidsph.errors import SceneError
-from solidsph.scene.scene_data import PartLike, SceneData
+from solidsph.errors import SceneError, SolidsphError
+from solidsph.registry import registry
+from solidsph.scene.scene_data import RECOMMENDED, PartLike, SceneData
 
 S = TypeVar("S", bound=SceneData)
 
@@ -20,6 +22,7 @@ S = TypeVar("S", bound=SceneData)
 class Scheme:
     """Parts by name, and a sentence for each that says why it was chosen."""
 
+    name: str
     discretisation: PartLike
     kernel: PartLike
     cover: float | None  # [spacings]; derived from the kernel if None
@@ -31,6 +34,7 @@ class Scheme:
 
 # The errors are those of tests/bare, where a scene names shape, spacing, material and loads only.
 _RECOMMENDED = Scheme(
+    name=RECOMMENDED,
     discretisation="fitted",
     kernel="cubic-spline",
     cover=None,
@@ -54,6 +58,7 @@ _RECOMMENDED = Scheme(
 
 _CORRECTED = attrs.evolve(
     _RECOMMENDED,
+    name="corrected",
     discretisation="lattice",
     kernel="modified-mollifier",
     formulation={"type": "total-lagrangian", "gradient": "corrected", "divergence": "variational"},
@@ -67,6 +72,7 @@ _CORRECTED = attrs.evolve(
 
 _PAPER = attrs.evolve(
     _CORRECTED,
+    name="paper",
     discretisation={"type": "lattice", "on_boundary": True},
     cover=5.5,
     formulation={"type": "total-lagrangian", "gradient": "standard", "divergence": "plain"},
@@ -83,16 +89,15 @@ _PAPER = attrs.evolve(
 )
 
 SCHEMES: Mapping[str, Scheme] = {
-    "recommended": _RECOMMENDED,
-    "corrected": _CORRECTED,
-    "paper": _PAPER,
+    scheme.name: scheme for scheme in (_RECOMMENDED, _CORRECTED, _PAPER)
 }
 """Schemes by name: the recommended one; the usual total Lagrangian form, with a linearly corrected
 gradient on a plain lattice; and that of Ismail & Reddy."""
 
 
 def scheme_of(scene: SceneData) -> Scheme:
-    """The scheme that a scene names.
+    """The scheme that a scene names, or `corrected` in place of the recommended one where an effect
+    asks for particles at the centres of cells.
 
     Raises:
         SceneError: there is none of that name.
@@ -100,7 +105,20 @@ def scheme_of(scene: SceneData) -> Scheme:
     if not isinstance(scene.scheme, str) or scene.scheme not in SCHEMES:
         known = ", ".join(map(repr, SCHEMES))
         raise SceneError(f"unknown scheme {scene.scheme!r}; take one of {known}")
+    if scene.scheme == RECOMMENDED and any(_at_cell_centres(e.part) for e in scene.effects):
+        return _CORRECTED
     return SCHEMES[scene.scheme]
+
+
+def _at_cell_centres(effect: PartLike) -> bool:
+    """Whether an effect needs particles at the centres of cells; not if it cannot be loaded."""
+    kind: object = effect
+    if isinstance(effect, (str, Mapping)):
+        name = effect if isinstance(effect, str) else effect.get("type")
+        kind = None
+        with suppress(SolidsphError):
+            kind = registry.load("effects", str(name))
+    return bool(getattr(kind, "at_cell_centres", False))
 
 
 def completed(scene: S) -> S:
