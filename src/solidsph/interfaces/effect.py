@@ -36,8 +36,8 @@ class Effect(Part):
     """True if it acts on the initial neighbour pairs even after they are severed."""
 
     at_cell_centres: ClassVar[bool] = False
-    """True if its sums suit particles at the centres of cells, and a gradient that is formed particle
-    by particle: a scene gets the scheme `corrected` then, not the recommended one."""
+    """True if its sums suit particles at the centres of cells, and a gradient that is formed
+    particle by particle: a scene gets the scheme `corrected` then, not the recommended one."""
 
     answers: ClassVar[frozenset[Need] | None] = None
     """Needs that it answers, from which `solidsph.advice` finds effects that are missing or not
