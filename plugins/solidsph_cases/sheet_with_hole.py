@@ -26,7 +26,6 @@ from solidsph_cases._sheet import (
     check_hole,
     extensions,
     is_known,
-    rows_along,
     sheet,
     whole,
 )
@@ -47,12 +46,9 @@ class SheetWithHole(Case):
 
     Its quarter has the side W and the hole the radius a. The whole sheet is computed: the peak at
     (0, a) lies on a plane of symmetry, where sums over half a support would be at their worst.
-    Rows of particles follow the hole: a lattice with a square hole is mapped onto the sheet, fading
-    into itself towards the edges.
-
-    Rubber is nearly incompressible, and its pressure sees neighbours that move against each other:
-    with the quadratic gradient the stress above the hole zigzags from particle to particle. With
-    the consistent one and hourglass control a few per cent of that are left, away from the hole.
+    The scheme is the recommended one, with hourglass control: rubber is nearly incompressible, and
+    its pressure sees neighbours that move against each other. Without it the peak is off by 7 % in
+    place of 3 %, with 20 particles a quarter.
     """
 
     title = "A sheet with a hole, pulled"
@@ -67,8 +63,8 @@ class SheetWithHole(Case):
     spacing: float = number(default=0.05)  # of particles [m]
     width: float = number(default=1.0)  # W, half the side of the sheet [m]
     traction: float = number(default=5e6)  # on the undeformed edge [Pa]
-    kernel: str = "modified-mollifier"
-    cover: float = number(default=3.0)  # [spacings]
+    kernel: str = "cubic-spline"
+    cover: float = number(default=2.6)  # [spacings]
     gradient: str = "consistent"
     hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
     engine: str = "auto"
@@ -91,7 +87,6 @@ class SheetWithHole(Case):
         return super().accuracy(measurements[1:2])
 
     def scenes(self) -> Mapping[str, Scene]:
-        rows = rows_along(whole, self.hole_ratio, self.width, self.spacing)
         builder = (
             sheet(
                 title=self.title,
@@ -99,7 +94,7 @@ class SheetWithHole(Case):
                 hole_ratio=self.hole_ratio,
                 width=self.width,
                 spacing=self.spacing,
-                discretisation={"type": "fitted-moments", "of": rows},
+                discretisation="fitted",
             )
             .boundary("traction", where="right", traction={"x": self.traction})
             .boundary("traction", where="left", traction={"x": -self.traction})
@@ -115,6 +110,7 @@ class SheetWithHole(Case):
         known = is_known(self.hole_ratio, S)
         top = at_hole(record, self.radius, 90.0)
         extension = float(extensions(record)[-1]) / W
+        peak = record.at([[0.0, self.radius]], output=-1).stress
         compare = partial(compared, record, tolerance=self.peak_tolerance)
         measured = [
             compared(
@@ -124,7 +120,12 @@ class SheetWithHole(Case):
             ),
             compare(
                 "largest principal Cauchy stress at (0, a)",
-                *(1e-6 * stress[top], "MPa", 1e-6 * PEAK if known else None, SOURCE),
+                *(
+                    1e-6 * float(largest_principal(peak)[0]),
+                    "MPa",
+                    1e-6 * PEAK if known else None,
+                    SOURCE,
+                ),
             ),
             compare(
                 "that over the largest anywhere",
@@ -138,7 +139,7 @@ class SheetWithHole(Case):
                 compared(
                     record,
                     "stress along the hole at (0, a) over the traction",
-                    *(_hoop_stress(record)[top] / S, "1", 3.0, _KIRSCH, _KIRSCH_TOLERANCE),
+                    *(float(peak[0, 0, 0]) / S, "1", 3.0, _KIRSCH, _KIRSCH_TOLERANCE),
                 ),
                 vanishing(
                     record,

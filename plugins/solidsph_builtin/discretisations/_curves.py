@@ -80,6 +80,11 @@ def _is_closed(line: Array, lengths: Array) -> bool:
 def _evenly(line: Array, spacing: float, *, closed: bool) -> Array:
     """Points in equal steps along a polygonal `line` (m, 2), its ends included, (k, 2) [m]."""
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    steps = cells_along(float(way[-1]), spacing)
+    # Around a closed curve as many in each quarter, so that a hole is as symmetric as its body.
+    steps = (
+        4 * cells_along(float(way[-1]) / 4.0, spacing)
+        if closed
+        else cells_along(float(way[-1]), spacing)
+    )
     places = np.linspace(0.0, way[-1], steps + 1)[: steps + (not closed)]
     return np.stack([np.interp(places, way, line[:, axis]) for axis in range(2)], axis=1)
