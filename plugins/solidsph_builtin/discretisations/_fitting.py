@@ -197,14 +197,11 @@ def agreeing(faces: Mapping[str, Face], positions: Array, volumes: Array) -> dic
     vectors = np.concatenate([face.area_vectors for face in faces.values()])
     sizes = np.concatenate([np.abs(face.areas) for face in faces.values()])
     d = positions.shape[1]
-    middle = volumes @ positions / volumes.sum()
-    scale = float(np.abs(positions - middle).max()) or 1.0
-    X = (positions - middle) / scale
-    upper = np.triu_indices(d)
-    f = np.hstack([np.ones((len(X), 1)), X, X[:, upper[0]] * X[:, upper[1]]])
+    f, _, scale = _quadratics(positions, volumes)
+    X = f[:, 1 : 1 + d]
     slopes = np.zeros((f.shape[1], d))
     slopes[1 : 1 + d] = np.eye(d) * volumes.sum()
-    for row, (i, j) in enumerate(zip(*upper, strict=True), start=1 + d):
+    for row, (i, j) in enumerate(zip(*np.triu_indices(d), strict=True), start=1 + d):
         slopes[row, i] += volumes @ X[:, j]
         slopes[row, j] += volumes @ X[:, i]
     sums = (f[owners, :, None] * vectors[:, None, :]).reshape(len(owners), -1)
@@ -226,6 +223,16 @@ def agreeing(faces: Mapping[str, Face], positions: Array, volumes: Array) -> dic
     }
 
 
+def _quadratics(positions: Array, volumes: Array) -> tuple[Array, Array, float]:
+    """1, x_i and x_i x_j (i <= j) at the particles (n, k), with x about the centre (d,) [m] and in
+    units of the size [m], so that equations are well scaled."""
+    centre = volumes @ positions / volumes.sum()
+    scale = float(np.abs(positions - centre).max()) or 1.0
+    x = (positions - centre) / scale
+    upper = np.triu_indices(positions.shape[1])
+    return np.hstack([np.ones((len(x), 1)), x, x[:, upper[0]] * x[:, upper[1]]]), centre, scale
+
+
 def with_moments(
     positions: Array, volumes: Array, near: Mask, shape: Shape, spacing: float
 ) -> Array:
@@ -236,12 +243,7 @@ def with_moments(
     are finer.
     """
     d = positions.shape[1]
-    # About the centre, in units of the size, so that the equations are well scaled.
-    centre = volumes @ positions / volumes.sum()
-    scale = float(np.abs(positions - centre).max()) or 1.0
-    X = (positions - centre) / scale
-    upper = np.triu_indices(d)
-    basis = np.hstack([np.ones((len(X), 1)), X, X[:, upper[0]] * X[:, upper[1]]])
+    basis, centre, scale = _quadratics(positions, volumes)
     missing = _moments(shape, centre, scale, spacing / _FINER[d]) - volumes @ basis
     if np.abs(missing).max() <= _ROUNDING * volumes.sum():
         return volumes
