@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import floor
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -22,6 +24,9 @@ _SMOOTH = np.cos(np.radians(30.0))
 
 # An end of a curve is at the corner that is nearest to it, at most so many samples away.
 _TO_CORNER = 4.0
+
+# Particles around a quarter of a closed curve are rounded up from 0.9 only.
+_UP = 0.1
 
 # Two particles closer than this, in spacings, are one.
 _CLOSEST = 0.4
@@ -80,11 +85,10 @@ def _is_closed(line: Array, lengths: Array) -> bool:
 def _evenly(line: Array, spacing: float, *, closed: bool) -> Array:
     """Points in equal steps along a polygonal `line` (m, 2), its ends included, (k, 2) [m]."""
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    # Around a closed curve as many in each quarter, so that a hole is as symmetric as its body.
-    steps = (
-        4 * cells_along(float(way[-1]) / 4.0, spacing)
-        if closed
-        else cells_along(float(way[-1]), spacing)
-    )
+    steps = cells_along(float(way[-1]), spacing)
+    if closed:
+        # As many in each quarter, so that a hole is as symmetric as its body; rather too few than
+        # too many, which crowd those inside.
+        steps = 4 * max(1, floor(float(way[-1]) / (4.0 * spacing) + _UP))
     places = np.linspace(0.0, way[-1], steps + 1)[: steps + (not closed)]
     return np.stack([np.interp(places, way, line[:, axis]) for axis in range(2)], axis=1)
