@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solidsph.maths.arrays import Array
+from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs, row_starts
 from solidsph.model.particles import Particles
 from solidsph_builtin.gradients._passes import passes
@@ -39,6 +39,7 @@ def solved(
     degree: int,
     length: float,
     missing: Array,
+    surface: Mask,
 ) -> Array:
     """Multipliers (n, 1 + d, d) whose change of the weights adds `missing` (n, 1 + d, d).
 
@@ -49,6 +50,7 @@ def solved(
         degree: of the polynomials whose gradients stay.
         length: unit of the offsets that L is multiplied by [m].
         missing: from the sums, (n, 1 + d, d).
+        surface: the particles on the surface, (n,).
     """
     d, V = particles.dimension, particles.volumes
     moments, diagonal_blocks, product = passes(d, degree)
@@ -65,9 +67,6 @@ def solved(
     )
     tests = _inverse(moments(*sums))
     blocks = diagonal_blocks(*sums, tests)
-    surface = np.zeros(particles.count, dtype=np.bool_)
-    for face in particles.faces.values():
-        surface[face.particles] = True
     diagonal = np.einsum("nii->ni", blocks)
     soft = softening(diagonal, surface)
     diagonal += soft

@@ -69,8 +69,8 @@ class Consistent(Gradient):
     beside it (Strand 1994), and a change confined to a rim is large and costs half of the step.
 
     The system is solved once, when the body is built: by a factorisation if it is small, else by
-    conjugate gradients over the fixed pairs, to a hundredth of what was missing or for half a
-    minute.
+    conjugate gradients over the fixed pairs, to a hundredth of what was missing or for a number of
+    steps that takes some seconds.
     """
 
     of: Gradient = attrs.field(factory=Quadratic, metadata={"part": "gradients"})
@@ -128,7 +128,7 @@ class Consistent(Gradient):
         else:
             from solidsph_builtin.gradients._iteration import solved  # loads the compiler
 
-            multipliers = solved(found, slopes, particles, degree, length, missing)
+            multipliers = solved(found, slopes, particles, degree, length, missing, surface)
         return _OfBody(inner, V, multipliers, length)
 
 
@@ -280,7 +280,10 @@ def _solved(matrix: csr_array, missing: Array, surface: Mask) -> Array:
     for _ in range(_REFINEMENTS):
         multipliers = multipliers + factors.solve(left)
         left = wanted - softened @ multipliers
-        before, unsolved = unsolved, float(np.abs(left).max() / max(np.abs(wanted).max(), 1e-300))
+        before, unsolved = (
+            unsolved,
+            float(np.abs(left).max() / max(np.abs(wanted).max(), _SMALLEST)),
+        )
         if unsolved <= _SOLVED or unsolved > 0.9 * before:
             break
     if not unsolved <= _USELESS:
