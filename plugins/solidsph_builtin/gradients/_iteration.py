@@ -13,13 +13,10 @@ import numpy as np
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs, row_starts
 from solidsph.model.particles import Particles
-from solidsph_builtin.gradients._passes import passes
+from solidsph_builtin.gradients._local_fits import LocalFits, portions
+from solidsph_builtin.gradients._passes import Sums, passes
 from solidsph_builtin.gradients._softening import softening
-from solidsph_builtin.gradients.quadratic import closeness
 
-# Eigenvalues of a moment matrix below this part of the largest belong to functions that the
-# neighbours do not determine.
-_DEPENDENT = 1e-10
 _SMALLEST = 1e-300
 
 # The largest sum that may be left, as a part of the largest that was missing: of all, and then of
@@ -34,7 +31,7 @@ _PAIR_STEPS = 5e7
 
 def solved(
     pairs: Pairs,
-    kernel_gradients: Array,
+    close: Array,
     particles: Particles,
     degree: int,
     length: float,
@@ -45,35 +42,24 @@ def solved(
 
     Args:
         pairs: all pairs of the body (m,).
-        kernel_gradients: of the pairs, (m, d).
+        close: their closeness (m,).
         particles: of the body.
         degree: of the polynomials whose gradients stay.
         length: unit of the offsets that L is multiplied by [m].
         missing: from the sums, (n, 1 + d, d).
         surface: the particles on the surface, (n,).
     """
-    d, V = particles.dimension, particles.volumes
-    moments, diagonal_blocks, product = passes(d, degree)
-    close = closeness(kernel_gradients, pairs.distances)
-    kept = close > 0.0
-    sums = (
-        row_starts(np.bincount(pairs.rows[kept], minlength=particles.count)),
-        pairs.columns[kept].astype(np.int32),
-        particles.positions,
-        close[kept],
-        particles.cells,
-        V,
-        length,
-    )
-    tests = _inverse(moments(*sums))
-    blocks = diagonal_blocks(*sums, tests)
+    d = particles.dimension
+    diagonal_blocks, product = passes(d, degree)
+    sums = _sums(pairs, close, particles, degree, length)
+    blocks = diagonal_blocks(sums)
     diagonal = np.einsum("nii->ni", blocks)
     soft = softening(diagonal, surface)
     diagonal += soft
-    steps = int(np.clip(_PAIR_STEPS / np.count_nonzero(kept), _FEWEST, _MOST))
+    steps = int(np.clip(_PAIR_STEPS / len(sums.columns), _FEWEST, _MOST))
 
     def softened(x: Array) -> Array:
-        result: Array = product(*sums, tests, x) + soft[:, :, None] * x
+        result: Array = product(sums, x) + soft[:, :, None] * x
         return result
 
     def of_sums_alone(x: Array) -> Array:
@@ -88,13 +74,25 @@ def solved(
     return multipliers
 
 
-def _inverse(moments: Array) -> Array:
-    """Inverse of symmetric matrices (n, k, k), zero where they are singular."""
-    sizes, directions = np.linalg.eigh(moments)
-    known = sizes > _DEPENDENT * np.maximum(sizes[:, -1:], _SMALLEST)
-    scaled = directions * np.where(known, 1.0 / np.where(known, sizes, 1.0), 0.0)[:, None, :]
-    inverse: Array = scaled @ directions.transpose(0, 2, 1)
-    return inverse
+def _sums(pairs: Pairs, close: Array, particles: Particles, degree: int, length: float) -> Sums:
+    roots, units = [], []
+    for _, own, part in portions(pairs):
+        fits = LocalFits.of(part, close[own] * particles.cells[part.columns], degree)
+        roots.append(fits.inverse_root())
+        units.append(fits.units)
+    root = np.concatenate(roots)
+    kept = close > 0.0
+    return Sums(
+        row_starts(np.bincount(pairs.rows[kept], minlength=particles.count)),
+        pairs.columns[kept].astype(np.int32),
+        particles.positions,
+        close[kept],
+        particles.cells,
+        particles.volumes,
+        root @ root.transpose(0, 2, 1),
+        np.concatenate(units),
+        length,
+    )
 
 
 def _conjugate_gradients(

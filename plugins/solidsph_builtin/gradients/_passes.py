@@ -3,148 +3,144 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from solidsph.engines.compiled.jit import njit
 
+# Sums in any order: they are vectorised.
+_FAST = {"reassoc", "contract", "nsz"}
+
+
+class Sums(NamedTuple):
+    """What the passes read."""
+
+    starts: Any  # (n + 1,)
+    columns: Any  # (m,)
+    positions: Any  # (n, d) [m]
+    closeness: Any  # (m,)
+    cells: Any  # (n,) [m^d]
+    volumes: Any  # (n,) [m^d]
+    inverses: Any  # (n, k, k) of the moments of the functions that keep their gradient
+    units: Any  # (n,) of the offsets in these functions [m]
+    length: float  # unit of the offsets that L is multiplied by [m]
+
+
+class Passes(NamedTuple):
+    """Compiled passes."""
+
+    diagonal_blocks: Any  # (sums) -> (n, 1 + d, 1 + d)
+    product: Any  # (sums, multipliers (n, 1 + d, d)) -> what they add to the sums, the same shape
+
 
 @cache
-def passes(dimension: int, degree: int) -> tuple[Any, Any, Any]:
-    """Compiled passes over pairs: moments, diagonal blocks, and the product with multipliers."""
+def passes(dimension: int, degree: int) -> Passes:
+    """The passes for functions of the first or second `degree` that keep their gradient."""
     d = dimension
     k = d + d * (d + 1) // 2 if degree > 1 else d
 
+    # The pairs of one particle stand side by side in `w`, `x` and `b`, for loops over vectors.
     @njit
-    def functions(x, b):
+    def scratch(starts):
+        longest = 0
+        for p in range(len(starts) - 1):
+            longest = max(longest, starts[p + 1] - starts[p])
+        return np.empty(longest), np.empty((d, longest)), np.empty((k, longest))
+
+    @njit(fastmath=_FAST)
+    def row(sums, p, w, x, b):
+        begin = sums.starts[p]
+        count = sums.starts[p + 1] - begin
+        X, own = sums.positions, sums.length / sums.units[p]
+        for m in range(count):
+            q = sums.columns[begin + m]
+            w[m] = sums.closeness[begin + m] * sums.cells[q]
+            for i in range(d):
+                x[i, m] = (X[q, i] - X[p, i]) / sums.length
         for i in range(d):
-            b[i] = x[i]
+            for m in range(count):
+                b[i, m] = own * x[i, m]
         if k > d:
             at = d
             for i in range(d):
                 for j in range(i, d):
-                    b[at] = x[i] * x[j]
+                    for m in range(count):
+                        b[at, m] = b[i, m] * b[j, m]
                     at += 1
+        return begin, count
 
-    @njit
-    def moments(starts, columns, X, close, cells, V, length):
-        n = len(starts) - 1
-        out = np.zeros((n, k, k))
-        for p in range(n):
-            x, b = np.empty(d), np.empty(k)
-            for m in range(starts[p], starts[p + 1]):
-                q = columns[m]
-                w = close[m] * cells[q]
-                if w == 0.0:
-                    continue
-                for i in range(d):
-                    x[i] = (X[q, i] - X[p, i]) / length
-                functions(x, b)
-                for i in range(k):
-                    for j in range(k):
-                        out[p, i, j] += w * b[i] * b[j]
-        return out
-
-    @njit
-    def blocks(starts, columns, X, close, cells, V, length, tests):
-        n = len(starts) - 1
+    @njit(fastmath=_FAST)
+    def diagonal_blocks(sums):
+        n = len(sums.starts) - 1
         out = np.zeros((n, 1 + d, 1 + d))
+        w, x, b = scratch(sums.starts)
+        y, t = np.empty(1 + d), np.empty(k)
         for p in range(n):
-            x, b, t, y = np.empty(d), np.empty(k), np.zeros(k), np.empty(1 + d)
+            begin, count = row(sums, p, w, x, b)
+            own, inverse = sums.volumes[p] ** 2, sums.inverses[p]
+            t[:] = 0.0
             total = 0.0
-            for m in range(starts[p], starts[p + 1]):
-                q = columns[m]
-                if close[m] == 0.0:
-                    continue
-                for i in range(d):
-                    x[i] = (X[q, i] - X[p, i]) / length
-                functions(x, b)
-                w = close[m] * cells[q]
-                total += w
-                for i in range(k):
-                    t[i] += w * b[i]
-                # The pair as (q, p), in the row of q.
-                for i in range(d):
-                    x[i] = -x[i]
-                functions(x, b)
-                w = close[m] * cells[p]
+            y[0] = 1.0
+            for m in range(count):
+                q = sums.columns[begin + m]
                 kept = 0.0
                 for i in range(k):
+                    t[i] += w[m] * b[i, m]
                     for j in range(k):
-                        kept += b[i] * tests[q, i, j] * b[j]
-                change = V[q] ** 2 * w * (1.0 - w * kept)
-                y[0] = 1.0
+                        kept += b[i, m] * inverse[i, j] * b[j, m]
+                total += w[m]
+                change = own * w[m] * (1.0 - w[m] * kept)
                 for i in range(d):
-                    y[1 + i] = -x[i]
+                    y[1 + i] = -x[i, m]
                 for i in range(1 + d):
                     for j in range(1 + d):
-                        out[p, i, j] += change * y[i] * y[j]
-            kept = 0.0
+                        out[q, i, j] += change * y[i] * y[j]
             for i in range(k):
                 for j in range(k):
-                    kept += t[i] * tests[p, i, j] * t[j]
-            out[p, 0, 0] += V[p] ** 2 * (total - kept)
+                    total -= t[i] * inverse[i, j] * t[j]
+            out[p, 0, 0] += own * total
         return out
 
-    @njit
-    def product(starts, columns, X, close, cells, V, length, tests, multipliers):
-        n = len(starts) - 1
-        kept = np.empty((n, k, d))
-        for p in range(n):
-            x, b, t = np.empty(d), np.empty(k), np.zeros((k, d))
-            for m in range(starts[p], starts[p + 1]):
-                q = columns[m]
-                w = close[m] * cells[q]
-                if w == 0.0:
-                    continue
-                for i in range(d):
-                    x[i] = (X[q, i] - X[p, i]) / length
-                functions(x, b)
-                for c in range(d):
-                    y = multipliers[q, 0, c] - multipliers[p, 0, c]
-                    for i in range(d):
-                        y -= multipliers[q, 1 + i, c] * x[i]
-                    for i in range(k):
-                        t[i, c] += w * b[i] * y
-            for i in range(k):
-                for c in range(d):
-                    s = 0.0
-                    for j in range(k):
-                        s += tests[p, i, j] * t[j, c]
-                    kept[p, i, c] = s
+    @njit(fastmath=_FAST)
+    def product(sums, multipliers):
+        n = len(sums.starts) - 1
         out = np.zeros((n, 1 + d, d))
+        w, x, b = scratch(sums.starts)
+        y, t = np.empty((d, len(w))), np.empty(k)
         for p in range(n):
-            x, b = np.empty(d), np.empty(k)
-            own = V[p] ** 2
-            for m in range(starts[p], starts[p + 1]):
-                q = columns[m]
-                if close[m] == 0.0:
-                    continue
-                for i in range(d):
-                    x[i] = (X[q, i] - X[p, i]) / length
-                functions(x, b)
-                w = own * close[m] * cells[q]
+            begin, count = row(sums, p, w, x, b)
+            for m in range(count):
+                q = sums.columns[begin + m]
                 for c in range(d):
-                    y = multipliers[q, 0, c] - multipliers[p, 0, c]
+                    value = multipliers[q, 0, c] - multipliers[p, 0, c]
                     for i in range(d):
-                        y -= multipliers[q, 1 + i, c] * x[i]
-                    for i in range(k):
-                        y -= b[i] * kept[p, i, c]
-                    out[p, 0, c] -= w * y
-                # The pair as (q, p), in the row of q.
-                for i in range(d):
-                    b[i] = -b[i]
-                w = V[q] ** 2 * close[m] * cells[p]
+                        value -= multipliers[q, 1 + i, c] * x[i, m]
+                    y[c, m] = value
+            own = sums.volumes[p] ** 2
+            for c in range(d):
+                for i in range(k):
+                    along = 0.0
+                    for m in range(count):
+                        along += w[m] * b[i, m] * y[c, m]
+                    t[i] = along
+                for i in range(k):
+                    part = 0.0
+                    for j in range(k):
+                        part += sums.inverses[p, i, j] * t[j]
+                    for m in range(count):
+                        y[c, m] -= part * b[i, m]
+                total = 0.0
+                for m in range(count):
+                    y[c, m] *= own * w[m]
+                    total += y[c, m]
+                out[p, 0, c] -= total
+            for m in range(count):
+                q = sums.columns[begin + m]
                 for c in range(d):
-                    y = multipliers[p, 0, c] - multipliers[q, 0, c]
+                    out[q, 0, c] += y[c, m]
                     for i in range(d):
-                        y += multipliers[p, 1 + i, c] * x[i]
-                    for i in range(k):
-                        y -= b[i] * kept[q, i, c]
-                    out[p, 0, c] += w * y
-                    for i in range(d):
-                        out[p, 1 + i, c] += w * y * x[i]
+                        out[q, 1 + i, c] -= y[c, m] * x[i, m]
         return out
 
-    return moments, blocks, product
+    return Passes(diagonal_blocks, product)

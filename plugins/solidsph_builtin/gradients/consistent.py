@@ -16,12 +16,9 @@ from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs
 from solidsph.model.particles import Particles
+from solidsph_builtin.gradients._local_fits import LocalFits, closeness, portions
 from solidsph_builtin.gradients._softening import softening
-from solidsph_builtin.gradients.quadratic import Quadratic, closeness
-
-# Eigenvalues of a moment matrix below this part of the largest belong to functions that the
-# neighbours do not determine; no condition can be imposed on those.
-_DEPENDENT = 1e-10
+from solidsph_builtin.gradients.quadratic import Quadratic
 
 _SMALLEST = 1e-300
 
@@ -123,12 +120,14 @@ class Consistent(Gradient):
             return inner
         V = particles.volumes
         if missing.shape[0] * missing.shape[1] <= _FACTORISED[particles.dimension]:
-            change = _Change.of(found, slopes, particles.cells, V, degree, length)
+            w = closeness(slopes, found.distances) * particles.cells[found.columns]
+            change = _Change.of(LocalFits.of(found, w, degree), V, length)
             multipliers = _solved(change.matrix(), missing, surface)
         else:
             from solidsph_builtin.gradients._iteration import solved  # loads the compiler
 
-            multipliers = solved(found, slopes, particles, degree, length, missing, surface)
+            close = closeness(slopes, found.distances)
+            multipliers = solved(found, close, particles, degree, length, missing, surface)
         return _OfBody(inner, V, multipliers, length)
 
 
@@ -147,11 +146,14 @@ class _OfBody(Gradient):
         return self.of.exact_degree
 
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
+        weights = np.empty_like(kernel_gradients)
+        for _, own, part in portions(pairs):
+            w = closeness(kernel_gradients[own], part.distances) * volumes[part.columns]
+            fits = LocalFits.of(part, w, self.exact_degree)
+            change = _Change.of(fits, self.volumes, self.length)
+            weights[own] = change.weights(self.multipliers)
         plain = self.of.weights(pairs, kernel_gradients, volumes)
-        change = _Change.of(
-            pairs, kernel_gradients, volumes, self.volumes, self.exact_degree, self.length
-        )
-        return plain + change.weights(self.multipliers)
+        return plain + pairs.of_differences(weights)
 
 
 def _missing(particles: Particles, pairs: Pairs, weights: Array, length: float) -> Array:
@@ -179,52 +181,35 @@ def _missing(particles: Particles, pairs: Pairs, weights: Array, length: float) 
 class _Change:
     """Change of the weights of some rows with the multipliers."""
 
-    pairs: Pairs
-    closeness: Array  # (m,) w
-    tests: Array  # (m, k) functions of the offset that must keep their gradient, orthonormal in w
-    volumes: Array  # (n,) V [m^d]
+    fits: LocalFits  # of the functions that must keep their gradient
+    root: Array  # (n, k, k) of the inverse of their moments
+    volumes: Array  # (n,) V of the rows [m^d]
     length: float  # unit of the offsets that L is multiplied by [m]
 
     @classmethod
-    def of(
-        cls,
-        pairs: Pairs,
-        kernel_gradients: Array,
-        cells: Array,
-        volumes: Array,
-        degree: int,
-        length: float,
-    ) -> _Change:
-        """For a gradient that is exact to this `degree`; `cells` (n,) are its weights in sums."""
-        reach = pairs.spread(np.maximum.reduceat(pairs.distances, pairs.starts[:-1]))
-        scaled = pairs.offsets / np.where(reach > 0.0, reach, 1.0)[:, None]
-        upper = np.triu_indices(scaled.shape[1])
-        squares = scaled[:, upper[0]] * scaled[:, upper[1]]
-        basis = np.hstack([scaled, squares]) if degree > 1 else scaled
-        w = closeness(kernel_gradients, pairs.distances) * cells[pairs.columns]
-        moments = pairs.row_sums((w[:, None, None] * basis[:, :, None]) * basis[:, None, :])
-        sizes, directions = np.linalg.eigh(moments)
-        known = sizes > _DEPENDENT * np.maximum(sizes[:, -1:], _SMALLEST)
-        scales = np.where(known, 1.0 / np.sqrt(np.where(known, sizes, 1.0)), 0.0)
-        units = directions * scales[:, None, :]
-        tests = np.einsum("mi,mij->mj", basis, pairs.spread(units))
-        return cls(pairs, w, tests, volumes, length)
+    def of(cls, fits: LocalFits, volumes: Array, length: float) -> _Change:
+        """With the `volumes` of the whole body."""
+        own = volumes[fits.pairs.rows[fits.pairs.starts[:-1]]]
+        return cls(fits, fits.inverse_root(), own, length)
 
     def weights(self, multipliers: Array) -> Array:
-        """Change of the weights by multipliers (n, 1 + d, d), (m, d)."""
-        pairs, w, b = self.pairs, self.closeness, self.tests
+        """Change of the weights by multipliers (n, 1 + d, d) of the body, (m, d)."""
+        pairs, fits = self.fits.pairs, self.fits
         y = multipliers[pairs.columns, 0] - multipliers[pairs.rows, 0]
         along_offset = multipliers[pairs.columns, 1:]
         y -= np.einsum("mj,mji->mi", pairs.offsets / self.length, along_offset)
+        rest = fits.padded(y)
         for _ in range(2):  # a single pass leaves rounding, which shows as stress in a rotation
-            along = pairs.row_sums((w[:, None] * b)[:, :, None] * y[:, None, :])
-            y = y - np.einsum("mk,mki->mi", b, pairs.spread(along))
-        return pairs.of_differences((w * self.volumes[pairs.rows])[:, None] * y)
+            along = self.root.transpose(0, 2, 1) @ fits.sums(rest)
+            rest -= fits.basis @ (self.root @ along)
+        return fits.of_pairs(self.volumes[:, None, None] * fits.weights * rest)
 
     def matrix(self) -> csr_array:
         """From the multipliers of one component, l of all particles and then each row of L, to
         what the sums gain, (n (1 + d), n (1 + d)); of all rows only."""
-        pairs, V = self.pairs, self.volumes[self.pairs.rows]
+        pairs, V = self.fits.pairs, self.fits.pairs.spread(self.volumes)
+        w = self.fits.of_pairs(self.fits.weights)[:, 0]
+        tests = self.fits.of_pairs(self.fits.basis @ self.root)
         n, m = pairs.row_count, pairs.count
         every = np.arange(m + 1)
         there = csr_array((np.ones(m), pairs.columns, every), shape=(m, n))
@@ -234,9 +219,9 @@ class _Change:
             for offset in pairs.offsets.T
         ]
         y = csr_array(hstack([there - here, *arms], format="csr"))
-        total = y.T @ (diags_array(V**2 * self.closeness) @ y)
-        for b in self.tests.T:
-            rows = csr_array((V * self.closeness * b, every[:-1], pairs.starts), shape=(n, m))
+        total = y.T @ (diags_array(V**2 * w) @ y)
+        for b in tests.T:
+            rows = csr_array((V * w * b, every[:-1], pairs.starts), shape=(n, m))
             kept = csr_array(rows @ y)
             total = total - kept.T @ kept
         return csr_array(total)

@@ -37,6 +37,17 @@ class Pairs:
         """Number of ordered pairs m, n self pairs included."""
         return len(self.columns)
 
+    def stretch(self, first: int, stop: int) -> Pairs:
+        """The rows `first` to `stop` of those listed."""
+        own = slice(self.starts[first], self.starts[stop])
+        return Pairs(
+            starts=self.starts[first : stop + 1] - self.starts[first],
+            rows=self.rows[own],
+            columns=self.columns[own],
+            offsets=self.offsets[own],
+            distances=self.distances[own],
+        )
+
     def reversed_order(self) -> Indices:
         """Index of (q, p) for every pair (p, q), (m,)."""
         # In column order the pairs of column p appear as (q, p) with q rising: row p's order.

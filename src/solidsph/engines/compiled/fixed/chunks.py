@@ -34,17 +34,9 @@ def in_chunks(
     pairs: Pairs, weights: Array, rows: int = _ROWS_AT_ONCE
 ) -> Iterator[tuple[Pairs, Array]]:
     """A complete list of pairs and its weights (m, d), some rows at a time."""
-    for first in range(0, pairs.row_count, _ROWS_AT_ONCE):
-        starts = pairs.starts[first : first + _ROWS_AT_ONCE + 1]
-        own = slice(starts[0], starts[-1])
-        part = Pairs(
-            starts=starts - starts[0],
-            rows=pairs.rows[own],
-            columns=pairs.columns[own],
-            offsets=pairs.offsets[own],
-            distances=pairs.distances[own],
-        )
-        yield part, weights[own]
+    for first in range(0, pairs.row_count, rows):
+        stop = min(first + rows, pairs.row_count)
+        yield pairs.stretch(first, stop), weights[pairs.starts[first] : pairs.starts[stop]]
 
 
 def _chunks(wanted: Mask) -> Iterator[slice]:
