@@ -21,7 +21,7 @@ class Sums(NamedTuple):
     positions: Any  # (n, d) [m]
     closeness: Any  # (m,)
     cells: Any  # (n,) [m^d]
-    volumes: Any  # (n,) [m^d]
+    shares: Any  # (n,) V^2 s [m^2d]
     inverses: Any  # (n, k, k) of the moments of the functions that keep their gradient
     units: Any  # (n,) of the offsets in these functions [m]
     length: float  # unit of the offsets that L is multiplied by [m]
@@ -77,8 +77,10 @@ def passes(dimension: int, degree: int) -> Passes:
         w, x, b = scratch(sums.starts)
         y, t = np.empty(1 + d), np.empty(k)
         for p in range(n):
+            if sums.shares[p] == 0.0:
+                continue
             begin, count = row(sums, p, w, x, b)
-            own, inverse = sums.volumes[p] ** 2, sums.inverses[p]
+            own, inverse = sums.shares[p], sums.inverses[p]
             t[:] = 0.0
             total = 0.0
             y[0] = 1.0
@@ -109,6 +111,8 @@ def passes(dimension: int, degree: int) -> Passes:
         w, x, b = scratch(sums.starts)
         y, t = np.empty((d, len(w))), np.empty(k)
         for p in range(n):
+            if sums.shares[p] == 0.0:
+                continue
             begin, count = row(sums, p, w, x, b)
             for m in range(count):
                 q = sums.columns[begin + m]
@@ -117,7 +121,7 @@ def passes(dimension: int, degree: int) -> Passes:
                     for i in range(d):
                         value -= multipliers[q, 1 + i, c] * x[i, m]
                     y[c, m] = value
-            own = sums.volumes[p] ** 2
+            own = sums.shares[p]
             for c in range(d):
                 for i in range(k):
                     along = 0.0

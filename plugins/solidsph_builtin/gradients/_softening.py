@@ -24,8 +24,7 @@ def softening(diagonal: Array, surface: Mask) -> Array:
 
     `surface` (n,) tells the particles on the surface.
     """
-    soft = np.full(
-        diagonal.shape, _MOMENTS[diagonal.shape[1] - 1] * float(np.mean(diagonal[:, 1:]))
-    )
-    soft[:, 0] = np.where(surface, _AT_SURFACE * float(np.median(diagonal[:, 0])), 0.0)
+    changed = diagonal[diagonal[:, 0] > 0.0]  # the sums that a change of the weights reaches
+    soft = np.full(diagonal.shape, _MOMENTS[diagonal.shape[1] - 1] * float(changed[:, 1:].mean()))
+    soft[:, 0] = np.where(surface, _AT_SURFACE * float(np.median(changed[:, 0])), 0.0)
     return soft

@@ -17,8 +17,9 @@ from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs
 from solidsph.model.particles import Particles
 from solidsph_builtin.gradients._local_fits import LocalFits, closeness, portions
+from solidsph_builtin.gradients._rim import freedom
 from solidsph_builtin.gradients._softening import softening
-from solidsph_builtin.gradients.quadratic import Quadratic
+from solidsph_builtin.gradients.cubic import Cubic
 
 _SMALLEST = 1e-300
 
@@ -57,20 +58,21 @@ class Consistent(Gradient):
     the energy and the angular momentum; here the gradient itself is changed, so that the
     variational divergence remains the derivative of an energy:
 
-        g_pq <- g_pq + w_pq V_p (l_q - l_p - L_q (X_q - X_p) - b(X_pq) . a_p),
+        g_pq <- g_pq + w_pq s_p V_p (l_q - l_p - L_q (X_q - X_p) - b(X_pq) . a_p),
 
-    with a_p such that polynomials up to the degree of the gradient, at most the second, keep what
-    their gradients, and l and L from the sparse linear system of the sums: the least change, with
-    each weight's change divided by its kernel weight w. All weights of a body change, if ever so
-    little deep inside: sums that are exact to the second degree at a surface need the fourth order
-    beside it (Strand 1994), and a change confined to a rim is large and costs half of the step.
+    with s_p 1 beside what the sums miss and 0 deep inside, a_p such that polynomials up to the
+    degree of the gradient, at most the second, keep what their gradients, and l and L from the
+    sparse linear system of the sums: the least change, with each weight's change divided by its
+    kernel weight w. Sums that are exact to the second degree at a surface need the fourth order
+    inside (Strand 1994); on a lattice `cubic` has it. With `quadratic` the change is as large as
+    the weights themselves.
 
     The system is solved once, when the body is built: by a factorisation if it is small, else by
     conjugate gradients over the fixed pairs, to a hundredth of what was missing or for a number of
     steps that takes some seconds.
     """
 
-    of: Gradient = attrs.field(factory=Quadratic, metadata={"part": "gradients"})
+    of: Gradient = attrs.field(factory=Cubic, metadata={"part": "gradients"})
 
     @property
     def exact_degree(self) -> int:
@@ -119,16 +121,17 @@ class Consistent(Gradient):
         if not missing.any():
             return inner
         V = particles.volumes
+        free = freedom(missing, particles.positions, length)
         if missing.shape[0] * missing.shape[1] <= _FACTORISED[particles.dimension]:
-            w = closeness(slopes, found.distances) * particles.cells[found.columns]
-            change = _Change.of(LocalFits.of(found, w, degree), V, length)
+            fits = LocalFits.of_gradient(found, slopes, particles.cells, degree)
+            change = _Change.of(fits, V, free, length)
             multipliers = _solved(change.matrix(), missing, surface)
         else:
             from solidsph_builtin.gradients._iteration import solved  # loads the compiler
 
             close = closeness(slopes, found.distances)
-            multipliers = solved(found, close, particles, degree, length, missing, surface)
-        return _OfBody(inner, V, multipliers, length)
+            multipliers = solved(found, close, particles, free, degree, length, missing, surface)
+        return _OfBody(inner, V, free, multipliers, length)
 
 
 @final
@@ -138,6 +141,7 @@ class _OfBody(Gradient):
 
     of: Gradient
     volumes: Array  # (n,) of the body [m^d]
+    freedom: Array  # (n,) s
     multipliers: Array  # (n, 1 + d, d) l and the columns of L
     length: float  # unit of the offsets that L is multiplied by [m]
 
@@ -147,10 +151,9 @@ class _OfBody(Gradient):
 
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
         weights = np.empty_like(kernel_gradients)
-        for _, own, part in portions(pairs):
-            w = closeness(kernel_gradients[own], part.distances) * volumes[part.columns]
-            fits = LocalFits.of(part, w, self.exact_degree)
-            change = _Change.of(fits, self.volumes, self.length)
+        for own, part in portions(pairs):
+            fits = LocalFits.of_gradient(part, kernel_gradients[own], volumes, self.exact_degree)
+            change = _Change.of(fits, self.volumes, self.freedom, self.length)
             weights[own] = change.weights(self.multipliers)
         plain = self.of.weights(pairs, kernel_gradients, volumes)
         return plain + pairs.of_differences(weights)
@@ -184,13 +187,14 @@ class _Change:
     fits: LocalFits  # of the functions that must keep their gradient
     root: Array  # (n, k, k) of the inverse of their moments
     volumes: Array  # (n,) V of the rows [m^d]
+    freedom: Array  # (n,) s of the rows
     length: float  # unit of the offsets that L is multiplied by [m]
 
     @classmethod
-    def of(cls, fits: LocalFits, volumes: Array, length: float) -> _Change:
-        """With the `volumes` of the whole body."""
-        own = volumes[fits.pairs.rows[fits.pairs.starts[:-1]]]
-        return cls(fits, fits.inverse_root(), own, length)
+    def of(cls, fits: LocalFits, volumes: Array, freedom: Array, length: float) -> _Change:
+        """With the `volumes` and the `freedom` of the whole body."""
+        own = fits.pairs.rows[fits.pairs.starts[:-1]]
+        return cls(fits, fits.inverse_root(), volumes[own], freedom[own], length)
 
     def weights(self, multipliers: Array) -> Array:
         """Change of the weights by multipliers (n, 1 + d, d) of the body, (m, d)."""
@@ -200,16 +204,18 @@ class _Change:
         y -= np.einsum("mj,mji->mi", pairs.offsets / self.length, along_offset)
         rest = fits.padded(y)
         for _ in range(2):  # a single pass leaves rounding, which shows as stress in a rotation
-            along = self.root.transpose(0, 2, 1) @ fits.sums(rest)
-            rest -= fits.basis @ (self.root @ along)
-        return fits.of_pairs(self.volumes[:, None, None] * fits.weights * rest)
+            along = fits.sums(rest) @ self.root
+            rest -= (along @ self.root.transpose(0, 2, 1)) @ fits.basis
+        own = self.freedom * self.volumes
+        return fits.of_pairs(own[:, None, None] * fits.weights * rest)
 
     def matrix(self) -> csr_array:
         """From the multipliers of one component, l of all particles and then each row of L, to
         what the sums gain, (n (1 + d), n (1 + d)); of all rows only."""
-        pairs, V = self.fits.pairs, self.fits.pairs.spread(self.volumes)
+        pairs = self.fits.pairs
+        V, s = pairs.spread(self.volumes), pairs.spread(self.freedom)
         w = self.fits.of_pairs(self.fits.weights)[:, 0]
-        tests = self.fits.of_pairs(self.fits.basis @ self.root)
+        tests = self.fits.of_pairs(self.root.transpose(0, 2, 1) @ self.fits.basis)
         n, m = pairs.row_count, pairs.count
         every = np.arange(m + 1)
         there = csr_array((np.ones(m), pairs.columns, every), shape=(m, n))
@@ -219,9 +225,9 @@ class _Change:
             for offset in pairs.offsets.T
         ]
         y = csr_array(hstack([there - here, *arms], format="csr"))
-        total = y.T @ (diags_array(V**2 * w) @ y)
+        total = y.T @ (diags_array(V**2 * s * w) @ y)
         for b in tests.T:
-            rows = csr_array((V * w * b, every[:-1], pairs.starts), shape=(n, m))
+            rows = csr_array((V * np.sqrt(s) * w * b, every[:-1], pairs.starts), shape=(n, m))
             kept = csr_array(rows @ y)
             total = total - kept.T @ kept
         return csr_array(total)
@@ -247,7 +253,9 @@ def _solved(matrix: csr_array, missing: Array, surface: Mask) -> Array:
     """Multipliers (n, 1 + d, d) whose change of the weights adds `missing` (n, 1 + d, d)."""
     n, kinds, d = missing.shape
     diagonal = matrix.diagonal().reshape(kinds, n)
-    size = float(np.median(diagonal[0]))
+    if not diagonal[0].any():
+        raise _unsolved(1.0)
+    size = float(np.median(diagonal[0][diagonal[0] > 0.0]))
     soft = softening(diagonal.T, surface).T.ravel()
     softened = csr_array(matrix + diags_array(soft))
     regular = csc_array(softened + diags_array(np.full(n * kinds, _REGULAR * size)))

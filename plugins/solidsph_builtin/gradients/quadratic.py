@@ -11,12 +11,8 @@ import numpy as np
 from solidsph.interfaces.gradient import Gradient
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs
-from solidsph_builtin.gradients._local_fits import LocalFits, closeness, portions
+from solidsph_builtin.gradients._local_fits import LocalFits, portions
 from solidsph_builtin.gradients.corrected import Corrected
-
-# Beyond this condition number of the scaled moment matrix the neighbours do not determine second
-# derivatives; of good arrangements, surfaces included, it is below some thousands.
-_WORST_CONDITION = 1e7
 
 # Largest sum of the lengths of a particle's weights, times its reach. A fit that relies on small
 # differences of large weights amplifies noise by this factor, and the stable step shrinks with it.
@@ -43,11 +39,12 @@ class Quadratic(Gradient):
 
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
         weights = np.empty_like(kernel_gradients)
-        poor = np.zeros(pairs.row_count, dtype=np.bool_)
-        for rows, own, part in portions(pairs):
-            w = closeness(kernel_gradients[own], part.distances) * volumes[part.columns]
-            weights[own], poor[rows] = _fitted(LocalFits.of(part, w, self.exact_degree))
-        if poor.any():
+        poor = False
+        for own, part in portions(pairs):
+            fits = LocalFits.of_gradient(part, kernel_gradients[own], volumes, 2)
+            weights[own], linear = quadratic_fit(fits, kernel_gradients[own], volumes)
+            poor |= bool(linear.any())
+        if poor:
             # Without a count: an engine may compute some rows at a time, and one warning is enough.
             warnings.warn(
                 "gradient 'quadratic': some particles have too few or too flat neighbours for a "
@@ -55,22 +52,19 @@ class Quadratic(Gradient):
                 "them more",
                 stacklevel=2,
             )
-            replaced = pairs.spread(poor)
-            linear = Corrected().weights(pairs, kernel_gradients, volumes)
-            weights[replaced] = linear[replaced]
         return pairs.of_differences(weights)
 
 
-def _fitted(fits: LocalFits) -> tuple[Array, Mask]:
-    """Weights of the pairs, (m, d), and which of the rows have a poor fit, (n,)."""
-    moments, d = fits.moments, fits.pairs.offsets.shape[1]
-    sizes, directions = np.linalg.eigh(moments)
-    poor = ~(sizes[:, 0] * _WORST_CONDITION > sizes[:, -1])
-    sizes[poor] = 1.0  # any: these rows are replaced
-    inverse = (directions / sizes[:, None, :]) @ directions.transpose(0, 2, 1)
-    # One step of refinement: the error of the inverse would show as stress in a rigid rotation.
-    missing = np.eye(moments.shape[1])[:d] - inverse[:, :d] @ moments
-    slopes = inverse[:, :d] + missing @ inverse
-    padded = fits.weights * (fits.basis @ slopes.transpose(0, 2, 1))
-    poor |= np.sqrt(np.einsum("nmi,nmi->nm", padded, padded)).sum(axis=1) > _WORST_AMPLIFICATION
-    return fits.of_pairs(padded / fits.units[:, None, None]), poor
+def quadratic_fit(fits: LocalFits, kernel_gradients: Array, volumes: Array) -> tuple[Array, Mask]:
+    """Weights (m, d) of `fits`, and which of their rows (n,) have those of a linear fit instead.
+
+    Raises:
+        BuildError: the neighbours of a particle determine neither.
+    """
+    weights, noise = fits.of_degree(2).gradients()
+    poor: Mask = noise > _WORST_AMPLIFICATION
+    if poor.any():
+        replaced = fits.pairs.spread(poor)
+        linear = Corrected().weights(fits.pairs, kernel_gradients, volumes)
+        weights[replaced] = linear[replaced]
+    return weights, poor
