@@ -237,17 +237,17 @@ def test_every_combination_has_a_certificate_or_is_refused(
 ) -> None:
     formulation = example_part("formulations", form, gradient=gradient, divergence=divergence)
     scheme = Scheme(cover=2.6 if dimension == 2 else 3.2, formulation=formulation)
-    # Of the built-in ones, one knows its body, if not in a row, where its change of the weights is
-    # the same everywhere inside; and one, where neighbours follow the motion, knows where the body
-    # stands: its strain is of displacements, not of their differences.
+    # Where neighbours follow the motion, two of the built-in ones are refused: one whose sums know
+    # its surface, and one that knows where the body stands: its strain is of displacements, not of
+    # their differences.
     moving = formulation.configuration is Configuration.CURRENT
-    of_body = gradient == "consistent" and (moving or dimension > 1)
-    if of_body or (gradient == "standard" and moving):
+    if gradient in ("consistent", "standard") and moving:
         with pytest.raises(SolidsphError, match="body"):
             certificate(scheme, dimension, 1.1)
         return
     found = certificate(scheme, dimension, 1.1)
-    assert 0.5 < found.critical_step < 4.0
+    # 0.34 with `cubic` where neighbours follow the motion: its weights are twice as large.
+    assert 0.3 < found.critical_step < 4.0
     if formulation.divergence.adjoint and not moving:  # a sum of squares, whatever the weights are
         assert found.growing == ()
 

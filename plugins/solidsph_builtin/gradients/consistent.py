@@ -79,6 +79,11 @@ class Consistent(Gradient):
         """That of the wrapped gradient."""
         return self.of.exact_degree
 
+    @property
+    def deep_inside(self) -> Gradient:
+        """The wrapped gradient, whose sums are right by symmetry."""
+        return self.of.deep_inside
+
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
         """Those of the wrapped gradient: the change is known once there is a body."""
         return self.of.weights(pairs, kernel_gradients, volumes)

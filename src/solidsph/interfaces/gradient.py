@@ -28,6 +28,12 @@ class Gradient(Part):
         For any arrangement and at free surfaces; -1 if not even a constant has gradient zero.
         """
 
+    @property
+    def deep_inside(self) -> Gradient:
+        """As it is far from every surface of a lattice; self, the default, unless `of_body` returns
+        one that is the same as another there."""
+        return self
+
     @abstractmethod
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
         """Weight vector g_pq of every pair, (m, d) [1/m].

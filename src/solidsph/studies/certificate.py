@@ -323,7 +323,7 @@ def _response(scheme: Scheme, stretches: Sequence[float]) -> tuple[LatticeRespon
     """Response of the lattice, CFL step [s] and the damping rate that effects declare [1/s]."""
     dimension = len(stretches)
     layers = [scheme.depth(min(stretches))] * dimension
-    simulation = scheme.simulation(dimension, layers)
+    simulation = scheme.deep_inside.simulation(dimension, layers)
     rate = sum(load.damping_rate for load in simulation.dynamics.loads)
     state = stretched(simulation, stretches)
     response = lattice_response(simulation.dynamics, state)

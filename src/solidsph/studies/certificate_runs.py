@@ -93,7 +93,9 @@ def _block(certificate: Certificate, moving: int) -> tuple[Simulation, State]:
     }
     hold = {"type": "prescribed-motion", "where": outer, "displacement": uniform}
     layers = [moving + held] * certificate.dimension
-    simulation = scheme.simulation(certificate.dimension, layers, boundaries=[(hold, "held")])
+    simulation = scheme.deep_inside.simulation(
+        certificate.dimension, layers, boundaries=[(hold, "held")]
+    )
     return simulation, stretched(simulation, stretches)
 
 

@@ -115,6 +115,16 @@ class Scheme:
         """Transit time of a confined wave over a spacing, the unit of rates and steps [s]."""
         return self.spacing / self.material.wave_speed
 
+    @property
+    def deep_inside(self) -> Scheme:
+        """As it is far from every surface, where a gradient may be simpler than its body's."""
+        form = self.formulation
+        if form.configuration is not Configuration.REFERENCE:
+            return self
+        return attrs.evolve(
+            self, formulation=attrs.evolve(form, gradient=form.gradient.deep_inside)
+        )
+
     def depth(self, least_stretch: float = 1.0) -> int:
         """Layers around a particle within which the surface must not be."""
         # Two supports: forces from stresses, stresses from gradients. In the current configuration

@@ -43,7 +43,7 @@ def stability_map(
     rates, factors, seen = (np.full(shape, nan) for _ in range(3))
     for row, cover in enumerate(covers):
         wider = attrs.evolve(scheme, cover=cover)
-        simulation = wider.simulation(1, [wider.depth(min(1.0, *stretches))])
+        simulation = wider.deep_inside.simulation(1, [wider.depth(min(1.0, *stretches))])
         start = stretched(simulation, [1.0])
         check_uniform(simulation.dynamics, start, lattice_response(simulation.dynamics, start))
         loads, bodies = simulation.dynamics.loads, simulation.model.bodies

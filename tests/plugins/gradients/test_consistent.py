@@ -15,6 +15,7 @@ from solidsph.simulation import Simulation as Built
 from solidsph.statics import equilibrium
 from solidsph.testing import example_part
 from solidsph_builtin.gradients import _iteration, consistent
+from solidsph_builtin.gradients.cubic import Cubic
 from tests.helpers.scenes import SOFT
 
 BLOCKS = {2: [1.0, 0.6], 3: [0.6, 0.5, 0.4]}
@@ -216,18 +217,40 @@ def test_by_iteration_the_sums_are_those_by_factorisation(
     assert np.abs(sums(exactly) - sums(factorised)).max() < 1e-6 * missing
 
 
-def test_the_stable_step_does_not_shrink() -> None:
-    """Of a change that is confined to a rim it does: to half in this sheet."""
-    sheet = {"type": "box", "lengths": [1.0, 2.0]}
+SHEET = {"type": "box", "lengths": [1.0, 2.0]}
 
-    def step(gradient: str) -> float:
-        builder = Simulation.builder().body("b", shape=sheet, spacing=0.025)
-        builder = builder.material("neo-hookean", **SOFT).duration(1.0)
-        built = builder.formulation("total-lagrangian", gradient=gradient).build()
+
+def sheet(gradient: object) -> Built:
+    builder = Simulation.builder().body("sheet", shape=SHEET, spacing=0.025)
+    builder = builder.material("neo-hookean", **SOFT).duration(1.0)
+    return builder.formulation("total-lagrangian", gradient=gradient).build()
+
+
+def test_the_stable_step_does_not_shrink() -> None:
+    """Around a gradient of the second order it does, since the change beside the surface is large:
+    to a quarter in this sheet."""
+
+    def step(gradient: object) -> float:
+        built = sheet(gradient)
         assert built.safe is not None
         return built.safe.step
 
     assert step("consistent") > step("quadratic")
+    assert step({"type": "consistent", "of": "quadratic"}) < 0.5 * step("consistent")
+
+
+def test_deep_inside_weights_are_those_of_the_wrapped_gradient() -> None:
+    (body,) = sheet("consistent").model.bodies
+    gradient, pairs, cells = body.formulation.gradient, body.pairs(), body.particles.cells
+    slopes = body.smoothing.gradient(pairs.offsets, pairs.distances)
+    change = np.abs(
+        gradient.weights(pairs, slopes, cells) - Cubic().weights(pairs, slopes, cells)
+    ).max(axis=1)
+    X = body.particles.positions[pairs.rows]
+    depth = np.minimum(X, np.array(SHEET["lengths"]) - X).min(axis=1) / 0.025
+    # What the sums miss reaches two supports into the body, the change three spacings farther.
+    assert change[depth > 8.5].max() == 0.0
+    assert change[depth < 1.0].max() > 1.0
 
 
 def test_weights_are_found_row_by_row() -> None:
