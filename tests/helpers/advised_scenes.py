@@ -277,6 +277,31 @@ traction = {{y = "-2e4*min(t/0.005, 1)"}}
 """,
     ),
     Flawed(
+        "surface-rows",
+        "gradient = 'consistent'",
+        """
+title = "a block whose rows begin on its surface"
+duration = 1.0
+statics = {}
+[body.block]
+shape = {type = "box", lengths = [1.0, 1.0]}
+spacing = 0.1
+discretisation = {type = "lattice", on_boundary = true}
+[material]
+type = "linear-elastic"
+youngs_modulus = 1e6
+poissons_ratio = 0.3
+density = 1000.0
+[[boundary]]
+type = "clamp"
+where = "left"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {x = 1000.0}
+""",
+    ),
+    Flawed(
         "half-supports",
         "ghosts = 3",
         """
@@ -290,6 +315,9 @@ discretisation = {type = "lattice", on_boundary = true, ghosts = 4, ghost_faces 
 type = "difference"
 of = {type = "box", lengths = [1.0, 1.0]}
 minus = {type = "disc", radius = 0.2}
+[formulation]
+type = "total-lagrangian"
+gradient = "corrected"
 [material]
 type = "linear-elastic"
 youngs_modulus = 1e6
@@ -483,6 +511,9 @@ material = {RUBBER}
 shape = {{type = "box", lengths = [0.2, 0.2]}}
 spacing = 0.02
 discretisation = {{type = "lattice", on_boundary = true}}
+[formulation]
+type = "total-lagrangian"
+gradient = "corrected"
 [[effect]]
 type = "body-force"
 acceleration = {{y = -9.81}}

@@ -89,6 +89,15 @@ def test_energy_that_nothing_put_in_is_told(monkeypatch: pytest.MonkeyPatch) -> 
     assert "times the energy put in at step 200" in found
 
 
+@pytest.mark.parametrize("material", ["linear-elastic", "saint-venant-kirchhoff"])
+def test_a_nearly_incompressible_body_is_strained_no_more_than_others(material: str) -> None:
+    """Thrown at 0.03 of the fastest wave it turned inside out, at any step."""
+    soft = {"type": material, "youngs_modulus": 1e6, "poissons_ratio": 0.4999, "density": 1e3}
+    scene = attrs.evolve(plain(), material=soft, speed=0.03, waves=3, held=True)
+    assert scene.slowest == pytest.approx(1.0 / 71.0, rel=0.01)
+    assert outcome(scene) == BOUNDED
+
+
 def test_a_seed_draws_one_scene() -> None:
     assert drawn(7) == drawn(7)
     assert drawn(7) != drawn(8)

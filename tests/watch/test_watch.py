@@ -19,6 +19,7 @@ from solidsph.watch import Grade, Symptom, Watchdog, run_watched
 from solidsph.watch.collapsing_neighbours import CollapsingNeighbours
 from solidsph.watch.faster_than_sound import FasterThanSound
 from solidsph.watch.hourglass_energy import HourglassEnergy
+from solidsph.watch.passing_through import PassingThrough
 from solidsph.watch.symptom import Finding
 from solidsph.watch.vanishing_volume import VanishingVolume
 from tests.helpers.resuming import OFTEN, Stop, assert_same_record
@@ -130,6 +131,42 @@ def test_hourglass_share() -> None:
     assert found(HourglassEnergy(failure=0.2), bar, displacements=zigzag).grade is Grade.FAILURE
     X = bar.build().particles.positions
     assert found(HourglassEnergy(), bar, displacements=0.01 * X) is None
+
+
+def rolled(turns: float, **effects: dict[str, object]) -> tuple[SceneBuilder, np.ndarray]:
+    """A strip, 41 particles by 3, bent to an arc of so many turns."""
+    shape = {"type": "box", "lengths": [2.0, 0.1], "origin": [-1.0, -0.05]}
+    builder = (
+        Simulation.builder()
+        .body("strip", shape=shape, spacing=0.05)
+        .material("neo-hookean", **SOFT)
+        .duration(1e-2)
+    )
+    for name, words in effects.items():
+        builder = builder.effect(name.replace("_", "-"), **words)
+    X = builder.build().particles.positions
+    radius = 2.0 / (2.0 * np.pi * turns)
+    angle, r = X[:, 0] / radius, radius - X[:, 1]
+    return builder, np.stack([r * np.sin(angle), radius - r * np.cos(angle)], axis=1) - X
+
+
+def test_a_body_that_passes_through_itself() -> None:
+    """A strip rolled up by a turn and a bit lies in itself; one by less, or with contact, does not.
+    Pressed to a tenth it is crushed, and does not."""
+    weight: dict[str, object] = {"acceleration": {"y": -9.81}}
+    builder, u = rolled(1.2, body_force=weight)
+    finding = found(PassingThrough(), builder, displacements=u)
+    assert finding is not None
+    assert finding.grade is Grade.WARNING
+    assert finding.remedy == "the effect 'contact' with itself = ['strip']"
+    builder, u = rolled(0.9, body_force=weight)
+    assert found(PassingThrough(), builder, displacements=u) is None
+    builder, u = rolled(1.2, contact={"itself": ["strip"]})
+    assert found(PassingThrough(), builder, displacements=u) is None
+    crushed = u * 0.0
+    crushed[:, 0] = -0.9 * builder.build().particles.positions[:, 0]
+    builder, _ = rolled(0.9)
+    assert found(PassingThrough(), builder, displacements=crushed) is None
 
 
 # Runs

@@ -85,6 +85,13 @@ class BondFailure(Effect):
                     "not formed particle by particle, so that what failed bonds leave cannot be "
                     "corrected anew; use 'corrected'"
                 )
+            if not gradient.of_differences:
+                # What failed bonds leave of its sums strains a body that merely moves.
+                raise SceneError(
+                    f"bond-failure: the gradient of body {body.name!r} acts on values and not on "
+                    "their differences, so that particles with failed bonds would be strained by "
+                    "moving alone; use 'corrected'"
+                )
             found.append(Bonds.of(body, self.critical_stretch, chosen[body.extent]))
         return found
 

@@ -26,6 +26,7 @@ _NAMES = (
     "small-cover",
     "large-cover",
     "half-supports",
+    "surface-rows",
     "near-incompressible",
     "unseen-motions",
     "bar-speed",

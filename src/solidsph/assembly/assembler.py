@@ -15,6 +15,7 @@ import pluggy
 from solidsph.assembly.binding import bind
 from solidsph.assembly.body import make_body
 from solidsph.assembly.initial_state import initial_state, reference_observation
+from solidsph.assembly.shared_holds import shared_once
 from solidsph.assembly.step_size import expected_steps, with_its_step
 from solidsph.engines.history import HistoryFields, modified
 from solidsph.interfaces.discrete_model import DiscreteModel
@@ -119,7 +120,7 @@ class Assembler:
         ):
             for label, part in several.items():
                 terms += self._problems.attempt(bind, kind, part, model, label) or []
-        return terms
+        return shared_once(terms, self._scene.duration)
 
     def _probes(self, model: DiscreteModel, terms: Sequence[Term]) -> list[Term]:
         """Bound probes."""

@@ -25,7 +25,11 @@ class Integrator(Part):
 
     @abstractmethod
     def start(self, state: State, dynamics: EquationOfMotion, step_size: float) -> State:
-        """The first state, with accelerations and what the scheme keeps in `memory`."""
+        """The first state, with accelerations and what the scheme keeps in `memory`.
+
+        A run whose step is cut begins again at a state in the middle: forces follow from what the
+        parts keep in its `memory`, which must not be lost.
+        """
 
     @abstractmethod
     def advance(self, state: State, dynamics: EquationOfMotion, step_size: float) -> State:
@@ -64,7 +68,10 @@ class PointwiseIntegrator(Integrator):
 
     def start(self, state: State, dynamics: EquationOfMotion, step_size: float) -> State:
         """The first state; the mean velocity before it is the one that leads to its velocity."""
-        response = dynamics.respond(state.time, state.positions, state.velocities)
+        # A run whose step is cut begins again in the middle, with all that its parts remember.
+        response = dynamics.respond(
+            state.time, state.positions, state.velocities, memory=state.memory
+        )
         a = response.accelerations
         return state.begun(
             accelerations=a,

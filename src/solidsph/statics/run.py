@@ -15,6 +15,11 @@ from solidsph.run.session import session
 from solidsph.scene.scene_data import StaticsScene
 from solidsph.statics.equilibrium import equilibrium
 
+_UNSTABLE = (
+    "the equilibrium is unstable: the body would leave it, as a strip does beyond its buckling "
+    "load. To find what it goes to, add a small load aside, or follow a damped motion"
+)
+
 
 def run_statics(
     simulation: BuiltScene,
@@ -50,6 +55,9 @@ def run_statics(
             "residual [-]": result.residual,
             "stable": result.stable,
         },
-        notes=() if since is None else since.notes,
+        notes=[
+            *(() if since is None else since.notes),
+            *([_UNSTABLE] if result.stable is False else []),
+        ],
         values_at=simulation.values_at,
     )

@@ -17,6 +17,7 @@ from solidsph.run.hooks import implementation
 from solidsph.watch.collapsing_neighbours import CollapsingNeighbours
 from solidsph.watch.faster_than_sound import FasterThanSound
 from solidsph.watch.hourglass_energy import HourglassEnergy
+from solidsph.watch.passing_through import PassingThrough
 from solidsph.watch.soundness import residual_share, tolerance
 from solidsph.watch.symptom import Finding, Grade, Symptom
 from solidsph.watch.vanishing_volume import VanishingVolume
@@ -26,6 +27,7 @@ SYMPTOMS: Sequence[Symptom] = (
     FasterThanSound(),
     CollapsingNeighbours(),
     HourglassEnergy(),
+    PassingThrough(),
 )
 """Symptoms that are looked for by default."""
 

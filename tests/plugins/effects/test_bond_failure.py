@@ -180,6 +180,9 @@ def test_bonds_fail_in_materials_that_remember(tmp_path: Path) -> None:
 def test_what_failed_bonds_do_not_fit_is_refused() -> None:
     with pytest.raises(BuildError, match="use 'corrected'"):
         bar(50).formulation("total-lagrangian", gradient="quadratic").build()
+    # A bar that broke had up to 40 times the energy that it began with.
+    with pytest.raises(BuildError, match="strained by moving alone"):
+        bar(50).formulation("total-lagrangian", gradient="standard").build()
     with pytest.raises(BuildError, match="acts on the initial pairs"):
         sheet().effect("hourglass-control").build()
     with pytest.raises(BuildError, match="named twice"):
