@@ -33,8 +33,4 @@ def make_body(name: str, parts: Parts, extent: slice) -> Body:
     gradient = formulation.gradient.of_body(
         name, particles, body.smoothing, body.pairs, moving=moving
     )
-    if gradient is formulation.gradient:
-        return body
-    # Every formulation is an attrs class with a field `gradient`, which the interface cannot state.
-    own = attrs.evolve(formulation, gradient=gradient)  # type: ignore[misc]
-    return attrs.evolve(body, formulation=own)
+    return attrs.evolve(body, formulation=formulation.with_gradient(gradient))

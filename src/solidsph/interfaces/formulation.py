@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from enum import Enum
-from typing import ClassVar
+from typing import ClassVar, final
+
+import attrs
 
 from solidsph.interfaces.divergence import Divergence
 from solidsph.interfaces.gradient import Gradient
@@ -38,6 +40,15 @@ class Formulation(Part):
     @abstractmethod
     def divergence(self) -> Divergence:
         """Divergence operator that gives the force."""
+
+    @final
+    def with_gradient(self, gradient: Gradient) -> Formulation:
+        """The same with another gradient."""
+        if gradient is self.gradient:
+            return self
+        # Every formulation is an attrs class with this field, which an interface cannot state.
+        result: Formulation = attrs.evolve(self, gradient=gradient)  # type: ignore[misc]
+        return result
 
     @staticmethod
     @abstractmethod

@@ -121,9 +121,7 @@ class Scheme:
         form = self.formulation
         if form.configuration is not Configuration.REFERENCE:
             return self
-        return attrs.evolve(
-            self, formulation=attrs.evolve(form, gradient=form.gradient.deep_inside)
-        )
+        return attrs.evolve(self, formulation=form.with_gradient(form.gradient.deep_inside))
 
     def depth(self, least_stretch: float = 1.0) -> int:
         """Layers around a particle within which the surface must not be."""
