@@ -18,7 +18,7 @@ from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Curves, Measurement, Trial
 from solidsph_cases._compare import finished, vanishing
 from solidsph_cases._energy import residual_over_start, smallest_volume_ratio
-from solidsph_cases._scheme import check_all_positive, check_count, with_scheme
+from solidsph_cases._scene import check_all_positive, check_count
 from solidsph_cases.drawing.fields import scatter
 from solidsph_cases.drawing.sheet import Bar, Panel, Sheet, line
 
@@ -68,12 +68,6 @@ class CollidingRings(Case):
     friction: float = number(default=0.0)  # coefficient [-]
     duration: float = number(default=0.012)  # [s]
     closest: float = number(default=0.5)  # neighbours may come, in first distances [-]
-    kernel: str = "cubic-spline"
-    cover: float = number(default=2.2)  # [spacings]
-    gradient: str = "corrected"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
-    engine: str = "auto"
-    time_step_factor: float = number(default=0.5)  # of the largest step
 
     def __attrs_post_init__(self) -> None:
         check_count("colliding-rings", "through", self.through, 4)
@@ -95,7 +89,6 @@ class CollidingRings(Case):
                 name,
                 shape={**ring, "centre": [side * x, side * y]},
                 spacing=(OUTER - INNER) / self.through,
-                discretisation="lattice",
             ).initial(where=name, velocity={"x": -side * v})
         builder = (
             builder.material(
@@ -105,11 +98,10 @@ class CollidingRings(Case):
                 density=DENSITY,
             )
             .effect("contact", itself=["all"], friction=self.friction)
-            .integrator("velocity-verlet", time_step_factor=self.time_step_factor)
             .duration(self.duration)
             .outputs(_OUTPUTS)
         )
-        return {"rings": with_scheme(builder, self).scene()}
+        return {"rings": builder.scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["rings"]
