@@ -21,6 +21,7 @@ from solidsph.studies.frontier import Frontier
 from solidsph.studies.point import Point
 from solidsph.studies.report import write_report
 from solidsph.studies.report_figures import EXPENSES, TIME, Figures, library
+from solidsph.studies.variant import with_settings
 from solidsph_cases.csm1 import Csm1
 from tests.commands.test_cli import solidsph
 from tests.helpers.reporting import HOSTILE, OfFunctions, hostile, known
@@ -121,7 +122,7 @@ def test_the_scene_of_every_point_is_in_the_page(report: Read) -> None:
     points = report.data["points"]
     assert len(points) == len(known())
     for point, shown in zip(known().points, points, strict=True):
-        (scene,) = Csm1(**point.settings).scenes().values()
+        (scene,) = with_settings(Csm1(), point.settings).scenes().values()
         (written,) = shown["scenes"]
         assert written["toml"] == scene.to_toml()
     names = [one["file"] for shown in points for one in shown["scenes"]]
@@ -175,7 +176,7 @@ def test_hostile_words_stay_words(tmp_path: Path) -> None:
     assert HOSTILE in read.texts("td")
     assert HOSTILE in read.texts("pre")
     assert read.data["points"][0]["label"] == made.points[0].label()
-    (scene,) = Csm1(**made.points[0].settings).scenes().values()
+    (scene,) = with_settings(Csm1(), made.points[0].settings).scenes().values()
     assert read.data["points"][0]["scenes"][0]["toml"] == scene.to_toml()
     # Plotly takes tags in its texts: none of ours is one.
     for text in _texts(read.data["expenses"]):

@@ -113,8 +113,8 @@ def _control(scene: Scene) -> float:
 def _with_control(scene: Scene, value: Any) -> Scene:
     if value != 0.0:
         return _with_effect(scene, f"{_CONTROL}.strength", value)
-    rest = [e for e in scene.effects if _table("effects", e.part)["type"] != _CONTROL]
-    return attrs.evolve(scene, effects=rest)
+    rest = (e for e in scene.effects if _table("effects", e.part)["type"] != _CONTROL)
+    return attrs.evolve(scene, effects=tuple(rest))
 
 
 def _with_effect(scene: Scene, key: str, value: Any) -> Scene:
