@@ -28,6 +28,7 @@ YOUNGS_MODULUS, POISSONS_RATIO, DENSITY = 1e7, 0.3975, 1010.0  # [Pa], [-], [kg/
 # The rings begin so far apart: a free flight that shows that nothing happens in it [m].
 _APART = 0.004
 _OUTPUTS = 120
+_STEP = 0.5  # of the critical step [-]
 
 # Neighbours that come closer than half their first distance, or part so far, have clumped or broken
 # apart. Where the rings bend most, their inner side is pressed together by a fifth and the outer
@@ -52,6 +53,10 @@ class CollidingRings(Case):
 
     title = "Two rubber rings collide"
     source = _SOURCE
+    studies = {
+        "time_step_factor": "pairs that touch and part do so between steps: at the default one "
+        "that leaves 0.12 % of the energy unaccounted for with 4 particles from rim to rim"
+    }
     sweep = {"through": (5, 7, 10, 14)}
     trials = {
         "0.059 c0": Trial({}, {"through": 4}),
@@ -98,6 +103,7 @@ class CollidingRings(Case):
                 density=DENSITY,
             )
             .effect("contact", itself=["all"], friction=self.friction)
+            .integrator(time_step_factor=_STEP)
             .duration(self.duration)
             .outputs(_OUTPUTS)
         )

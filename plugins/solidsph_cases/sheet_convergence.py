@@ -15,6 +15,7 @@ from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import PartLike
 from solidsph.studies.case import Case, Curves, Measurement
+from solidsph.studies.scene_words import changed
 from solidsph_cases._compare import compared, finished
 from solidsph_cases._scene import check_all_positive, check_count
 from solidsph_cases._sheet import (
@@ -35,6 +36,7 @@ from solidsph_cases.drawing.convergence import by_spacing, errors_panel
 from solidsph_cases.drawing.fields import LARGEST_STRESS, quarter_circle, quarter_particles
 from solidsph_cases.drawing.sheet import Panel, Sheet, level, line, mark
 
+_COVER = 3.0  # of rows along the hole [spacings]
 ROWS_ALONG, NO_ROWS = "rows along the hole", "no rows"
 ARRANGEMENTS = (ROWS_ALONG, "rows up to the hole", NO_ROWS)
 
@@ -57,6 +59,7 @@ class SheetConvergence(Case):
         "discretisation": "arrangements of particles are what is compared",
         "gradient": "the recommended one for all of them: particles that a scene arranges by "
         "itself would get a linear one",
+        "cover": "where rows that follow the hole spread, particles need more of their neighbours",
     }
     sweep = {
         "across": ((5, 10), (10, 15), (15, 20), (20, 30)),
@@ -113,7 +116,7 @@ class SheetConvergence(Case):
         if name == NO_ROWS:
             moved = {"amplitude": self.jitter, "seed": self.seed}
             discretisation = {"type": "jittered", "of": "fitted", **moved}
-        return (
+        scene = (
             sheet(
                 title=f"{self.title}: {name}, spacing W/{count}",
                 square=quarter,
@@ -128,6 +131,7 @@ class SheetConvergence(Case):
             .statics()
             .scene()
         )
+        return changed(scene, "cover", _COVER) if name == ROWS_ALONG else scene
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         measured = []
