@@ -142,7 +142,8 @@ def test_what_has_no_scene_says_why(tmp_path: Path) -> None:
     assert "runs no scene" in point["note"]
     (point,) = page(one, OfFunctions(), tmp_path).data["points"]
     plain, moved = point["scenes"]
-    assert plain["toml"] == Csm1(across=5).scenes()["csm1"].to_toml()
+    as_it_is = with_settings(Csm1(across=5), {"gradient": "consistent"})
+    assert plain["toml"] == as_it_is.scenes()["csm1"].to_toml()
     assert "toml" not in moved
     assert "cannot be written: " in moved["why"]
     assert "function" in moved["why"]
