@@ -23,6 +23,7 @@ import numpy as np
 import scipy
 from table import Table
 
+from solidsph.errors import SceneError
 from solidsph.registry import registry
 from solidsph.studies.case import Case
 from solidsph.studies.cost import SweepSetup, frontier
@@ -33,6 +34,7 @@ from solidsph.studies.point import Point, format_setting
 from solidsph.studies.processes import Processes
 from solidsph.studies.search import Goal, search
 from solidsph.studies.sweep import SweepStatus
+from solidsph.studies.variant import setting_of
 
 # Each with the accuracy that is searched for.
 CASES: Mapping[str, float] = {
@@ -116,7 +118,7 @@ def section(name: str, repeats: int, page: Path | None) -> Iterator[str]:
     folder = Path("results/frontiers") / name
     means = SweepSetup(Processes(1), folder, repeats, watch)
     made = frontier(case, None, means)
-    own = {axis: getattr(priced, axis) for axis in priced.sweep}
+    own = {axis: setting_of(priced, axis) for axis in priced.sweep}
     default = next(point for point in made.points if point.settings == own)
     yield f"## {priced.title}\n\n`solidsph cost {name}`: {made.sentence()}\n"
     picture = folder / f"{name}.png"
@@ -176,11 +178,13 @@ def one_at_a_time(case: Case, default: Point, means: SweepSetup) -> str:
     """The case's own parameters with one choice changed."""
     rows = []
     for choice, values in CHOICES.items():
-        if not hasattr(case, choice):
+        try:
+            chosen = setting_of(case, choice)
+        except SceneError:  # a case without scenes
             continue
         points = means.points(case, [{choice: value} for value in values])
         for value, point in zip(values, points, strict=True):
-            mark = " (own)" if getattr(case, choice) == value else ""
+            mark = " (own)" if chosen == value else ""
             rows.append((f"{choice} {format_setting(value)}{mark}", *row(point, default)[1:3]))
     columns = ("one choice changed", "error, %", "time, s")
     return "#" + Table("One choice at a time", columns, tuple(rows)).markdown()

@@ -10,7 +10,7 @@ from solidsph.maths.arrays import Array, Indices
 from solidsph.results.record import Record
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph_builtin.materials.neo_hookean import NeoHookean
-from solidsph_cases._scheme import ON_BOUNDARY, MovingScheme, solid, with_scheme
+from solidsph_cases._scene import solid
 
 LENGTH = 0.15  # [m]
 YOUNGS_MODULUS = 200e9  # [Pa]
@@ -18,14 +18,12 @@ POISSONS_RATIO = 0.3  # [-]
 DENSITY = 8000.0  # [kg/m^3]
 
 
-def bar(title: str, *, particles: int, poissons_ratio: float, scheme: MovingScheme) -> SceneBuilder:
+def bar(title: str, *, particles: int, poissons_ratio: float) -> SceneBuilder:
     """A bar in one dimension, in uniaxial strain, with a particle on each end."""
     shape = {"type": "interval", "length": LENGTH}
     material = NeoHookean(YOUNGS_MODULUS, poissons_ratio, DENSITY)
     spacing = LENGTH / (particles - 1)
-    builder = solid(title, "bar", shape, spacing, material, discretisation=ON_BOUNDARY)
-    builder = builder.integrator(scheme.integrator, time_step_factor=scheme.time_step_factor)
-    return with_scheme(builder, scheme)
+    return solid(title, "bar", shape, spacing, material)
 
 
 def with_viscosity(builder: SceneBuilder, linear: float, quadratic: float) -> SceneBuilder:

@@ -17,7 +17,7 @@ from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.simulation import Simulation
-from solidsph_cases._scheme import ON_BOUNDARY
+from solidsph_cases._scene import ON_BOUNDARY
 
 LENGTH = 1.0  # of the range that is looked at [m]
 

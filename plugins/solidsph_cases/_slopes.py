@@ -14,7 +14,7 @@ from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Measurement
 from solidsph_cases._line import LENGTH, F, Line, bare_line, complete_line
-from solidsph_cases._scheme import check_count
+from solidsph_cases._scene import check_count
 
 _COVERS = (1.5, 2.2, 2.5, 3.5, 5.5)
 

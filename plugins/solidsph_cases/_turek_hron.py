@@ -15,7 +15,7 @@ from solidsph.maths.arrays import Array
 from solidsph.results.record import Record
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph_builtin.materials.saint_venant_kirchhoff import SaintVenantKirchhoff
-from solidsph_cases._scheme import FITTED, ON_BOUNDARY, Scheme, box, solid, with_scheme
+from solidsph_cases._scene import box, solid
 from solidsph_cases.drawing.fields import LARGEST_STRESS, field, outline, principal_stress
 from solidsph_cases.drawing.sheet import BELOW, Bar, Mark, Panel, line
 
@@ -37,7 +37,6 @@ class Clamp:
 
     face: str
     shape: Mapping[str, Any]
-    discretisation: Mapping[str, Any]
     source: str
     rest: tuple[float, float]  # displacement of the tip in equilibrium [m]
     first_minimum: float  # of u_y after release [m]
@@ -46,13 +45,11 @@ class Clamp:
     oscillation: tuple[float, float, float, float, float] | None
 
 
-_BOX = box(LENGTH, HEIGHT, origin=[0.0, -0.5 * HEIGHT])
 _MATERIAL = SaintVenantKirchhoff(youngs_modulus=1.4e6, poissons_ratio=0.4, density=1000.0)
 
 STRAIGHT = Clamp(
     face="left",
-    shape=_BOX,
-    discretisation=FITTED,
+    shape=box(LENGTH, HEIGHT, origin=[0.0, -0.5 * HEIGHT]),
     source=OURS,
     rest=(-7.087e-3, -65.568e-3),
     first_minimum=-128.66e-3,
@@ -69,16 +66,6 @@ ARC = Clamp(
         "type": "difference",
         "of": box(LENGTH - _CORNER, HEIGHT, origin=[_CORNER, -0.5 * HEIGHT]),
         "minus": {"type": "disc", "radius": RADIUS, "centre": [-RADIUS, 0.0]},
-    },
-    discretisation={
-        "type": "fitted-moments",
-        "of": {
-            "type": "mapped",
-            "of": ON_BOUNDARY,
-            "before": _BOX,
-            # Each row is stretched a little, from the arc to the free end.
-            "to": {"x": f"X + (sqrt({RADIUS**2!r} - Y*Y) - {RADIUS!r})*(1 - X/{LENGTH!r})"},
-        },
     },
     source=SOURCE,
     rest=(-7.187e-3, -66.10e-3),
@@ -103,21 +90,18 @@ def clamp_named(case: str, name: str) -> Clamp:
     return CLAMPS[name]
 
 
-def beam(title: str, clamp: Clamp, across: int, scheme: Scheme) -> SceneBuilder:
-    """The beam under gravity, with so many particles across, on its boundary too.
+def beam(title: str, clamp: Clamp, across: int) -> SceneBuilder:
+    """The beam under gravity, with so many particles across, both surfaces included.
 
-    The clamp and the tip are then at their true places. With an even number across, the tip lies
-    halfway between two particles.
+    With an even number across, the tip lies halfway between two particles.
     """
     spacing = HEIGHT / (across - 1)
     tags = {"tip": f"X > {LENGTH - 0.1 * spacing!r} and abs(Y) < {0.6 * spacing!r}"}
-    options = {"discretisation": clamp.discretisation, "tags": tags}
-    builder = (
-        solid(title, "beam", clamp.shape, spacing, _MATERIAL, **options)
+    return (
+        solid(title, "beam", clamp.shape, spacing, _MATERIAL, tags=tags)
         .boundary("clamp", where=clamp.face)
         .effect("body-force", acceleration={"y": -GRAVITY}, label="gravity")
     )
-    return with_scheme(builder, scheme)
 
 
 def tip(record: Record) -> Array:

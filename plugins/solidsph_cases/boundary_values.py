@@ -18,7 +18,7 @@ from solidsph_cases._boundary_pictures import boundary_sheet
 from solidsph_cases._boundary_ways import block_condition, block_size, largest_error, miss, smoothed
 from solidsph_cases._compare import ROUNDING, closed_form
 from solidsph_cases._line import LENGTH, F, Line, check_covers, complete_line, left_by_the_cut
-from solidsph_cases._scheme import check_count
+from solidsph_cases._scene import check_count
 from solidsph_cases.drawing.sheet import Sheet
 
 _MOMENTS = "moments of the kernel on an endless lattice"

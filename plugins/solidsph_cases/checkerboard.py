@@ -16,9 +16,11 @@ from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Measurement, Trial
 from solidsph_cases._compare import finished
 from solidsph_cases._energy import energy_kept
-from solidsph_cases._scheme import ON_BOUNDARY, SOFT, box, check_count, in_motion, solid
+from solidsph_cases._scene import SOFT, box, check_count, solid
 
 SPACING = 0.1  # [m]
+
+_STEP = 0.1  # of the critical step [-]
 
 # How far alternating particles may come: a wave of two spacings has the frequency pi c / spacing,
 # and one of a fifth of it is still a wave.
@@ -36,6 +38,12 @@ class Checkerboard(Case):
 
     title = "A checkerboard start"
     source = "a wave of two spacings swings by v0 / omega, omega = pi c / spacing"
+    studies = {
+        "hourglass": "without it particles go 1.4 times as far as a wave would have them in 2D, "
+        "1.1 times in 3D; with it 0.94 and 0.81 times",
+        "time_step_factor": "all energy is in the fastest vibration, and wavers by a quarter of "
+        "the square of its frequency times the step: 2.6 % at the default step, 0.05 % here",
+    }
     sweep = {"particles": (9, 13), "hourglass": (0.1, 0.5, 1.0)}
     trials = {
         "2D": Trial(brief={"transits": 10.0}),
@@ -51,13 +59,6 @@ class Checkerboard(Case):
     particles: int = 11  # along each side
     speed: float = number(default=1e-3)  # of each at the start, over the wave speed [-]
     transits: float = number(default=50.0)  # duration, in transits of a side
-    kernel: str = "cubic-spline"
-    cover: float = number(default=2.2)  # [spacings]
-    gradient: str = "quadratic"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
-    engine: str = "auto"
-    integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.05)  # of the largest step
     energy_tolerance: float = number(default=1e-3)  # largest change that passes [-]
 
     def __attrs_post_init__(self) -> None:
@@ -74,9 +75,14 @@ class Checkerboard(Case):
         side = SPACING * (self.particles - 1)
         shape = box(*[side] * d)
         signs = "*".join(f"cos({pi / SPACING!r}*{name})" for name in "XYZ"[:d])
-        builder = solid(self.title, "body", shape, SPACING, SOFT, discretisation=ON_BOUNDARY)
-        builder = builder.initial(velocity=dict.fromkeys("xyz"[:d], f"{self.speed * c!r}*{signs}"))
-        return {"body": in_motion(builder, self, self.transits * side / c, 200).scene()}
+        builder = (
+            solid(self.title, "body", shape, SPACING, SOFT)
+            .initial(velocity=dict.fromkeys("xyz"[:d], f"{self.speed * c!r}*{signs}"))
+            .effect("hourglass-control")
+            .integrator(time_step_factor=_STEP)
+            .duration(self.transits * side / c)
+        )
+        return {"body": builder.scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["body"]

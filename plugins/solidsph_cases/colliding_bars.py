@@ -21,7 +21,7 @@ from solidsph.studies.case import Case, Curves, Measurement, Trial
 from solidsph_builtin.materials.linear_elastic import LinearElastic
 from solidsph_cases._compare import compared, finished, vanishing
 from solidsph_cases._energy import residual_over_start
-from solidsph_cases._scheme import box, check_all_positive, check_count, with_scheme
+from solidsph_cases._scene import box, check_all_positive, check_count
 from solidsph_cases.drawing.sheet import Panel, Sheet, line
 
 LENGTH = 1.0  # of each bar [m]
@@ -60,12 +60,6 @@ class CollidingBars(Case):
     across: int = 6  # and across it, in 2D
     speed: float = number(default=0.01)  # v over the wave speed [-]
     strength: float = number(default=1.0)  # of the contact [-]
-    kernel: str = "cubic-spline"
-    cover: float = number(default=2.2)  # [spacings]
-    gradient: str = "corrected"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
-    engine: str = "auto"
-    time_step_factor: float = number(default=0.5)  # of the largest step
 
     def __attrs_post_init__(self) -> None:
         check_count("colliding-bars", "particles", self.particles, 10)
@@ -103,20 +97,17 @@ class CollidingBars(Case):
                 if self.dimension == 1
                 else box(LENGTH, self.width, origin=[start, 0.0])
             )
-            builder = builder.body(
-                name, shape=shape, spacing=LENGTH / self.particles, discretisation="lattice"
-            )
+            builder = builder.body(name, shape=shape, spacing=LENGTH / self.particles)
         if self.dimension == 2:
             builder = builder.boundary("clamp", where="all", axes=["y"])
         builder = (
             builder.material(describe("materials", MATERIAL))
             .effect("contact", strength=self.strength)
             .initial(where=f"X < {-0.5 * gap!r}", velocity={"x": self.velocity})
-            .integrator("central-difference", time_step_factor=self.time_step_factor)
             .duration(_DURATION * self.transit)
             .outputs(_OUTPUTS)
         )
-        return {"bars": with_scheme(builder, self).scene()}
+        return {"bars": builder.scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["bars"]
@@ -161,9 +152,10 @@ class CollidingBars(Case):
 
     def mean_velocities(self, record: Record) -> Array:
         """Of both bars along the axis, (t, 2) [m/s]."""
-        v = record.field("velocity")[:][:, :, 0]
-        bodies = record.particles.bodies
-        return np.column_stack([v[:, bodies[name]].mean(axis=1) for name in ("first", "second")])
+        particles = record.particles
+        v, V = record.field("velocity")[:][:, :, 0], particles.volumes
+        rows = (particles.bodies[name] for name in ("first", "second"))
+        return np.column_stack([v[:, row] @ V[row] / V[row].sum() for row in rows])
 
     def pictures(self, records: Mapping[str, Record]) -> Mapping[str, Sheet]:
         """The force of contact and both mean velocities against time, in transits."""

@@ -18,7 +18,7 @@ from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Curves, Measurement, Trial
 from solidsph_cases._compare import finished, vanishing
 from solidsph_cases._energy import residual_over_start, smallest_volume_ratio
-from solidsph_cases._scheme import check_all_positive, check_count, with_scheme
+from solidsph_cases._scene import check_all_positive, check_count
 from solidsph_cases.drawing.fields import scatter
 from solidsph_cases.drawing.sheet import Bar, Panel, Sheet, line
 
@@ -28,6 +28,7 @@ YOUNGS_MODULUS, POISSONS_RATIO, DENSITY = 1e7, 0.3975, 1010.0  # [Pa], [-], [kg/
 # The rings begin so far apart: a free flight that shows that nothing happens in it [m].
 _APART = 0.004
 _OUTPUTS = 120
+_STEP = 0.5  # of the critical step [-]
 
 # Neighbours that come closer than half their first distance, or part so far, have clumped or broken
 # apart. Where the rings bend most, their inner side is pressed together by a fifth and the outer
@@ -46,12 +47,16 @@ class CollidingRings(Case):
     rings break, by the numbers alone, which is what Monaghan and Gray showed and mended. The
     outcome is known in kind: the rings flatten where they touch, part, and go on vibrating;
     momentum stays, and so does energy; neighbours remain neighbours. We know of no published value
-    of the speed after the impact, so that only its convergence is given: 0.799, 0.812, 0.810 and
-    0.809 of that before, with 5, 7, 10 and 14 particles from rim to rim.
+    of the speed after the impact, so that only its convergence is given: 0.795, 0.800, 0.800 and
+    0.804 of that before, with 5, 7, 8 and 10 particles from rim to rim.
     """
 
     title = "Two rubber rings collide"
     source = _SOURCE
+    studies = {
+        "time_step_factor": "pairs that touch and part do so between steps: at the default one "
+        "that leaves 0.12 % of the energy unaccounted for with 4 particles from rim to rim"
+    }
     sweep = {"through": (5, 7, 10, 14)}
     trials = {
         "0.059 c0": Trial({}, {"through": 4}),
@@ -68,12 +73,6 @@ class CollidingRings(Case):
     friction: float = number(default=0.0)  # coefficient [-]
     duration: float = number(default=0.012)  # [s]
     closest: float = number(default=0.5)  # neighbours may come, in first distances [-]
-    kernel: str = "cubic-spline"
-    cover: float = number(default=2.2)  # [spacings]
-    gradient: str = "corrected"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
-    engine: str = "auto"
-    time_step_factor: float = number(default=0.5)  # of the largest step
 
     def __attrs_post_init__(self) -> None:
         check_count("colliding-rings", "through", self.through, 4)
@@ -95,7 +94,6 @@ class CollidingRings(Case):
                 name,
                 shape={**ring, "centre": [side * x, side * y]},
                 spacing=(OUTER - INNER) / self.through,
-                discretisation="lattice",
             ).initial(where=name, velocity={"x": -side * v})
         builder = (
             builder.material(
@@ -105,11 +103,11 @@ class CollidingRings(Case):
                 density=DENSITY,
             )
             .effect("contact", itself=["all"], friction=self.friction)
-            .integrator("velocity-verlet", time_step_factor=self.time_step_factor)
+            .integrator(time_step_factor=_STEP)
             .duration(self.duration)
             .outputs(_OUTPUTS)
         )
-        return {"rings": with_scheme(builder, self).scene()}
+        return {"rings": builder.scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["rings"]

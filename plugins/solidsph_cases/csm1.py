@@ -13,7 +13,7 @@ from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Measurement
 from solidsph_cases._compare import compared
-from solidsph_cases._scheme import check_all_positive, check_count
+from solidsph_cases._scene import check_all_positive, check_count
 from solidsph_cases._turek_hron import Clamp, beam, beam_panel, clamp_named, stress_bar, tip
 from solidsph_cases.drawing.sheet import Sheet, mark
 
@@ -37,11 +37,6 @@ class Csm1(Case):
 
     clamp: str = "arc"  # or "straight", whose reference is our own
     across: int = 5  # particles across the beam
-    kernel: str = "cubic-spline"
-    cover: float = number(default=3.0)  # [spacings]
-    gradient: str = "consistent"
-    hourglass: float = number(default=0.0)  # strength [-]; 0 adds none
-    engine: str = "auto"
     load_steps: int = 1
     tolerance: float = number(default=0.005)  # largest error of the tip that passes [-]
 
@@ -57,7 +52,7 @@ class Csm1(Case):
         return clamp_named("csm1", self.clamp)
 
     def scenes(self) -> Mapping[str, Scene]:
-        builder = beam(self.title, self.held, self.across, self).statics(load_steps=self.load_steps)
+        builder = beam(self.title, self.held, self.across).statics(load_steps=self.load_steps)
         return {"csm1": builder.duration(1.0).scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:

@@ -15,7 +15,7 @@ from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Measurement
 from solidsph_cases._compare import compared
-from solidsph_cases._scheme import check_all_positive, check_count
+from solidsph_cases._scene import check_all_positive, check_count
 from solidsph_cases._turek_hron import (
     Clamp,
     beam,
@@ -59,13 +59,6 @@ class Csm3(Case):
     clamp: str = "arc"  # or "straight", whose reference is our own
     across: int = 5  # particles across the beam
     duration: float = number(default=0.5)  # [s]; from 1.9 on the oscillation is measured too
-    kernel: str = "cubic-spline"
-    cover: float = number(default=2.6)  # [spacings]
-    gradient: str = "consistent"
-    hourglass: float = number(default=0.0)  # strength [-]; 0 adds none
-    engine: str = "auto"
-    integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.6)  # of the largest step
     tolerance: float = number(default=0.01)  # largest error that passes [-]
 
     def __attrs_post_init__(self) -> None:
@@ -80,8 +73,7 @@ class Csm3(Case):
 
     def scenes(self) -> Mapping[str, Scene]:
         builder = (
-            beam(self.title, self.held, self.across, self)
-            .integrator(self.integrator, time_step_factor=self.time_step_factor)
+            beam(self.title, self.held, self.across)
             .duration(self.duration)
             .outputs(ceil(_RATE * self.duration))
         )

@@ -18,7 +18,7 @@ from solidsph.studies.case import Case, Measurement, Trial
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 from solidsph_cases._compare import finished, vanishing
 from solidsph_cases._energy import total_energy
-from solidsph_cases._scheme import FITTED, box, check_all_positive, check_count, in_motion, solid
+from solidsph_cases._scene import box, check_all_positive, check_count, solid
 from solidsph_cases.drawing.fields import LARGEST_STRESS, field, outline, principal_stress
 from solidsph_cases.drawing.sheet import Bar, Panel, Sheet, line, mark
 
@@ -48,20 +48,13 @@ class ElasticSpin(Case):
     source = "conservation of angular momentum and energy"
     sweep = {
         "across": (11, 21),
-        "time_step_factor": (0.1, 0.2, 0.4),
-        "gradient": ("quadratic", "corrected"),
+        "time_step_factor": (0.1, 0.2, 0.4, 0.7),
+        "gradient": ("consistent", "quadratic", "corrected"),
     }
     trials = {"1000 turns": Trial({"turns": 1000.0, "across": 11}, {"turns": 5.0})}
 
     turns: float = number(default=10.0)  # duration, in turns of the rigid square
     across: int = 21  # particles along a side
-    kernel: str = "cubic-spline"
-    cover: float = number(default=2.2)  # [spacings]
-    gradient: str = "quadratic"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
-    engine: str = "auto"
-    integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.4)  # of the largest step
     momentum_tolerance: float = number(default=1e-10)  # relative change that passes [-]
     energy_tolerance: float = number(default=1e-3)  # relative drift that passes [-]
 
@@ -76,10 +69,13 @@ class ElasticSpin(Case):
     def scenes(self) -> Mapping[str, Scene]:
         w, spacing = ANGULAR_VELOCITY, SIDE / (self.across - 1)
         shape = box(SIDE, SIDE, origin=[-0.5 * SIDE, -0.5 * SIDE])
-        builder = solid(self.title, "square", shape, spacing, RUBBER, discretisation=FITTED)
-        builder = builder.initial(velocity={"x": f"-{w!r}*Y", "y": f"{w!r}*X"})
-        outputs = min(_MOST_OUTPUTS, ceil(_OUTPUTS_A_TURN * self.turns))
-        return {"spin": in_motion(builder, self, self.turns * 2.0 * pi / w, outputs).scene()}
+        builder = (
+            solid(self.title, "square", shape, spacing, RUBBER)
+            .initial(velocity={"x": f"-{w!r}*Y", "y": f"{w!r}*X"})
+            .duration(self.turns * 2.0 * pi / w)
+            .outputs(min(_MOST_OUTPUTS, ceil(_OUTPUTS_A_TURN * self.turns)))
+        )
+        return {"spin": builder.scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["spin"]

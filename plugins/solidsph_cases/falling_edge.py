@@ -17,7 +17,7 @@ from solidsph.studies.case import Case, Curves, Measurement
 from solidsph_cases._compare import closed_form
 from solidsph_cases._line import LENGTH, Line, check_covers, complete_line
 from solidsph_cases._moments import Moments, of_lattice
-from solidsph_cases._scheme import check_count
+from solidsph_cases._scene import check_count
 from solidsph_cases._slopes import SlopeOfEdge
 from solidsph_cases.drawing.profiles import KEY, by_cover
 from solidsph_cases.drawing.sheet import Mark, Panel, Sheet, theory

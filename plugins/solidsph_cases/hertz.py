@@ -17,14 +17,7 @@ from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Curves, Measurement
 from solidsph_builtin.materials.linear_elastic import LinearElastic
 from solidsph_cases._compare import compared
-from solidsph_cases._scheme import (
-    ON_BOUNDARY,
-    box,
-    check_all_positive,
-    check_count,
-    solid,
-    with_scheme,
-)
+from solidsph_cases._scene import check_all_positive, check_count, solid
 from solidsph_cases.drawing.fields import scatter
 from solidsph_cases.drawing.sheet import Bar, Panel, Sheet, level, line
 
@@ -50,10 +43,10 @@ class Hertz(Case):
     """The lower side of a long block has the radius R; its top is moved down until the foot is
     flat over a tenth of R, in plane strain and in equilibrium.
 
-    Rows of particles follow the round side, so that the outermost lie on it. The load P is what
-    the plane carries; half-width and peak pressure come from the parabola that fits the squares of
-    the pressures p^2 = p0^2 (1 - x^2 / a^2) best. Against an elastic half-plane the block is
-    finite, which changes the pressures by less than a hundredth. One half is simulated.
+    Particles lie on the round side. The load P is what the plane carries; half-width and peak
+    pressure come from the parabola that fits the squares of the pressures
+    p^2 = p0^2 (1 - x^2 / a^2) best. Against an elastic half-plane the block is finite, which
+    changes the pressures by less than a hundredth. One half is simulated.
     """
 
     title = "A round foot on a rigid plane"
@@ -62,11 +55,6 @@ class Hertz(Case):
 
     in_contact: int = 8  # particles from the middle of the contact to its edge
     strength: float = number(default=10.0)  # of the wall [-]
-    kernel: str = "cubic-spline"
-    cover: float = number(default=2.2)  # [spacings]
-    gradient: str = "consistent"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
-    engine: str = "auto"
 
     def __attrs_post_init__(self) -> None:
         check_count("hertz", "in_contact", self.in_contact, 3)
@@ -79,20 +67,13 @@ class Hertz(Case):
 
     def scenes(self) -> Mapping[str, Scene]:
         side = _BLOCK * _HALF_WIDTH
-        rows = {
-            "type": "mapped",
-            "of": ON_BOUNDARY,
-            "before": box(side, side),
-            "to": {"y": f"Y + X**2/{2.0 * RADIUS!r}*(1 - Y/{side!r})"},
-        }
         tags = {
             "middle": f"X < {0.1 * self.spacing!r}",
             "upper": f"Y > {side - 0.1 * self.spacing!r}",
         }
         shape = {"type": "polygon", "vertices": _outline(side, self.spacing)}
-        options = {"discretisation": rows, "tags": tags}
         builder = (
-            solid(self.title, "foot", shape, self.spacing, MATERIAL, **options)
+            solid(self.title, "foot", shape, self.spacing, MATERIAL, tags=tags)
             .boundary("clamp", where="middle", axes=["x"])
             .boundary(
                 "prescribed-motion",
@@ -110,7 +91,7 @@ class Hertz(Case):
             .statics(load_steps=4)
             .duration(1.0)
         )
-        return {"foot": with_scheme(builder, self).scene()}
+        return {"foot": builder.scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records["foot"]

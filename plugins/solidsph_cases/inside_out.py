@@ -12,7 +12,7 @@ from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Measurement, Trial
 from solidsph_cases._energy import smallest_volume_ratio
-from solidsph_cases._scheme import ON_BOUNDARY, SOFT, box, check_count, solid, with_scheme
+from solidsph_cases._scene import SOFT, box, check_count, solid
 
 
 @final
@@ -33,11 +33,6 @@ class InsideOut(Case):
 
     particles: int = 9  # along each side
     size: float = number(default=1.6)  # half of the piece's side [spacings]
-    kernel: str = "cubic-spline"
-    cover: float = number(default=2.2)  # [spacings]
-    gradient: str = "quadratic"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
-    engine: str = "auto"
 
     def __attrs_post_init__(self) -> None:
         check_count("inside-out", "particles", self.particles, 5)
@@ -47,14 +42,13 @@ class InsideOut(Case):
         middle = spacing * (self.particles // 2)
         near = self.size * spacing
         tags = {"piece": " and ".join(f"abs({axis} - {middle!r}) < {near!r}" for axis in "XY")}
-        options = {"discretisation": ON_BOUNDARY, "tags": tags}
         builder = (
-            solid(self.title, "square", box(1.0, 1.0), spacing, SOFT, **options)
+            solid(self.title, "square", box(1.0, 1.0), spacing, SOFT, tags=tags)
             .initial(where="piece", displacement={"x": f"-2*(X - {middle!r})"})
             .duration(0.1)
             .outputs(10)
         )
-        return {"square": with_scheme(builder, self).scene()}
+        return {"square": builder.scene()}
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         return [smallest_volume_ratio(records["square"])]

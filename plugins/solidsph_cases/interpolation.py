@@ -27,7 +27,7 @@ from solidsph_cases._line import (
     whole_line,
 )
 from solidsph_cases._moments import Moments, of_lattice
-from solidsph_cases._scheme import check_count
+from solidsph_cases._scene import check_count
 from solidsph_cases._slopes import SlopeOfQuartic
 from solidsph_cases.drawing.profiles import KEY, by_cover
 from solidsph_cases.drawing.sheet import Panel, Sheet, note, theory

@@ -16,26 +16,20 @@ from solidsph.registry.parameters import check_positive, number
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_builder import SceneBuilder
+from solidsph.scene.scene_data import PartLike
 from solidsph.studies.case import Case, Curves, Measurement, Trial
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 from solidsph_cases import _stretch_theory as theory
 from solidsph_cases._compare import compared, finished
-from solidsph_cases._scheme import (
-    ON_BOUNDARY,
-    box,
-    check_all_positive,
-    check_count,
-    solid,
-    with_scheme,
-)
+from solidsph_cases._scene import ON_BOUNDARY, box, check_all_positive, check_count, solid
 from solidsph_cases._stretch_history import History, StressCurve
 from solidsph_cases._stretch_pictures import stress_over_stretch
 from solidsph_cases.drawing.sheet import Sheet
 
 BAR, MOVING, PLAIN = "bar", "bar-in-motion", "bar-plain-sums"
 
-# The paper's sums need complete supports, and a cover at which they make 1 of a gradient of 1.
-_PLAIN_COVER = 5.5
+# The paper's sums need complete supports, of 5.5 spacings.
+_GHOSTS = {**ON_BOUNDARY, "ghosts": 6}
 
 _OUTPUTS_A_TRANSIT = 10
 
@@ -71,6 +65,7 @@ class LargeStretch(Case):
     title = "A bar and strips pulled to six times their length"
     source = "Ismail & Reddy, section 5.3, Fig. 15"
     figures = ("fig-15",)
+    studies = dict.fromkeys(("scheme", "discretisation"), "one scene has the paper's own sums")
     sweep = {
         "particles": (16, 31, 61),
         "gradient": ("consistent", "quadratic"),
@@ -87,12 +82,6 @@ class LargeStretch(Case):
     density: float = number(default=1000.0)  # [kg/m^3]
     particles: int = 31  # along the pull
     width: int = 7  # particles across a strip
-    kernel: str = "modified-mollifier"
-    cover: float = number(default=2.5)  # [spacings]
-    gradient: str = "consistent"
-    hourglass: float = number(default=0.0)  # strength [-]; 0 names none
-    engine: str = "auto"
-    time_step_factor: float = number(default=0.5)  # of the largest step
     tolerance: float = number(default=0.02)  # largest error of the mean stress that passes [-]
 
     def __attrs_post_init__(self) -> None:
@@ -131,17 +120,15 @@ class LargeStretch(Case):
     def scenes(self) -> Mapping[str, Scene]:
         moving = {"x": f"{self.speed / self.length!r}*X"}
         return {
-            BAR: with_scheme(self._bar(), self).scene(),
-            MOVING: with_scheme(self._bar().initial(velocity=moving), self).scene(),
-            PLAIN: self._bar(ghosts=6)
-            .kernel(self.kernel, cover=_PLAIN_COVER)
-            .formulation("total-lagrangian", gradient="standard", divergence="plain")
+            BAR: self._bar().scene(),
+            MOVING: self._bar().initial(velocity=moving).scene(),
+            PLAIN: self._bar(discretisation=_GHOSTS)
+            .scheme("paper")
             .boundary("ghost-extension")
             # These sums have no energy near the ends: that is what the scene is to show.
             .energy_tolerance("off")
-            .engine(self.engine)
             .scene(),
-            **{_strip(held): with_scheme(self._strip(held), self).scene() for held in self.across},
+            **{_strip(held): self._strip(held).scene() for held in self.across},
         }
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
@@ -225,9 +212,9 @@ class LargeStretch(Case):
     def _curve(self, held: float | None) -> StressCurve:
         return StressCurve(1.0 if held is None else held, *self.material.lame_parameters)
 
-    def _bar(self, ghosts: int = 0) -> SceneBuilder:
+    def _bar(self, discretisation: PartLike | None = None) -> SceneBuilder:
         shape = {"type": "interval", "length": self.length}
-        return self._pulled(shape, f"{self.title}: bar", ghosts)
+        return self._pulled(shape, f"{self.title}: bar", discretisation)
 
     def _strip(self, held: float) -> SceneBuilder:
         breadth = (self.width - 1) * self.length / (self.particles - 1)
@@ -239,14 +226,14 @@ class LargeStretch(Case):
             .initial(displacement={"x": 0.0, "y": across})
         )
 
-    def _pulled(self, shape: Mapping[str, object], title: str, ghosts: int = 0) -> SceneBuilder:
-        lattice = {**ON_BOUNDARY, "ghosts": ghosts}
+    def _pulled(
+        self, shape: PartLike, title: str, discretisation: PartLike | None = None
+    ) -> SceneBuilder:
         spacing = self.length / (self.particles - 1)
         return (
-            solid(title, "sheet", shape, spacing, self.material, discretisation=lattice)
+            solid(title, "sheet", shape, spacing, self.material, discretisation=discretisation)
             .boundary("prescribed-motion", where="left", displacement={"x": 0.0})
             .boundary("prescribed-motion", where="right", displacement={"x": f"{self.speed!r}*t"})
-            .integrator("central-difference", time_step_factor=self.time_step_factor)
             .duration(self.transits * self.transit)
             .outputs(max(20, round(_OUTPUTS_A_TRANSIT * self.transits)))
         )

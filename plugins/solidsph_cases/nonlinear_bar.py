@@ -28,7 +28,7 @@ from solidsph_cases._bar import (
 )
 from solidsph_cases._compare import alone, compared, finished
 from solidsph_cases._finite_waves import FiniteWave, Law, law_of
-from solidsph_cases._scheme import check_count
+from solidsph_cases._scene import check_count
 from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark, note, theory
 
 # The wave is watched until it has come so far: its exact solution knows no right end.
@@ -38,6 +38,7 @@ _END = 0.9  # of the bar
 _SETTLED = 0.4
 
 _OUTPUTS = 100
+_STEP = 0.5  # of the critical step [-]
 
 _SHOCK = "Rankine-Hugoniot"
 _FAN = "simple wave, v = -integral of c ds"
@@ -56,6 +57,11 @@ class NonlinearBar(Case):
     title = "Waves of finite amplitude in a bar"
     source = "Rankine-Hugoniot conditions and simple waves of Ismail & Reddy's law"
     figures = ("section-6-viscosity",)
+    studies = {
+        "time_step_factor": "viscosity acts on the velocity of half a step ago: the power that it "
+        "takes is off by 2.4 % at the default step with 101 particles, by 1.5 % at this one; and "
+        "in a trial, energies within 0.1 % without viscosity need a smaller one",
+    }
     sweep = {
         "particles": (51, 101, 201, 401),
         "linear": (0.25, 0.5, 1.0),
@@ -63,11 +69,10 @@ class NonlinearBar(Case):
     }
     trials = {
         "pushed and pulled suddenly at 0.3 c": Trial(
-            {"velocities": (0.3,), "time_step_factor": 0.15}, {"particles": 101}
+            {"velocities": (0.3,), "time_step_factor": 0.3}, {"particles": 101}
         ),
         "pushed suddenly at 0.5 c, no viscosity": Trial(
             {"velocities": (0.5,)},
-            {"particles": 101},
             must_fail="nothing gives a shock a width, so that particles run through each other",
         ),
     }
@@ -76,13 +81,6 @@ class NonlinearBar(Case):
     particles: int = 201
     linear: float = number(default=0.5)  # strengths of the artificial viscosity [-]
     quadratic: float = number(default=1.0)
-    kernel: str = "cubic-spline"
-    cover: float = number(default=2.2)  # [spacings]
-    gradient: str = "consistent"
-    hourglass: float = number(default=0.0)  # strength [-]; 0 names none
-    engine: str = "auto"
-    integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.5)  # of the largest step
     plateau_tolerance: float = number(default=0.02)  # largest error of a stress that passes [-]
     speed_tolerance: float = number(default=0.01)  # and of a speed
 
@@ -130,8 +128,9 @@ class NonlinearBar(Case):
             title = f"{self.title}: {name}"
             motion = {"x": f"{wave.velocity!r}*t"}
             builder = (
-                bar(title, particles=self.particles, poissons_ratio=POISSONS_RATIO, scheme=self)
+                bar(title, particles=self.particles, poissons_ratio=POISSONS_RATIO)
                 .boundary("prescribed-motion", where="left", displacement=motion, label="end")
+                .integrator(time_step_factor=_STEP)
                 .duration(_END * LENGTH / wave.head)
                 .outputs(_OUTPUTS)
             )

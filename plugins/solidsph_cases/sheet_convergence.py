@@ -15,12 +15,14 @@ from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import PartLike
 from solidsph.studies.case import Case, Curves, Measurement
+from solidsph.studies.scene_words import changed
 from solidsph_cases._compare import compared, finished
-from solidsph_cases._scheme import check_all_positive, check_count, with_scheme
+from solidsph_cases._scene import check_all_positive, check_count
 from solidsph_cases._sheet import (
     EXTENSION,
     PEAK,
     SOURCE,
+    STUDIES,
     check_hole,
     extensions,
     is_known,
@@ -34,6 +36,7 @@ from solidsph_cases.drawing.convergence import by_spacing, errors_panel
 from solidsph_cases.drawing.fields import LARGEST_STRESS, quarter_circle, quarter_particles
 from solidsph_cases.drawing.sheet import Panel, Sheet, level, line, mark
 
+_COVER = 3.0  # of rows along the hole [spacings]
 ROWS_ALONG, NO_ROWS = "rows along the hole", "no rows"
 ARRANGEMENTS = (ROWS_ALONG, "rows up to the hole", NO_ROWS)
 
@@ -51,6 +54,13 @@ class SheetConvergence(Case):
     title = "A sheet with a hole at rest: convergence"
     source = "Ismail & Reddy, section 5.4: a convergence analysis should be completed"
     figures = ("section-5.4-convergence",)
+    studies = {
+        **STUDIES,
+        "discretisation": "arrangements of particles are what is compared",
+        "gradient": "the recommended one for all of them: particles that a scene arranges by "
+        "itself would get a linear one",
+        "cover": "where rows that follow the hole spread, particles need more of their neighbours",
+    }
     sweep = {
         "across": ((5, 10), (10, 15), (15, 20), (20, 30)),
         "gradient": ("consistent", "quadratic", "corrected"),
@@ -62,13 +72,8 @@ class SheetConvergence(Case):
     traction: float = number(default=5e6)  # on the undeformed edge [Pa]
     jitter: float = number(default=0.2)  # of the particles without rows [spacings]
     seed: int = 1  # of their random numbers
-    kernel: str = "modified-mollifier"
-    cover: float = number(default=3.0)  # [spacings]
-    gradient: str = "consistent"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
-    engine: str = "auto"
-    tolerance: float = number(default=0.01)  # largest error of the displacement that passes [-]
-    peak_tolerance: float = number(default=0.1)  # largest error of the stress that passes [-]
+    tolerance: float = number(default=0.005)  # largest error of the displacement that passes [-]
+    peak_tolerance: float = number(default=0.05)  # largest error of the stress that passes [-]
 
     def __attrs_post_init__(self) -> None:
         check_all_positive("sheet-convergence", self, width="m", traction="Pa")
@@ -105,13 +110,13 @@ class SheetConvergence(Case):
 
     def _scene(self, name: str, count: int) -> Scene:
         spacing = self.width / count
-        discretisation: PartLike = "conforming-lattice"
+        discretisation: PartLike | None = None
         if name == ROWS_ALONG:
             discretisation = rows_along(quarter, self.hole_ratio, self.width, spacing)
         if name == NO_ROWS:
             moved = {"amplitude": self.jitter, "seed": self.seed}
-            discretisation = {"type": "jittered", "of": discretisation, **moved}
-        builder = (
+            discretisation = {"type": "jittered", "of": "fitted", **moved}
+        scene = (
             sheet(
                 title=f"{self.title}: {name}, spacing W/{count}",
                 square=quarter,
@@ -121,10 +126,12 @@ class SheetConvergence(Case):
                 discretisation=discretisation,
             )
             .boundary("traction", where="right", traction={"x": self.traction})
+            .formulation("total-lagrangian", gradient="consistent")
             .duration(1.0)
             .statics()
+            .scene()
         )
-        return with_scheme(builder, self).scene()
+        return changed(scene, "cover", _COVER) if name == ROWS_ALONG else scene
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         measured = []

@@ -20,12 +20,13 @@ from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.studies.case import Case, Curves, Measurement
 from solidsph_cases import _motion_pictures as motion
 from solidsph_cases._compare import compared, finished, vanishing
-from solidsph_cases._scheme import check_all_positive, in_motion, with_scheme
+from solidsph_cases._scene import check_all_positive
 from solidsph_cases._sheet import (
     EXTENSION,
     MATERIAL,
     PEAK,
     SOURCE,
+    STUDIES,
     at_hole,
     check_hole,
     extensions,
@@ -75,14 +76,12 @@ class SheetInMotion(Case):
     undamped sheet it takes one of more than 0.6 W. With a larger hole it is softer and comes to
     rest later: up to 0.7 W, with a damping of 0.3 and 100 crossings to settle.
 
-    Particles lie in the rows of a lattice, the outermost on the hole and on the two planes of
-    symmetry. Those that follow the hole in rows have sharper stresses at rest, but where rows close
-    up beside larger holes their stable step is fifty times smaller.
     """
 
     title = "A sheet with a hole, in motion"
     source = "Ismail & Reddy, section 5.4, Figs. 16 to 18"
     figures = ("fig-16", "fig-17", "fig-18")
+    studies = STUDIES
     sweep = {
         "spacing": (0.2, 0.1, 1.0 / 15.0, 0.05),
         "gradient": ("consistent", "quadratic", "corrected"),
@@ -96,13 +95,6 @@ class SheetInMotion(Case):
     ramp: float = number(default=30.0)  # how long the slow load grows [W / c_p]
     settling: float = number(default=50.0)  # and how long it stays [W / c_p]
     damping: float = number(default=0.5)  # rate of mass damping, then [c_p / W]
-    kernel: str = "modified-mollifier"
-    cover: float = number(default=3.0)  # [spacings]
-    gradient: str = "consistent"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
-    engine: str = "auto"
-    integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.3)  # of the largest step; particles crowd
     tolerance: float = number(default=0.02)  # largest error that passes [-]
     peak_tolerance: float = number(default=0.1)  # of the stress at rest, as in `sheet-convergence`
 
@@ -142,13 +134,12 @@ class SheetInMotion(Case):
     def scenes(self) -> Mapping[str, Scene]:
         S, slow = self.traction, self.ramp + self.settling
         ramp = f"{S!r}*min(t/{self.ramp * self.crossing!r}, 1)"
-        rest = with_scheme(self._sheet(), self)
         return {
             SUDDEN: self._moving(S, self.duration, _OUTPUTS).scene(),
             RAMPED: self._moving(ramp, slow, _OUTPUTS_AT_REST)
             .effect("mass-damping", rate=self.damping / self.crossing)
             .scene(),
-            REST: _pulled(rest, S).duration(1.0).statics().scene(),
+            REST: _pulled(self._sheet(), S).duration(1.0).statics().scene(),
         }
 
     def _sheet(self) -> SceneBuilder:
@@ -158,12 +149,11 @@ class SheetInMotion(Case):
             hole_ratio=self.hole_ratio,
             width=self.width,
             spacing=self.spacing,
-            discretisation="conforming-lattice",
         )
 
     def _moving(self, traction: float | str, crossings: float, outputs: int) -> SceneBuilder:
         duration, outputs = crossings * self.crossing, ceil(outputs * crossings)
-        return _pulled(in_motion(self._sheet(), self, duration, outputs), traction)
+        return _pulled(self._sheet(), traction).duration(duration).outputs(outputs)
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         return [*self._extension(records), *self._stress(records)]

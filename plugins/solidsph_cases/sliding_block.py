@@ -16,7 +16,7 @@ from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Curves, Measurement, Trial
 from solidsph_cases._compare import compared, finished, vanishing
 from solidsph_cases._energy import residual_over_work
-from solidsph_cases._scheme import SOFT, box, check_all_positive, check_count, solid, with_scheme
+from solidsph_cases._scene import SOFT, box, check_all_positive, check_count, solid
 from solidsph_cases.drawing.sheet import Panel, Sheet, line, mark
 
 LENGTH, HEIGHT = 0.2, 0.1  # [m]
@@ -46,7 +46,7 @@ class SlidingBlock(Case):
     title = "A block on an incline"
     source = _SOURCE
     sweep = {"along": (8, 12, 16)}
-    trials = {"slides, and sticks": Trial({}, {"along": 8, "duration": 0.2})}
+    trials = {"slides, and sticks": Trial({}, {"along": 12, "duration": 0.2})}
 
     friction: float = number(default=0.3)  # f [-]
     steep: float = number(default=30.0)  # angle at which it slides [degrees]
@@ -54,12 +54,6 @@ class SlidingBlock(Case):
     along: int = 12  # particles along the block
     duration: float = number(default=0.4)  # [s]
     ramp: float = number(default=0.1)  # until gravity is whole [s]
-    kernel: str = "cubic-spline"
-    cover: float = number(default=2.2)  # [spacings]
-    gradient: str = "corrected"
-    hourglass: float = number(default=0.5)  # strength [-]; 0 adds none
-    engine: str = "auto"
-    time_step_factor: float = number(default=0.5)  # of the largest step
 
     def __attrs_post_init__(self) -> None:
         check_count("sliding-block", "along", self.along, 6)
@@ -77,8 +71,8 @@ class SlidingBlock(Case):
         }
         title = f"{self.title} of {degrees:g} degrees"
         shape, spacing = box(LENGTH, HEIGHT), LENGTH / self.along
-        builder = (
-            solid(title, "block", shape, spacing, SOFT, discretisation="lattice")
+        return (
+            solid(title, "block", shape, spacing, SOFT)
             .effect("body-force", acceleration=weight, label="gravity")
             .effect(
                 "rigid-wall",
@@ -87,11 +81,10 @@ class SlidingBlock(Case):
                 friction=self.friction,
                 label="incline",
             )
-            .integrator("velocity-verlet", time_step_factor=self.time_step_factor)
             .duration(self.duration)
             .outputs(_OUTPUTS)
+            .scene()
         )
-        return with_scheme(builder, self).scene()
 
     def moved(self, times: Array) -> Array:
         """Way under an acceleration of 1 m/s^2 that grows as gravity does, (t,) [m]."""

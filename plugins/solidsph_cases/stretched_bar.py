@@ -13,7 +13,7 @@ from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Measurement, Trial
 from solidsph_cases._compare import finished
 from solidsph_cases._stability_map import TOTAL, UPDATED
-from solidsph_cases.tensile_instability import TensileInstability, spread
+from solidsph_cases.tensile_instability import STUDIES, TensileInstability, spread
 
 
 @final
@@ -23,6 +23,7 @@ class StretchedBar(Case):
 
     title = "A stretched bar, its middle particle out of place"
     source = "Ismail & Reddy, section 5.2: a disturbance spreads"
+    studies = STUDIES
     sweep = {"spacing": (5e-3, 2.5e-3), "cover": (3.5, 5.5)}
     trials = {
         "total Lagrangian": Trial(),

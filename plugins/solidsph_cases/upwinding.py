@@ -17,7 +17,7 @@ from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 from solidsph.studies.case import Case, Curves, Measurement
 from solidsph.studies.spectrum import spectrum
-from solidsph_cases._scheme import ON_BOUNDARY, check_count
+from solidsph_cases._scene import ON_BOUNDARY, check_count
 from solidsph_cases.drawing.sheet import Mark, Panel, Sheet, line, mark
 
 # A growth by less than this in the time of a wave across a spacing is rounding of the spectrum.

@@ -31,7 +31,7 @@ from solidsph_cases._bar_histories import SOURCE, Histories
 from solidsph_cases._bar_pictures import Column, histories_sheet
 from solidsph_cases._bar_waves import FREE, HELD, BarWaves, Pulse, smooth_pulse, square_pulse
 from solidsph_cases._compare import alone, finished
-from solidsph_cases._scheme import ON_BOUNDARY, check_all_positive, check_count, solid
+from solidsph_cases._scene import ON_BOUNDARY, check_all_positive, check_count, solid
 from solidsph_cases._wave_measures import STATIONS, TRAVELLING
 from solidsph_cases.drawing.convergence import errors_panel
 from solidsph_cases.drawing.sheet import Sheet
@@ -84,6 +84,10 @@ class WaveBar(Case):
     title = "A small stress wave in a bar"
     source = "Ismail & Reddy, section 5.1, Figs. 10 and 11"
     figures = ("fig-10", "fig-11")
+    studies = dict.fromkeys(
+        ("scheme", "kernel", "cover", "discretisation"),
+        "one scene has the paper's own sums, completed by ghosts",
+    )
 
     particles: int = 61
     stress: float = number(default=-100e3)  # of the pulse [Pa]
@@ -93,13 +97,6 @@ class WaveBar(Case):
     paper_cover: float = number(default=3.5)  # of the paper's own sums [spacings]
     linear: float = number(default=0.5)  # strengths of the artificial viscosity [-]
     quadratic: float = number(default=1.0)
-    kernel: str = "cubic-spline"
-    cover: float = number(default=2.2)  # [spacings]
-    gradient: str = "consistent"
-    hourglass: float = number(default=0.0)  # strength [-]; 0 adds none
-    engine: str = "auto"
-    integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.5)  # of the largest step
 
     def __attrs_post_init__(self) -> None:
         for count in (self.particles, *self.convergence):
@@ -139,9 +136,7 @@ class WaveBar(Case):
 
     def priced(self) -> Case:
         """The smooth pulse alone."""
-        return SmoothPulse(
-            **{field.name: getattr(self, field.name) for field in attrs.fields(SmoothPulse)}
-        )
+        return SmoothPulse(self.particles)
 
     def scenes(self) -> Mapping[str, Scene]:
         smooth, square = self.pulses
@@ -170,7 +165,7 @@ class WaveBar(Case):
         title = f"{self.title}: {pulse.name} pulse, {reading.label}"
         nu = reading.poissons_ratio
         return (
-            bar(title, particles=particles, poissons_ratio=nu, scheme=self)
+            bar(title, particles=particles, poissons_ratio=nu)
             .boundary("clamp", where="right")
             .duration(self.transits * LENGTH / reading.speed)
             .outputs(_OUTPUTS)
@@ -192,8 +187,8 @@ class WaveBar(Case):
         lattice = {**ON_BOUNDARY, "ghosts": ceil(self.paper_cover)}
         builder = (
             solid(title, "bar", shape, spacing, material, discretisation=lattice)
+            .scheme("paper")
             .kernel("modified-mollifier", cover=self.paper_cover)
-            .formulation("total-lagrangian", gradient="standard", divergence="plain")
             # The paper's sums have no energy near the ends, and what it shows is the wave.
             .energy_tolerance("off")
             .boundary("clamp", where="right")
@@ -201,10 +196,8 @@ class WaveBar(Case):
         return (
             self._with_moved_end(builder, PAPER, pulse)
             .boundary("ghost-extension")
-            .integrator("central-difference", time_step_factor=0.5)
             .duration(self.transits * LENGTH / PAPER.speed)
             .outputs(_OUTPUTS)
-            .engine(self.engine)
         )
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
@@ -330,17 +323,10 @@ class SmoothPulse(Case):
     }
 
     particles: int = 61
-    kernel: str = "cubic-spline"
-    cover: float = number(default=2.2)  # [spacings]
-    gradient: str = "consistent"
-    hourglass: float = number(default=0.0)  # strength [-]; 0 adds none
-    engine: str = "auto"
-    integrator: str = "central-difference"
-    time_step_factor: float = number(default=0.5)  # of the largest step
 
     @property
     def _case(self) -> WaveBar:
-        return WaveBar(**attrs.asdict(self), convergence=())
+        return WaveBar(particles=self.particles, convergence=())
 
     def scenes(self) -> Mapping[str, Scene]:
         case = self._case

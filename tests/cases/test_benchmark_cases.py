@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping
 from math import pi
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from solidsph.assembly import step_size
 from solidsph.simulation import Simulation
 from solidsph.studies.case import Case
 from solidsph.studies.case_run import CaseResult, run_case
+from solidsph.studies.variant import with_settings
 from solidsph_cases._turek_hron import CLAMPS, extremum
 from solidsph_cases.cantilever_plate import KL, CantileverPlate, mode_formula, period_of
 from solidsph_cases.csm1 import Csm1
@@ -24,8 +24,8 @@ from solidsph_cases.elastic_spin import ElasticSpin
 from solidsph_cases.sheet_with_hole import SheetWithHole, around_hole
 from tests.commands.test_cli import solidsph
 
-# The scheme whose errors at the clamp are positive and of first order.
-QUADRATIC: dict[str, Any] = {"gradient": "quadratic", "cover": 2.2}
+# Without its bound the step is the CFL step, which is 1.2 times the critical one.
+UNSTABLE = {"time_step_factor": 1.0}
 
 
 def errors(outcome: CaseResult) -> Mapping[str, float]:
@@ -49,35 +49,18 @@ def told(name: str, outcome: CaseResult) -> None:
 # --- Turek and Hron's beam -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("clamp", CLAMPS)
-def test_csm1_approaches_the_reference_with_the_order_of_its_corners(
-    clamp: str, tmp_path: Path
-) -> None:
-    coarse, fine = (
-        run_case(Csm1(clamp=clamp, across=across, tolerance=0.01, **QUADRATIC), tmp_path)
-        for across in (9, 17)
-    )
-    assert coarse.passed
-    # The corners of the clamp are singular: halving the spacing halves the error. Where the
-    # surface is curved and particles beside it stand irregularly, errors of a higher order
-    # outweigh that until the beam is finer.
-    most = {"straight": 2.3, "arc": 4.0}[clamp]
-    for quantity, error in errors(fine).items():
-        assert 0.0 < error < 0.005
-        assert 1.7 < errors(coarse)[quantity] / error < most
-    check_pictures(fine)
-
-
-@pytest.mark.parametrize("clamp", CLAMPS)
-def test_csm1_with_the_consistent_gradient(clamp: str, tmp_path: Path) -> None:
-    # At a straight clamp, whose corners are sharper, 5 across leave 0.6 %.
-    outcome = run_case(Csm1(clamp=clamp, across=9), tmp_path)
+def test_csm1_is_right_with_few_particles(tmp_path: Path) -> None:
+    outcome = run_case(Csm1(across=9, tolerance=0.002), tmp_path)
     assert outcome.passed
-    plain = run_case(Csm1(clamp=clamp, across=9, tolerance=0.1, **QUADRATIC), tmp_path)
-    # Without the push of surface particles it is better, and at the arc, where they stand
-    # irregularly, more than twice so.
-    factor = {"straight": 1.0, "arc": 0.5}[clamp]
-    assert abs(errors(outcome)["tip: u_y"]) < factor * abs(errors(plain)["tip: u_y"])
+    check_pictures(outcome)
+
+
+def test_csm1_approaches_the_reference_with_the_order_of_its_corners(tmp_path: Path) -> None:
+    """The corners of the clamp are singular: halving the spacing about halves the error."""
+    coarse, fine = (errors(run_case(Csm1("straight", across=n), tmp_path)) for n in (9, 17))
+    for quantity, error in fine.items():
+        assert abs(error) < 0.002
+        assert 1.7 < coarse[quantity] / error < 3.0
 
 
 def test_csm1_at_the_tip_between_two_particles(tmp_path: Path) -> None:
@@ -89,7 +72,7 @@ def test_csm1_at_the_tip_between_two_particles(tmp_path: Path) -> None:
 
 
 def test_csm1_measures_what_a_softer_scheme_does_wrong(tmp_path: Path) -> None:
-    outcome = run_case(Csm1(across=5, gradient="corrected"), tmp_path)
+    outcome = run_case(with_settings(Csm1(across=5), {"gradient": "corrected"}), tmp_path)
     assert not outcome.passed
     assert errors(outcome)["tip: u_y"] > 0.05  # linear gradients are one-sided at free surfaces
     assert outcome.measurements[1].verdict == "NOT within 0.5 %"
@@ -107,13 +90,12 @@ def test_csm3_at_five_across(tmp_path: Path) -> None:
 def test_a_case_that_diverges_has_not_passed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # The CFL step is 1.2 times the critical one.
     monkeypatch.setattr(step_size, "safe_step", lambda *scene: None)
-    outcome = run_case(Csm3(across=5, duration=0.05, time_step_factor=1.0), tmp_path)
+    outcome = run_case(with_settings(Csm3(duration=0.05), UNSTABLE), tmp_path)
     assert outcome.runs[0].outcome.startswith("diverged")
     assert not any(m.passed for m in outcome.measurements)
     assert outcome.measurements[0].verdict.startswith("diverged")
-    longer = run_case(Csm3(across=5, duration=2.5, time_step_factor=1.0), tmp_path)
+    longer = run_case(with_settings(Csm3(duration=2.5), UNSTABLE), tmp_path)
     assert len(longer.measurements) == 7
     assert not any(m.passed for m in longer.measurements)
 
@@ -139,13 +121,13 @@ def test_frequency_and_period_of_known_sines() -> None:
 
 @pytest.mark.parametrize("poissons_ratio", [0.3975, 0.22])
 def test_cantilever_plate_in_two_independent_ways(poissons_ratio: float, tmp_path: Path) -> None:
-    case = CantileverPlate(across=5, poissons_ratio=poissons_ratio, tolerance=0.015)
+    case = CantileverPlate(across=5, poissons_ratio=poissons_ratio)
     outcome = run_case(case, tmp_path)
     history, natural = outcome.measurements
     # One has the time loop and an amplitude of a per cent, the other neither: its square apart.
     assert history.value == pytest.approx(natural.value, rel=5e-4)
-    # Too soft at the corners of the clamp, and a finite thickness against a thin plate.
-    assert 1.0 < natural.value / natural.reference < 1.015
+    # By the corners of the clamp; at 0.22 by its finite thickness against a thin plate as well.
+    assert natural.error < {0.3975: 0.004, 0.22: 0.008}[poissons_ratio]
     assert outcome.passed
     check_pictures(outcome)
 
@@ -194,9 +176,9 @@ def test_elastic_spin_notices_a_torque(tmp_path: Path, monkeypatch: pytest.Monke
     scene = Simulation.builder(case.scenes()["spin"]).effect("mass-damping", rate=1.0).scene()
     monkeypatch.setattr(ElasticSpin, "scenes", lambda self: {"spin": scene})
     outcome = run_case(case, tmp_path)
-    # 0.03 s at a rate of 1/s.
+    # 0.03 s at a rate of 1/s; in steps of seven tenths of the critical one.
     assert outcome.measurements[0].value == pytest.approx(
-        1.0 - np.exp(-0.5 * 2.0 * pi / 105.0), rel=1e-3
+        1.0 - np.exp(-0.5 * 2.0 * pi / 105.0), rel=5e-3
     )
     assert [m.passed for m in outcome.measurements] == [False, False, True]
 
@@ -204,22 +186,18 @@ def test_elastic_spin_notices_a_torque(tmp_path: Path, monkeypatch: pytest.Monke
 # --- The sheet with a hole -----------------------------------------------------------------------
 
 
-# Where rows close up, a quadratic fit finds too few neighbours and says so.
-LINEAR = {"kernel": "cubic-spline", "cover": 2.2, "gradient": "corrected"}
-
-
 def test_sheet_with_hole_at_twenty_particles_a_quarter(tmp_path: Path) -> None:
     outcome = run_case(SheetWithHole(), tmp_path)
     assert outcome.passed, outcome.measurements
     check_pictures(outcome)
     # Elsewhere nothing is known.
-    other = run_case(SheetWithHole(hole_ratio=0.4, **LINEAR), tmp_path)
+    other = run_case(SheetWithHole(hole_ratio=0.4), tmp_path)
     assert [m.reference for m in other.measurements] == [None, None, 1.0]
 
 
 def test_the_sheets_rows_follow_the_hole() -> None:
     for ratio in (0.1, 0.2, 0.5, 0.7):
-        case = SheetWithHole(hole_ratio=ratio, spacing=0.05, **LINEAR)
+        case = SheetWithHole(hole_ratio=ratio, spacing=0.05)
         particles = Simulation.builder(case.scenes()["sheet"]).build().particles
         rim = particles.positions[particles.tags["rim"]]
         assert np.hypot(*rim.T) == pytest.approx(case.radius, abs=1e-9)
@@ -253,23 +231,12 @@ def test_a_wrong_parameter_is_one_clear_message(
     case: type[Case], parameters: dict, expected: str
 ) -> None:
     def build() -> None:
-        for scene in case(**parameters).scenes().values():
+        for scene in with_settings(case(), parameters).scenes().values():
             Simulation.builder(scene).build()
 
     with pytest.raises((SceneError, BuildError)) as caught:
         build()
     assert expected in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    "case", [Csm1(), Csm3(), CantileverPlate(), ElasticSpin(), SheetWithHole()]
-)
-def test_a_strength_of_zero_names_no_control(case: Case) -> None:
-    import attrs
-
-    for strength, expected in ((0.0, 0), (0.2, 1)):
-        (scene,) = attrs.evolve(case, hourglass=strength).scenes().values()
-        assert scene.to_toml().count("hourglass-control") == expected
 
 
 def test_a_case_from_the_command_line(tmp_path: Path) -> None:
@@ -291,34 +258,36 @@ def test_a_case_from_the_command_line(tmp_path: Path) -> None:
 
 @pytest.mark.validation
 @pytest.mark.parametrize("clamp", CLAMPS)
-def test_csm1_falls_at_every_refinement(clamp: str, tmp_path: Path) -> None:
-    across = np.array([5, 9, 17, 25, 33])
+def test_csm1_keeps_within_its_bars(clamp: str, tmp_path: Path) -> None:
+    # At 5 across a straight clamp, whose corners are sharper, leaves 0.6 %.
+    for n, most in {5: 0.006, 9: 0.003, 17: 0.003}.items():
+        found = errors(run_case(Csm1(clamp=clamp, across=n), tmp_path))
+        assert max(map(abs, found.values())) < most
+
+
+@pytest.mark.validation
+def test_csm1_falls_at_every_refinement(tmp_path: Path) -> None:
+    across = np.array([5, 9, 17, 25])
     found = []
     for n in across.tolist():
-        outcome = run_case(Csm1(clamp=clamp, across=n, **QUADRATIC), tmp_path)
-        told(f"csm1 {clamp} {n} across", outcome)
+        outcome = run_case(Csm1(clamp="straight", across=n, tolerance=0.01), tmp_path)
+        told(f"csm1 straight {n} across", outcome)
         found.append([abs(error) for error in errors(outcome).values()])
     falling = np.array(found)
     assert np.all(np.diff(falling, axis=0) < 0.0), falling
-    assert falling[across == 17].max() < 0.005
+    assert falling[across == 17].max() < 0.002
     # The corner of the clamp is singular; see test_beam.
     order = -np.polyfit(np.log(across - 1), np.log(falling[:, 1]), 1)[0]
     assert order > 0.9
 
 
 @pytest.mark.validation
-def test_csm3_falls_at_every_refinement(tmp_path: Path) -> None:
-    found = {}
-    for n in (5, 9, 17, 33):
-        case = Csm3(across=n, duration=0.48, time_step_factor=0.6, **QUADRATIC)
-        outcome = run_case(case, tmp_path)
+def test_csm3_keeps_within_its_bars(tmp_path: Path) -> None:
+    for n, most in {5: 0.005, 9: 0.003}.items():
+        outcome = run_case(Csm3(across=n, duration=0.48), tmp_path)
         told(f"csm3 {n} across", outcome)
-        found[n] = errors(outcome)
-    minimum = np.array([abs(one["first minimum of u_y"]) for one in found.values()])
-    assert np.all(np.diff(minimum) < 0.0), minimum
-    assert minimum[1] < 0.01
-    assert minimum[2] < 0.003
-    assert abs(found[9]["time of it"]) < 0.01
+        assert abs(errors(outcome)["first minimum of u_y"]) < most
+        assert abs(errors(outcome)["time of it"]) < 0.01
 
 
 @pytest.mark.validation

@@ -177,7 +177,10 @@ def test_shocks_need_viscosity_and_fans_hardly(coarse: CaseResult) -> None:
         for m in found(coarse, "overshoot")
         if "without" not in m.quantity
     }
-    assert max(viscous.values()) < 0.01
+    assert max(viscous[f"push-{v}"] for v in (0.1, 0.3, 0.5)) < 0.01
+    # The end of a pulled bar, half a particle, rings from the jump of its velocity at the start.
+    assert max(viscous.values()) < 0.05
+    assert all(m.value < 0.03 for m in found(coarse, "profile") if m.quantity.startswith("pull"))
     assert bare["push-0.3"].value > 0.4
     assert bare["push-0.5"].value > 1.0
     # Pulled, the end particle alone rings, from the jump of its velocity at the start.

@@ -15,7 +15,7 @@ from solidsph.simulation import Simulation
 from solidsph.studies.case_run import CaseResult, run_case
 from solidsph_cases.sheet_convergence import SheetConvergence
 
-COARSE = SheetConvergence(across=(10, 15))
+COARSE = SheetConvergence(across=(15, 20))
 NAMES = ("rows along the hole", "rows up to the hole", "no rows")
 
 
@@ -35,12 +35,12 @@ def records(outcome: CaseResult) -> Iterator[Mapping[str, Record]]:
 @pytest.mark.parametrize("name", NAMES)
 def test_errors_fall_faster_than_the_spacing(records: Mapping[str, Record], name: str) -> None:
     coarse, fine = COARSE.errors(records, name)
-    # The consistent gradient gives the peak stress at the hole within 6 % with two particles to
-    # the radius, and leaves the sheet too stiff by 1.2 %, in any arrangement.
-    assert coarse < 0.0125
-    assert fine < coarse / 1.5
+    # Half a per cent with three particles to the radius, in any arrangement.
+    assert coarse < 0.006
+    # On the recommended particles so little that the reference's digits begin to count.
+    assert fine < coarse / (20.0 / 15.0) or fine < coarse < 1e-3
     (order,) = [m for m in COARSE.measure(records) if m.quantity.startswith(f"{name}: order")]
-    assert order.value == pytest.approx(np.log(coarse / fine) / np.log(1.5))
+    assert order.value == pytest.approx(np.log(coarse / fine) / np.log(20.0 / 15.0))
     assert order.verdict == "falls at every refinement"
     assert order.passed
 
@@ -50,8 +50,8 @@ def test_an_error_that_grows_does_not_pass(records: Mapping[str, Record], name: 
     dashed = name.replace(" ", "-")
     swapped = {
         **records,
-        f"{dashed}-10": records[f"{dashed}-15"],
-        f"{dashed}-15": records[f"{dashed}-10"],
+        f"{dashed}-15": records[f"{dashed}-20"],
+        f"{dashed}-20": records[f"{dashed}-15"],
     }
     (order,) = [m for m in COARSE.measure(swapped) if m.quantity.startswith(f"{name}: order")]
     assert order.verdict == "does NOT fall at every refinement"
@@ -93,11 +93,12 @@ def test_arrangements_are_what_they_are_called() -> None:
         assert np.hypot(*rim.T) == pytest.approx(0.2, abs=1e-6)
     along, up, none = (found[name] for name in NAMES)
 
-    # On a lattice coordinates are multiples of the spacing, but for those moved onto the hole.
+    # On a lattice coordinates are multiples of the spacing, but for those moved to fit the
+    # hole, up to some spacings from it.
     def on_lattice(X: np.ndarray) -> float:
-        return float(np.isclose(20.0 * X, np.round(20.0 * X), atol=1e-6).all(axis=1).mean())
+        return float(np.isclose(20.0 * X, np.round(20.0 * X), atol=1e-4).all(axis=1).mean())
 
-    assert on_lattice(up.positions[up.tags["interior"]]) == 1.0
+    assert on_lattice(up.positions[up.tags["interior"]]) > 0.7
     assert on_lattice(none.positions[none.tags["interior"]]) < 0.01
     assert along.tags["rim"].sum() == 9  # half the side of the square before, four, twice, and one
 
@@ -115,7 +116,7 @@ def test_pictures_and_tables(outcome: CaseResult, records: Mapping[str, Record])
     assert picture.read_bytes().startswith(b"\x89PNG")
     (table,) = COARSE.curves(records).values()
     assert len(table) == 1 + 2 * len(NAMES)
-    np.testing.assert_allclose(table["spacing over W [1]"], [1 / 10, 1 / 15])
+    np.testing.assert_allclose(table["spacing over W [1]"], [1 / 15, 1 / 20])
     for name in NAMES:
         np.testing.assert_array_equal(
             table[f"{name}: error of u_x [1]"], COARSE.errors(records, name)

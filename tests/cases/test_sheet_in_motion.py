@@ -61,8 +61,8 @@ def test_the_edge_moves_as_the_impedance_has_it(records: Mapping[str, Record]) -
     crossings = record.times / COARSE.crossing
     watched = (crossings > 0.4) & (crossings < 0.6)
     moved = (record.positions[:][watched][:, low, 0] - X[low, 0]).mean(axis=1)
-    # The jump rings with the period of a few spacings: four per cent of what has moved so far.
-    assert moved == pytest.approx(velocity * record.times[watched], rel=0.04)
+    # The jump rings with the period of a few spacings: five per cent of what has moved so far.
+    assert moved == pytest.approx(velocity * record.times[watched], rel=0.05)
 
 
 def test_nothing_moves_ahead_of_the_front(records: Mapping[str, Record]) -> None:

@@ -11,6 +11,7 @@ from solidsph.scene.scene_data import InitialScene
 from solidsph.studies.case import Case
 from solidsph.studies.frontier import Frontier
 from solidsph.studies.point import Point
+from solidsph.studies.variant import with_settings
 from solidsph_cases.csm1 import Csm1
 
 HOSTILE = "</script><script>window.hit = 1</script><img src=x onerror='window.hit = 2'> & \"co\""
@@ -72,7 +73,8 @@ class OfFunctions(Case):
     gradient: str = "consistent"
 
     def scenes(self):
-        (scene,) = Csm1(across=self.across, gradient=self.gradient).scenes().values()
+        words = {"gradient": self.gradient}
+        (scene,) = with_settings(Csm1(across=self.across), words).scenes().values()
         start = InitialScene(displacement={"x": lambda x, y, z: 0.0 * x})
         return {"plain": scene, "moved": attrs.evolve(scene, initial=[start])}
 

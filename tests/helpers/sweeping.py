@@ -19,6 +19,7 @@ from solidsph.studies.journal import Journal
 from solidsph.studies.processes import Processes
 from solidsph.studies.sweep import SweepStatus, sweep
 from solidsph.studies.task import Task
+from solidsph.studies.variant import with_settings
 from solidsph_cases.csm3 import Csm3
 from tests.helpers.waiting import HANG
 
@@ -85,7 +86,7 @@ def several(folder: Path, *errors: float) -> Sequence[Task]:
 
 def swinging() -> Sequence[Task]:
     """Short runs of a beam."""
-    case = Csm3(across=3, duration=0.005, engine="matrix")
+    case = with_settings(Csm3(across=3, duration=0.005), {"engine": "matrix"})
     return [Task(case, {"cover": cover}, repeat) for cover in (2.3, 2.2, 2.6) for repeat in (0, 1)]
 
 

@@ -21,6 +21,7 @@ from solidsph.studies.frontier import Frontier
 from solidsph.studies.point import Point
 from solidsph.studies.report import write_report
 from solidsph.studies.report_figures import EXPENSES, TIME, Figures, library
+from solidsph.studies.variant import with_settings
 from solidsph_cases.csm1 import Csm1
 from tests.commands.test_cli import solidsph
 from tests.helpers.reporting import HOSTILE, OfFunctions, hostile, known
@@ -121,7 +122,7 @@ def test_the_scene_of_every_point_is_in_the_page(report: Read) -> None:
     points = report.data["points"]
     assert len(points) == len(known())
     for point, shown in zip(known().points, points, strict=True):
-        (scene,) = Csm1(**point.settings).scenes().values()
+        (scene,) = with_settings(Csm1(), point.settings).scenes().values()
         (written,) = shown["scenes"]
         assert written["toml"] == scene.to_toml()
     names = [one["file"] for shown in points for one in shown["scenes"]]
@@ -141,7 +142,8 @@ def test_what_has_no_scene_says_why(tmp_path: Path) -> None:
     assert "runs no scene" in point["note"]
     (point,) = page(one, OfFunctions(), tmp_path).data["points"]
     plain, moved = point["scenes"]
-    assert plain["toml"] == Csm1(across=5).scenes()["csm1"].to_toml()
+    as_it_is = with_settings(Csm1(across=5), {"gradient": "consistent"})
+    assert plain["toml"] == as_it_is.scenes()["csm1"].to_toml()
     assert "toml" not in moved
     assert "cannot be written: " in moved["why"]
     assert "function" in moved["why"]
@@ -175,7 +177,7 @@ def test_hostile_words_stay_words(tmp_path: Path) -> None:
     assert HOSTILE in read.texts("td")
     assert HOSTILE in read.texts("pre")
     assert read.data["points"][0]["label"] == made.points[0].label()
-    (scene,) = Csm1(**made.points[0].settings).scenes().values()
+    (scene,) = with_settings(Csm1(), made.points[0].settings).scenes().values()
     assert read.data["points"][0]["scenes"][0]["toml"] == scene.to_toml()
     # Plotly takes tags in its texts: none of ours is one.
     for text in _texts(read.data["expenses"]):

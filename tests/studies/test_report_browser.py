@@ -24,6 +24,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 from solidsph.studies.frontier import Frontier
 from solidsph.studies.point import Point
 from solidsph.studies.report import write_report
+from solidsph.studies.variant import with_settings
 from solidsph_cases.csm1 import Csm1
 from tests.helpers.reporting import HOSTILE, OfFunctions, hostile, known
 from tests.helpers.waiting import HANG
@@ -209,7 +210,7 @@ def test_a_row_shows_its_scene(report: webdriver.Chrome) -> None:
     assert every(report, "#scenes pre") == []
     for number in (1, 4, 6):
         every(report, "#points tbody tr")[number].find_elements(By.TAG_NAME, "td")[2].click()
-        (scene,) = Csm1(**known().points[number].settings).scenes().values()
+        (scene,) = with_settings(Csm1(), known().points[number].settings).scenes().values()
         (shown,) = every(report, "#scenes pre")
         assert shown.get_property("textContent") == scene.to_toml()
         assert known().points[number].label() in one(report, "#chosen").text
@@ -228,7 +229,7 @@ def test_a_point_of_the_plot_shows_its_scene_and_says_what_it_is(report: webdriv
         moving(report).click().perform()
         number = int(one(report, "#scene-heading").text.split()[-1]) - 1
         point = points[number]
-        (scene,) = Csm1(**point.settings).scenes().values()
+        (scene,) = with_settings(Csm1(), point.settings).scenes().values()
         assert one(report, "#scenes pre").get_property("textContent") == scene.to_toml()
         until(report, lambda point=point: ring(report, "by-cost")[0] == [point.time])
         assert ring(report, "by-spacing")[0] == [point.spacing]
@@ -333,7 +334,7 @@ def test_a_scene_is_copied_and_downloaded(report: webdriver.Chrome, tmp_path: Pa
         "Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)}
     )
     every(report, "#points tbody button")[3].click()
-    (scene,) = Csm1(**known().points[3].settings).scenes().values()
+    (scene,) = with_settings(Csm1(), known().points[3].settings).scenes().values()
     one(report, "#scenes a.button").click()
     saved = tmp_path / "csm1-4.toml"
     until(report, lambda: saved.exists() and saved.stat().st_size > 0)

@@ -24,7 +24,8 @@ def cases(options: Output) -> None:
             field.name: field.default for field in attrs.fields(cls) if field.default is not None
         }
         rows.append(
-            {"case": name, "title": cls.title, "source": cls.source, "parameters": parameters}
+            {"case": name, "title": cls.title, "source": cls.source}
+            | {"parameters": parameters, "studies": dict(cls.studies)}
         )
     present({"cases": rows}, _text(rows), as_json=options.as_json)
 
@@ -34,3 +35,6 @@ def _text(rows: Sequence[Mapping[str, Any]]) -> Iterator[Table | str]:
     for row in rows:
         listed = ", ".join(f"{name}={value}" for name, value in row["parameters"].items())
         yield f"{row['case']} --set: {listed}"
+        for why in dict.fromkeys(row["studies"].values()):
+            words = [word for word, reason in row["studies"].items() if reason == why]
+            yield f"  names {', '.join(words)}: {why}"

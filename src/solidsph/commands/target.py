@@ -8,12 +8,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import attrs
+
 from solidsph.errors import SceneError
 from solidsph.registry import registry
 from solidsph.registry.construct import construct
 from solidsph.scene.scene import Scene
 from solidsph.scene.toml_reader import MOST_BYTES, similar_names
 from solidsph.studies.case import Case
+from solidsph.studies.scene_words import WORDS
+from solidsph.studies.variant import with_settings
 from solidsph.system.encoding import decoded
 
 STANDARD_INPUT = "-"
@@ -38,8 +42,16 @@ def resolve(target: str, settings: Sequence[str]) -> Scene | Case:
         what = "no file" if "/" in target or "." in target else "unknown case"
         hint = similar_names(target, *cases) or "; give a scene file, or a case: solidsph cases"
         raise SceneError(f"{what} {target!r}{hint}")
-    case: Case = construct("cases", {"type": target, **parameters(settings)})
-    return case
+    own = [field.name for field in attrs.fields(registry.load("cases", target))]
+    table = parameters(settings)
+    words = {
+        name: value
+        for name, value in table.items()
+        if name not in own and (name in WORDS or "." in name)
+    }
+    rest = {name: value for name, value in table.items() if name not in words}
+    case: Case = construct("cases", {"type": target, **rest})
+    return with_settings(case, words)
 
 
 def name_of(target: str) -> str:

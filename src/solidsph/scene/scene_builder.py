@@ -108,14 +108,18 @@ class SceneBuilder(ABC):
 
     def integrator(
         self,
-        integrator: PartLike,
+        integrator: PartLike | None = None,
         *,
         time_step_factor: float | None = None,
         time_step: float | None = None,
         **parameters: Any,
     ) -> Self:
-        """Choose the integrator, and the step as a factor of the critical step or in seconds."""
-        self._set(integrator=_part(integrator, parameters))
+        """Choose the integrator, and the step as a factor of the critical step or in seconds.
+
+        Without an integrator it is that of the scheme.
+        """
+        if integrator is not None:
+            self._set(integrator=_part(integrator, parameters))
         return self._set_given(time_step_factor=time_step_factor, time_step=time_step)
 
     def statics(

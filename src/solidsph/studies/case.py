@@ -65,6 +65,10 @@ class Case(ABC):
     as "section-6-viscosity". The name of a picture begins with that of its figure or passage, or
     with the numbers of all its figures, "fig-13-14"."""
 
+    studies: ClassVar[Mapping[str, str]] = {}
+    """Words of the scheme that its scenes name, each with the reason: what the case is about, or
+    what the recommended scheme lacks there. All else is the scheme's (see `scene_words.named`)."""
+
     sweep: ClassVar[Mapping[str, Sequence[Any]]] = {}
     """Parameters to vary in a cost sweep, each with the values to try. The first one refines, from
     coarse to fine."""

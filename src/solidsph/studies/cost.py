@@ -22,7 +22,7 @@ from solidsph.studies.runner import Runner
 from solidsph.studies.search import Goal, SearchResult, Settings, search
 from solidsph.studies.sweep import StatusCallback, ignore_status, sweep
 from solidsph.studies.task import Task
-from solidsph.studies.variant import with_settings
+from solidsph.studies.variant import setting_of, with_settings
 
 Axes = Mapping[str, Sequence[Any]]
 
@@ -107,10 +107,11 @@ def sweep_of(case: Case) -> Axes:
 
 
 def default_settings(case: Case, axes: Axes) -> Settings | None:
-    """The case's own values of these axes; None if one of them is not a parameter of the case."""
-    missing = object()
-    own = {axis: getattr(case, axis, missing) for axis in axes}
-    return None if missing in own.values() else own
+    """The case's own values of these axes; None if it has no such value."""
+    try:
+        return {axis: setting_of(case, axis) for axis in axes}
+    except SceneError:
+        return None
 
 
 def _priced(case: Case | str, axes: Axes | None) -> tuple[Case, Axes]:

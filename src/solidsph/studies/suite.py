@@ -96,7 +96,7 @@ def run_trial(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # hard cases deserve their warnings
-            variant = with_settings(case, _understood(case, chosen))
+            variant = with_settings(case, chosen)
             runs = run_scenes(variant, folder)
         conservative = {name for name, scene in variant.scenes().items() if _has_energy(scene)}
         with open_records(runs) as records:
@@ -115,14 +115,6 @@ def run_trial(
         must_fail=trial.must_fail,
         known=trial.known,
     )
-
-
-def _understood(case: Case, settings: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Settings in which "hourglass" is a parameter of the case, or else of the effect."""
-    if "hourglass" not in settings or hasattr(case, "hourglass"):
-        return settings
-    rest = {name: value for name, value in settings.items() if name != "hourglass"}
-    return {**rest, "hourglass-control.strength": settings["hourglass"]}
 
 
 def _graded(

@@ -10,6 +10,7 @@ import pytest
 from solidsph import Record, Scene, Simulation
 from solidsph.run.energy import DISSIPATED, KINETIC, RESIDUAL, STRAIN
 from solidsph.studies.case_run import run_case
+from solidsph.studies.variant import with_settings
 from solidsph_cases.taylor_bar import LENGTH, RADIUS, TaylorBar
 
 PAGE = Path(__file__).parents[3] / "docs/effects.md"
@@ -43,7 +44,9 @@ def test_the_documented_scene_runs_and_its_ledger_closes(name: str, tmp_path: Pa
 
 def test_the_end_of_a_taylor_bar_does_not_yet_know_of_the_wall(tmp_path: Path) -> None:
     """Before the fastest wave is there it flies on, while the foot flows."""
-    outcome = run_case(TaylorBar(across=2, duration=5e-6, engine="matrix"), tmp_path)
+    outcome = run_case(
+        with_settings(TaylorBar(across=2, duration=5e-6), {"engine": "matrix"}), tmp_path
+    )
     assert outcome.passed
     with Record(outcome.runs[0].record) as record:
         case = TaylorBar(across=2)

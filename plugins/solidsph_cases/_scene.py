@@ -1,71 +1,36 @@
-"""The scenes of cases: a body of a material, and the scheme that the user chooses for it."""
+"""The scenes of cases: a body of a material, and what several of them do to it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.material import Material
 from solidsph.registry.construct import describe
 from solidsph.registry.parameters import check_positive
+from solidsph.scene.scene import Scene
 from solidsph.scene.scene_builder import SceneBuilder
+from solidsph.scene.scene_data import PartLike
 from solidsph.simulation import Simulation
+from solidsph.studies.scene_words import changed
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 
 ON_BOUNDARY: Mapping[str, Any] = {"type": "lattice", "on_boundary": True}
-FITTED: Mapping[str, Any] = {"type": "fitted-moments", "of": ON_BOUNDARY}
+DISORDER: Mapping[str, str] = {
+    "discretisation": "particles in no order",
+    "gradient": "the recommended one for them too: particles that a scene arranges by itself get a "
+    "linear one",
+}
+"""Why `disordered` names these parts."""
+
 SOFT = NeoHookean(youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
-
-
-class Scheme(Protocol):
-    """The parameters by which a cost study sweeps a case."""
-
-    @property
-    def kernel(self) -> str: ...  # name
-    @property
-    def cover(self) -> float: ...  # [spacings]
-    @property
-    def gradient(self) -> str: ...  # name
-    @property
-    def hourglass(self) -> float: ...  # strength of hourglass control [-]; 0 adds none
-    @property
-    def engine(self) -> str: ...  # name
-
-
-class MovingScheme(Scheme, Protocol):
-    """The same with the parameters of the integration in time."""
-
-    @property
-    def integrator(self) -> str: ...  # name
-    @property
-    def time_step_factor(self) -> float: ...  # of the largest step
-
-
-def with_scheme(builder: SceneBuilder, scheme: Scheme) -> SceneBuilder:
-    """`builder` with the kernel, the total Lagrangian form, the engine and hourglass control."""
-    builder = (
-        builder.kernel(scheme.kernel, cover=scheme.cover)
-        .formulation("total-lagrangian", gradient=scheme.gradient, divergence="variational")
-        .engine(scheme.engine)
-    )
-    if scheme.hourglass == 0.0:
-        return builder
-    return builder.effect("hourglass-control", strength=scheme.hourglass)
-
-
-def in_motion(
-    builder: SceneBuilder, scheme: MovingScheme, duration: float, outputs: int
-) -> SceneBuilder:
-    """`builder` with the scheme, integrated over `duration` [s]."""
-    builder = builder.integrator(scheme.integrator, time_step_factor=scheme.time_step_factor)
-    return with_scheme(builder.duration(duration).outputs(outputs), scheme)
 
 
 def solid(
     title: str,
     name: str,
-    shape: Mapping[str, Any],
+    shape: PartLike,
     spacing: float,
     material: Material,
     **options: Any,
@@ -95,6 +60,15 @@ def between_walls(builder: SceneBuilder, dimension: int) -> SceneBuilder:
         for side in sides[axis]:
             builder = builder.boundary("clamp", where=side, axes=[axis])
     return builder
+
+
+def disordered(scene: Scene, amplitude: float) -> Scene:
+    """`scene` with every particle inside moved at random, up to `amplitude` [spacings]; see
+    `DISORDER`."""
+    if amplitude == 0.0:
+        return scene
+    moved = {"type": "jittered", "of": "fitted", "amplitude": amplitude, "seed": 1}
+    return changed(changed(scene, "discretisation", moved), "gradient", "consistent")
 
 
 def check_count(case: str, name: str, value: object, least: int) -> None:
