@@ -35,6 +35,10 @@ class GradedPoints(Case):
     title = "A block of graded points"
     source = "standing wave of a confined bar: omega = pi c / length"
     sweep = {"along": (20, 30, 40)}
+    studies = {
+        "discretisation": "points of one's own are the subject",
+        "gradient": "one trial names it",
+    }
     trials = {
         "with the gradient 'consistent'": Trial({"gradient": "consistent"}, {"along": 20}),
         "spacings from 1 to 4": Trial(

@@ -42,6 +42,10 @@ class NotchedSheet(Case):
     title = "A notched sheet of rubber"
     source = "the two grips carry the same force; matter does not turn inside out"
     sweep = {"across": (10, 20)}
+    studies = {
+        "hourglass": "at 40 spacings a side neighbours beside the grips move against each other "
+        "from a stretch of 3.5 on; one trial has control, which resists",
+    }
     trials = {
         "to a stretch of 4": Trial(brief={"across": 10}),
         "to a stretch of 4, finer": Trial(

@@ -68,7 +68,7 @@ def test_the_end_of_a_taylor_bar_does_not_yet_know_of_the_wall(tmp_path: Path) -
 @pytest.mark.validation
 def test_a_taylor_bar_is_within_what_is_published_and_converges(tmp_path: Path) -> None:
     off = []
-    for across in (3, 4, 5):
+    for across in (3, 4):
         outcome = run_case(TaylorBar(across=across, tolerance=0.02), tmp_path)
         for m in outcome.measurements:
             print(f"taylor-bar, {across} along the radius: {m.quantity} = {m.value:.5g} {m.unit}")
@@ -77,7 +77,7 @@ def test_a_taylor_bar_is_within_what_is_published_and_converges(tmp_path: Path) 
         by_name = {m.quantity: m for m in outcome.measurements}
         off.append([by_name[name].value for name in ("final length", "foot radius, mean")])
     lengths, radii = np.array(off).T
-    # With its own tolerance of zero the default is inside both ranges.
+    # Without any tolerance it is inside both ranges.
     assert 21.4 <= lengths[-1] <= 21.5
     assert 7.0 <= radii[-1] <= 7.2
     # The coarser, the less it flows: shorter and wider at every refinement.
