@@ -35,18 +35,8 @@ class GradedPoints(Case):
     title = "A block of graded points"
     source = "standing wave of a confined bar: omega = pi c / length"
     sweep = {"along": (20, 30, 40)}
-    studies = {
-        "discretisation": "points of one's own are the subject",
-        "gradient": "one trial names it",
-    }
-    trials = {
-        "with the gradient 'consistent'": Trial({"gradient": "consistent"}, {"along": 20}),
-        "spacings from 1 to 4": Trial(
-            brief={"along": 20},
-            known="points of a user get the gradient 'corrected', which suits cells and not points "
-            "on the surface: with 'consistent' the frequency is within 1 %",
-        ),
-    }
+    studies = {"discretisation": "points of one's own are the subject"}
+    trials = {"spacings from 1 to 4": Trial(brief={"along": 20})}
 
     grading: float = number(default=4.0)  # largest distance of points over the least [-]
     along: int = 30  # steps along the block

@@ -278,15 +278,19 @@ traction = {{y = "-2e4*min(t/0.005, 1)"}}
     ),
     Flawed(
         "surface-rows",
-        "gradient = 'consistent'",
+        "the same discretisation for every body",
         """
-title = "a block whose rows begin on its surface"
+title = "a block whose rows begin on its surface, and another whose rows begin inside"
 duration = 1.0
 statics = {}
 [body.block]
 shape = {type = "box", lengths = [1.0, 1.0]}
 spacing = 0.1
 discretisation = {type = "lattice", on_boundary = true}
+[body.other]
+shape = {type = "box", lengths = [1.0, 1.0], origin = [0.0, 2.0]}
+spacing = 0.1
+discretisation = "lattice"
 [material]
 type = "linear-elastic"
 youngs_modulus = 1e6

@@ -161,6 +161,9 @@ class Odd(Discretisation):
         values[3] = self.value
         return attrs.evolve(made, **{self.name: values})
 
+    def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
+        return False
+
 
 class NoParticles(Odd):
     def particles(self, shape: Shape, spacing: float) -> Any:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import attrs
+import numpy as np
 import pytest
 
 from solidsph import BuildError, Scene, Simulation
+from solidsph.advice import advise
+from solidsph.errors import PluginError
 from solidsph.registry.construct import construct
 from solidsph.scene.scheme import SCHEMES, completed, scheme_of
 from solidsph_builtin.discretisations.fitted import Fitted
@@ -45,10 +50,88 @@ def test_a_bare_scene_has_the_recommended_parts() -> None:
     assert isinstance(construct("discretisations", SCHEMES["recommended"].discretisation), Fitted)
 
 
-def test_particles_that_a_scene_names_may_be_off_the_surface() -> None:
-    """There the sums of `consistent` have no known value."""
-    body = bare(discretisation="lattice").model.bodies[0]
-    assert type(body.formulation.gradient).__name__ == "Corrected"
+ON_BOUNDARY = {"type": "lattice", "on_boundary": True}
+JITTERED = {"amplitude": 0.1, "seed": 1}
+
+
+def points(depth: float) -> dict[str, object]:
+    """Even points in the box, the outermost at a depth [m]."""
+    x, y = (np.linspace(depth, length - depth, round(10 * length) + 1) for length in (1.0, 0.5))
+    return {"type": "points", "positions": [[float(a), float(b)] for a in x for b in y]}
+
+
+@pytest.mark.parametrize(
+    ("discretisation", "gradient"),
+    [
+        ("lattice", "corrected"),
+        ({"type": "jittered-lattice", **JITTERED}, "corrected"),
+        ({"type": "fitted-moments", "of": "lattice"}, "corrected"),
+        (points(0.05), "corrected"),
+        ({"type": "lattice", "ghosts": 3}, "corrected"),
+        ({**ON_BOUNDARY, "ghosts": 3}, "corrected"),
+        (ON_BOUNDARY, "consistent"),
+        ("fitted", "consistent"),
+        ("conforming-lattice", "consistent"),
+        ({"type": "jittered", "of": "fitted", **JITTERED}, "consistent"),
+        ({"type": "fitted-moments", "of": "conforming-lattice"}, "consistent"),
+        ({"type": "mapped", "of": ON_BOUNDARY, "before": BOX, "to": {"x": "X"}}, "consistent"),
+        (points(0.0), "consistent"),
+        (Lattice(on_boundary=True), "consistent"),
+    ],
+)
+def test_the_gradient_suits_where_the_particles_end(discretisation: Any, gradient: str) -> None:
+    """Half a spacing inside, the sums of `consistent` have no known value, nor with ghosts."""
+    builder = Simulation.builder().body("b", shape=BOX, spacing=0.1, discretisation=discretisation)
+    builder = builder.material("neo-hookean", **SOFT).duration(1e-3)
+    if isinstance(discretisation, dict) and "ghosts" in discretisation:
+        builder = builder.boundary("ghost-extension")
+    simulation = builder.build()
+    assert completed(simulation.scene).formulation["gradient"] == gradient  # type: ignore[index]
+    assert "surface-rows" not in {one.name for one in advise(simulation)}
+
+
+def test_the_gradient_suits_every_body() -> None:
+    builder = Simulation.builder().material("neo-hookean", **SOFT).duration(1e-3)
+    for name, own in (("on", ON_BOUNDARY), ("inside", "lattice"), ("bare", None)):
+        builder.body(name, shape=BOX, spacing=0.1, discretisation=own)
+    assert completed(builder.scene()).formulation["gradient"] == "corrected"  # type: ignore[index]
+
+
+def test_a_gradient_that_the_scene_names_stays() -> None:
+    builder = Simulation.builder().body("b", shape=BOX, spacing=0.1, discretisation="lattice")
+    builder = builder.material("neo-hookean", **SOFT).duration(1e-3)
+    scene = builder.formulation("total-lagrangian", gradient="consistent").scene()
+    assert completed(scene).formulation["gradient"] == "consistent"  # type: ignore[index]
+    scene = builder.formulation("total-lagrangian", divergence="plain").scene()
+    assert completed(scene).formulation == {
+        "type": "total-lagrangian",
+        "gradient": "corrected",
+        "divergence": "plain",
+    }
+
+
+@pytest.mark.parametrize(
+    ("wrong", "problem"),
+    [
+        ("lattise", "did you mean"),
+        ({"type": "points", "file": "none.csv"}, "cannot read positions"),
+        ({"type": "points", "positions": [[2.0, 2.0]]}, "outside the shape"),
+    ],
+)
+def test_a_wrong_discretisation_is_told_once(wrong: Any, problem: str) -> None:
+    with pytest.raises(BuildError, match=problem) as found:
+        bare(discretisation=wrong)
+    assert len(found.value.problems) == 1
+
+
+class Breaks(Lattice):
+    def ends_on_surface(self, shape: Any, spacing: float) -> bool:
+        raise KeyError("surface")
+
+
+def test_a_discretisation_that_breaks_when_asked_is_named() -> None:
+    with pytest.raises(PluginError, match=r"Breaks.* failed: KeyError: 'surface'"):
+        bare(discretisation=Breaks())
 
 
 @pytest.mark.parametrize("effect", ["bond-failure", "heat"])

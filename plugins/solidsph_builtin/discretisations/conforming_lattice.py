@@ -80,6 +80,10 @@ class ConformingLattice(Discretisation):
         owned = faces(surface, owners, positions)
         return without_ghosts(positions, volumes, mean_spacing(grid, spacing), owned)
 
+    def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
+        """True: this is what it is for."""
+        return True
+
 
 def outermost(shape: Shape, grid: Grid, spacing: float) -> tuple[Array, Mask]:
     """The particles on the boundary of `shape`, (m, d) [m], by a `grid` with points on it, and

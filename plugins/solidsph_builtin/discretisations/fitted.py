@@ -70,6 +70,10 @@ class Fitted(Discretisation):
         given = without_ghosts(X, whole, size, owned)
         return fitted(self, shape, spacing, given, _MOVES * size if irregular else 0.0)
 
+    def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
+        """True: this is what it is for."""
+        return True
+
     def _arranged(
         self, shape: Shape, grid: Grid, spacing: float, size: float
     ) -> tuple[Array, Mask, bool]:

@@ -41,3 +41,7 @@ class FittedMoments(Discretisation):
             SceneError: the fit would make a volume negative.
         """
         return fitted(self, shape, spacing, self.of.particles(shape, spacing))
+
+    def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
+        """Where those of the wrapped discretisation do."""
+        return self.of.ends_on_surface(shape, spacing)

@@ -61,3 +61,7 @@ class Jittered(Discretisation):
         return attrs.evolve(
             given, positions=positions, images=positions.copy(), volumes=volumes, cells=volumes
         )
+
+    def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
+        """Where those of `of` do: particles that own a surface stay."""
+        return self.of.ends_on_surface(shape, spacing)

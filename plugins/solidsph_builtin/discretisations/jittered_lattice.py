@@ -59,3 +59,7 @@ class JitteredLattice(Discretisation):
         positions, images = regular.positions.copy(), regular.images.copy()
         positions[real] = images[real] = moved
         return attrs.evolve(regular, positions=positions, images=images)
+
+    def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
+        """False: they are at the centres of cells, and displaced."""
+        return False

@@ -59,3 +59,7 @@ class Lattice(Discretisation):
         return lattice_particles(
             self, shape, grid, spacing, ghosts=self.ghosts, ghost_faces=self.ghost_faces
         )
+
+    def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
+        """True with `on_boundary` and without ghosts, as on the faces of a box."""
+        return self.on_boundary and not self.ghosts

@@ -82,6 +82,10 @@ class Mapped(Discretisation):
         except SceneError as cause:
             raise refusal(self, f"after the map, {cause}") from None
 
+    def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
+        """Where those of `of` do in `before`, whose surface the map takes to that of the body."""
+        return self.of.ends_on_surface(self.before, spacing)
+
 
 def _moved(field: VectorField, X: Array) -> Array:
     """Images of X (n, d) under the map [m]."""

@@ -26,6 +26,9 @@ from solidsph_builtin.discretisations._surface import faces, sampled, without_gh
 
 # Closer than this, in spacings, two points coincide; a point outside by less than this is inside.
 _TOLERANCE = 1e-6
+# A point is on the surface up to this depth, in spacings: nodes of a mesh stand on its facets, and
+# files hold few digits. Up to here 'consistent' errs less than 'corrected' in bending and torsion.
+_ON_SURFACE = 0.1
 # Samples along a spacing from which the volumes nearest to points are found, for each dimension.
 # Even, so that none lies half way between two points of a lattice.
 _SAMPLES = {1: 64, 2: 8, 3: 4}
@@ -94,6 +97,19 @@ class Points(Discretisation):
         surface = sampled(self, shape, spacing)
         owned = faces(surface, nearest(tree, surface.points), positions)
         return without_ghosts(positions, self._volumes(shape, tree, spacing), spacing, owned)
+
+    def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
+        """True if most of the surface is nearest to points on it.
+
+        Raises:
+            SceneError: as of `particles`, where the file or the rows are wrong.
+        """
+        spacing = check_spacing(self, spacing)
+        positions, surface = self._positions(shape.dimension), sampled(self, shape, spacing)
+        depths = np.abs(shape.signed_distance(positions)) / spacing
+        on = depths[cKDTree(positions).query(surface.points)[1]] <= _ON_SURFACE
+        areas = np.linalg.norm(surface.area_vectors, axis=1)
+        return bool(areas[on].sum() > 0.5 * areas.sum())
 
     def _positions(self, dimension: int) -> Array:
         """The points as a new array (n, d) [m]."""

@@ -11,8 +11,9 @@ from solidsph.maths.arrays import Array
 _RIGHT = 1e-10
 
 # [spacings] from a sum that misses to the nearest row that does not change. With 2 to 8 the stable
-# step, the errors and the largest change are the same.
-_WIDTH = 3.0
+# step, the errors and the largest change are the same. In a row of particles there are not enough
+# weights to change in a rim.
+_WIDTH = {1: np.inf, 2: 3.0, 3: 3.0}
 
 
 def freedom(missing: Array, positions: Array, spacing: float) -> Array:
@@ -26,6 +27,6 @@ def freedom(missing: Array, positions: Array, spacing: float) -> Array:
     size = np.abs(missing).reshape(len(missing), -1).max(axis=1)
     wrong = size > _RIGHT * size.max()
     away, _ = cKDTree(positions[wrong]).query(positions)
+    part = away / (_WIDTH[positions.shape[1]] * spacing)
     # Its third derivative is small: the sums of changes that vary faster would miss in turn.
-    result: Array = np.cos(0.5 * np.pi * np.minimum(away / (_WIDTH * spacing), 1.0)) ** 4
-    return np.where(away < _WIDTH * spacing, result, 0.0)
+    return np.where(part < 1.0, np.cos(0.5 * np.pi * np.minimum(part, 1.0)) ** 4, 0.0)

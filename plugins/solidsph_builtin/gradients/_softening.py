@@ -15,8 +15,8 @@ _AT_SURFACE = 1e-11
 
 # The same for the first moments of all sums. A part of them is beyond reach, and others cost more
 # change than they are worth: with 1e-5 a beam clamped on an arc is off by 2 % with 6 across, with
-# 1e-3 by 0.05 %. Ends of a bar have too few neighbours for any.
-_MOMENTS = {1: 1e6, 2: 1e-3, 3: 1e-3}
+# 1e-3 by 0.05 %.
+_MOMENTS = 1e-3
 
 
 def softening(diagonal: Array, surface: Mask) -> Array:
@@ -25,6 +25,6 @@ def softening(diagonal: Array, surface: Mask) -> Array:
     `surface` (n,) tells the particles on the surface.
     """
     changed = diagonal[diagonal[:, 0] > 0.0]  # the sums that a change of the weights reaches
-    soft = np.full(diagonal.shape, _MOMENTS[diagonal.shape[1] - 1] * float(changed[:, 1:].mean()))
+    soft = np.full(diagonal.shape, _MOMENTS * float(changed[:, 1:].mean()))
     soft[:, 0] = np.where(surface, _AT_SURFACE * float(np.median(changed[:, 0])), 0.0)
     return soft

@@ -1,4 +1,4 @@
-"""Particles on the surface under the gradient that a scheme takes for those inside."""
+"""Particles on the surface, where a scheme takes the gradient for those inside."""
 
 from __future__ import annotations
 
@@ -18,12 +18,11 @@ _MOST = 0.5
 
 
 def surface_rows(facts: SceneFacts) -> Iterator[Advice]:
-    """Find bodies with a discretisation of their own, in a scene that names no gradient.
+    """Find bodies on whose surface particles lie, in a scene that gets 'corrected' all the same.
 
-    The recommended scheme takes 'corrected' for them, which suits particles half a spacing inside.
-    On the surface it is too soft: a beam with 5 particles across bends 11 % too far, a confined
-    block swings 2.4 % too slowly with 40 spacings along it, and one of graded points 28 %, where
-    'consistent' is off by 0.05 % (the case `graded-points`).
+    One gradient serves all bodies, and effects that need particles at the centres of cells get
+    'corrected', which suits particles half a spacing inside. On the surface it is too soft: a beam
+    with 5 particles across bends 39 % too far, and a block of graded points swings 28 % too slowly.
     """
     scene, given = facts.simulation.scene, facts.simulation.scene.formulation
     is_named = given is not None and not (isinstance(given, Mapping) and "gradient" not in given)
@@ -34,17 +33,18 @@ def surface_rows(facts: SceneFacts) -> Iterator[Advice]:
         if share > _MOST:
             yield Advice(
                 finding=f"{100.0 * share:.0f} % of the outer particles of body {body.name!r} lie "
-                "on its surface, and the scheme takes the gradient 'corrected' for a "
-                "discretisation that a scene names",
-                expected="a gradient that takes the surface into account",
-                remedy="gradient = 'consistent'; or particles half a spacing inside",
+                "on its surface, and the scheme takes the gradient 'corrected', as another body's "
+                "lie inside or an effect asks for particles at the centres of cells",
+                expected="particles of all bodies on the surface, or of none",
+                remedy="the same discretisation for every body: none named, or 'lattice', which is "
+                "at the centres of cells; or name a gradient",
             )
 
 
 def _share_on_surface(body: BodyFacts) -> float:
     particles = body.body.particles
     outer = np.flatnonzero(~particles.ghosts & particles.area_vectors.any(axis=1))
-    if not outer.size:
+    if not outer.size or particles.ghosts.any():
         return 0.0
     depths = np.abs(body.body.shape.signed_distance(particles.positions[outer]))
     return float(np.mean(depths <= _ON * body.spacing))

@@ -28,6 +28,7 @@ from solidsph.studies.case import Case
 from solidsph.studies.cluster import Cluster
 from solidsph.studies.cost import Axes, SweepSetup, default_settings, find_best, frontier
 from solidsph.studies.frontier import Frontier
+from solidsph.studies.larger_step import ERROR, TIME, at_largest_step, larger_step_sentence
 from solidsph.studies.point import Point
 from solidsph.studies.processes import Processes
 from solidsph.studies.report import write_report
@@ -128,7 +129,13 @@ def _sweep(
 
     folder = options.folder(target)
     result = frontier(case, axes, setup)
-    rows = list(result)
+    faster = at_largest_step(case, result, setup)
+    known = {id(one.usual): one.row for one in faster}
+    unknown = {ERROR: "", TIME: ""} if faster else {}
+    rows = [
+        {**row, **known.get(id(point), unknown)}
+        for row, point in zip(result, result.points, strict=True)
+    ]
     own = default_settings(case.priced(), axes)
     default = next((point for point in result.points if point.settings == own), None)
     picture, table = folder / f"{target}-frontier.png", folder / f"{target}-points.csv"
@@ -140,7 +147,7 @@ def _sweep(
         writer.writerows(rows)
     page = folder / f"{target}-report.html" if options.report else None
     if page is not None:
-        write_report(result, case, page)
+        write_report(result, case, page, faster=faster)
     facts = {
         "case": target,
         "points": rows,
@@ -163,6 +170,7 @@ def _sweep(
             "times the front": result.excess(default),
         },
         "sentence": result.sentence(),
+        "largest step": larger_step_sentence(faster),
         "picture": str(picture),
         "table": str(table),
         "report": None if page is None else str(page),
@@ -197,6 +205,8 @@ def _sweep_text(
             place = f"{excess:.2g} times the time of an equally accurate one on the front"
         yield f"the case's own parameters: {default.brief()}: {place}"
     yield facts["sentence"]
+    if facts["largest step"]:
+        yield facts["largest step"]
     yield f"picture: {facts['picture']}"
     yield f"all points: {facts['table']}"
     if facts["report"] is not None:

@@ -252,12 +252,27 @@ def _why(scene: Scene, entry: registry.Entry) -> str:
     elif entry.kind == "discretisations":
         chosen = all(body.discretisation is None for body in scene.bodies.values())
     elif entry.kind in ("gradients", "divergences"):
-        chosen = entry.name == scheme.formulation[registry.singular(entry.kind)]
-        if not chosen:
-            return "part of the formulation"
+        return _why_operator(scene, entry)
     else:
         chosen = False
     return f"{scheme.name} scheme: {scheme.why[entry.kind]}" if chosen else "named by the scene"
+
+
+def _why_operator(scene: Scene, entry: registry.Entry) -> str:
+    """Why a gradient or a divergence is used."""
+    scheme, kind = scheme_of(scene), registry.singular(entry.kind)
+    given = scene.formulation
+    table = {"type": given} if isinstance(given, str) else {} if given is None else given
+    if isinstance(table, Mapping):
+        if kind in table:
+            own = registry.entry_of(entry.kind, construct(entry.kind, table[kind]))
+            return "named by the scene" if entry == own else "part of the formulation"
+        if table.get("type", scheme.formulation["type"]) == scheme.formulation["type"]:
+            if entry.name == scheme.formulation[kind]:
+                return f"{scheme.name} scheme: {scheme.why[entry.kind]}"
+            if kind == "gradient" and entry.name == scheme.elsewhere:
+                return f"{scheme.name} scheme: {scheme.why['elsewhere']}"
+    return "part of the formulation"
 
 
 def _numbers(simulation: Simulation) -> list[Row]:

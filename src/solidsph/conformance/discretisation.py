@@ -49,6 +49,10 @@ _AREAS = 1e-10
 # A particle is still on the boundary if it is outside by less than this, in spacings.
 _ON_BOUNDARY = 1e-6
 
+# A particle this deep still ends on the surface, in spacings.
+_ON_SURFACE = 0.1
+_BOXES = ("bar", "rectangle", "block")
+
 # Support radius of the sums [spacings], so small that some supports are complete.
 _COVER = 2.2
 
@@ -174,6 +178,23 @@ def inside(discretisation: Discretisation) -> Iterator[float]:
         yield float(distances[sample.real].max())
         if p.ghosts.any():
             yield -float(distances[p.ghosts].min())
+
+
+@KIT.problems("as declared")
+def ends_on_surface(discretisation: Discretisation) -> Iterator[str]:
+    """On boxes, whose surface every arrangement can follow, the particles of most of the surface
+    stand on it and there are no ghosts, or the discretisation says that it does not end there."""
+    for sample in _samples(discretisation):
+        if sample.name not in _BOXES:
+            continue
+        p, shape = sample.particles, sample.shape
+        names = sorted(set(shape.surface(SPACING).faces))
+        outer = np.unique(np.concatenate([p.tagged(name) for name in names if name in p.tags]))
+        depths = np.abs(shape.signed_distance(p.positions[outer])) / SPACING
+        found = bool((depths <= _ON_SURFACE).mean() > 0.5) and not p.ghosts.any()
+        declared = discretisation.ends_on_surface(shape, SPACING)
+        if declared is not found:
+            yield f"{sample.name}: says {declared!r}, is {found}"
 
 
 @KIT.check

@@ -24,3 +24,17 @@ class Discretisation(Part):
         Raises:
             SceneError: no particle fits, or the arrangement cannot represent the shape.
         """
+
+    @abstractmethod
+    def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
+        """Whether the outermost particles stand on the surface of `shape`, to a tenth of a
+        `spacing` [m], without ghosts beyond it.
+
+        A scheme asks before it chooses a gradient: the sums of some suit particles that end on the
+        surface, those of others particles half a spacing inside. Most of the surface counts. A
+        lattice, which follows no curved surface, answers as for a box. The answer must not take
+        much longer than reading the parameters.
+
+        Raises:
+            SceneError: a parameter on which the answer depends is wrong.
+        """

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from importlib.metadata import version
 from importlib.resources import files
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from string import Template
 from typing import Any, final
@@ -19,6 +19,7 @@ from solidsph.errors import SolidsphError
 from solidsph.run.outcome import FINISHED
 from solidsph.studies.case import Case
 from solidsph.studies.frontier import AS_IT_IS, Frontier
+from solidsph.studies.larger_step import LARGEST, LargerStep, larger_step_sentence
 from solidsph.studies.point import Point, format_setting
 from solidsph.studies.report_figures import EXPENSES, TIME, Figures, drawable, library
 from solidsph.studies.variant import with_settings
@@ -26,7 +27,14 @@ from solidsph.studies.variant import with_settings
 _NUMBER = "no."  # heading of the numbers of configurations
 
 
-def write_report(made: Frontier, case: Case, path: Path, *, title: str | None = None) -> None:
+def write_report(
+    made: Frontier,
+    case: Case,
+    path: Path,
+    *,
+    title: str | None = None,
+    faster: Sequence[LargerStep] = (),
+) -> None:
     """Write a page with plots, a table of all points and the scenes of each.
 
     It contains Plotly's script, about 5 MB, and needs no network.
@@ -36,11 +44,12 @@ def write_report(made: Frontier, case: Case, path: Path, *, title: str | None = 
         case: its scenes are shown.
         path: of the HTML file.
         title: by default that of the case.
+        faster: configurations of `made` with the largest safe time step.
 
     Raises:
         SceneError: Plotly is not installed.
     """
-    page = _Page(made, case.priced(), title)
+    page = _Page(made, case.priced(), title, faster)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(page.text(), encoding="utf-8")
 
@@ -68,6 +77,7 @@ class _Page:
     made: Frontier
     case: Case
     title: str | None
+    faster: Sequence[LargerStep]
 
     def text(self) -> str:
         folder = files("solidsph.studies") / "report_page"
@@ -86,6 +96,7 @@ class _Page:
             style=parts["page.css"],
             choices="".join(self._choices()),
             left_out=self._left_out(),
+            faster=self._faster(),
             table=self._table(),
             orders=self._orders(),
             failures=self._failures(),
@@ -157,6 +168,10 @@ class _Page:
             "show; they are only in the table.</p>"
         )
 
+    def _faster(self) -> str:
+        sentence = larger_step_sentence(self.faster)
+        return f'<p id="larger-step">{escape(sentence)}.</p>' if sentence else ""
+
     def _table(self) -> str:
         columns = [(heading, cells, _class(cells)) for heading, cells in self._columns()]
         headings = "".join(
@@ -180,6 +195,8 @@ class _Page:
         points, front = self.made.points, self.made.numbers(self.made.front())
         names = dict.fromkeys(name for point in points for name in point.settings)
         several = any(len(point.seconds) > 1 for point in points)
+        faster = {id(one.usual): one.point for one in self.faster}
+        larger = [faster.get(id(point)) for point in points] if faster else []
         return [
             (_NUMBER, _cells(range(1, len(points) + 1))),
             ("front", _cells("front" if n in front else "" for n in range(len(points)))),
@@ -188,6 +205,14 @@ class _Page:
             ("trusted [%]", _cells(100.0 * self.made.trusted(p) for p in points)),
             ("time [s]", _cells(p.time for p in points)),
             *([("repeats [s]", [_repeats(p) for p in points])] if several else []),
+            *(
+                [
+                    (f"{LARGEST:g} of the step: error [%]", _cells(_percent(p) for p in larger)),
+                    ("its time [s]", _cells(p.time if p else inf for p in larger)),
+                ]
+                if larger
+                else []
+            ),
             ("spacing [m]", _cells(p.spacing for p in points)),
             ("particles", _cells(p.particles for p in points)),
             ("steps", _cells(p.steps for p in points)),
@@ -228,6 +253,10 @@ class _Page:
 
 def _cells(values: Iterable[Any], form: str = ".3g") -> Sequence[_Cell]:
     return [_Cell.of(value, form) for value in values]
+
+
+def _percent(point: Point | None) -> float:
+    return 100.0 * point.error if point else inf
 
 
 def _repeats(point: Point) -> _Cell:

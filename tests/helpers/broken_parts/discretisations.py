@@ -21,6 +21,9 @@ class GoodDiscretisation(Discretisation):
     def particles(self, shape: Shape, spacing: float) -> Particles:
         return Lattice(ghosts=1).particles(shape, spacing)
 
+    def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
+        return False
+
 
 class RefusesAll(GoodDiscretisation):
     def particles(self, shape: Shape, spacing: float) -> Particles:
@@ -81,6 +84,16 @@ class Unseeded(GoodDiscretisation):
         return attrs.evolve(given, volumes=np.random.default_rng().permutation(given.volumes))
 
 
+class SaysItEnds(GoodDiscretisation):
+    def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
+        return True
+
+
+class EndsInSilence(GoodDiscretisation):
+    def particles(self, shape: Shape, spacing: float) -> Particles:
+        return Lattice(on_boundary=True).particles(shape, spacing)
+
+
 DISCRETISATIONS = [
     (RefusesAll, {"represents a shape"}),
     (WithoutLast, {"arrays"}),
@@ -92,4 +105,6 @@ DISCRETISATIONS = [
     (TagOfAll, {"tags"}),
     (NoImages, {"images"}),
     (Unseeded, {"same bits"}),
+    (SaysItEnds, {"ends on surface"}),
+    (EndsInSilence, {"ends on surface"}),
 ]

@@ -20,6 +20,7 @@ from solidsph.interfaces.shape import Shape
 from solidsph.model.particles import Particles
 from solidsph_builtin.discretisations._noise import moved_inside
 from solidsph_builtin.discretisations.conforming_lattice import ConformingLattice
+from solidsph_builtin.discretisations.fitted import Fitted
 from solidsph_builtin.discretisations.jittered import Jittered
 from solidsph_builtin.discretisations.jittered_lattice import JitteredLattice
 from solidsph_builtin.discretisations.lattice import Lattice
@@ -802,3 +803,51 @@ def test_one_large_spacing_still_makes_one_particle() -> None:
     np.testing.assert_allclose(particles.volumes, 0.5)
     np.testing.assert_allclose(particles.area_vectors, [[0.0, 0.0]], atol=1e-15)
     assert all(particles.tags[face].all() for face in ("left", "right", "bottom", "top"))
+
+
+# Where particles end ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "arrangement",
+    [Fitted(), ConformingLattice(), Jittered(ConformingLattice(), 0.3, 5)],
+    ids=name_of,
+)
+@pytest.mark.parametrize("shape", SHAPES, ids=name_of)
+def test_particles_that_own_the_surface_stand_on_it(
+    shape: Shape, arrangement: Discretisation
+) -> None:
+    assert arrangement.ends_on_surface(shape, 0.09)
+    particles = arrangement.particles(shape, 0.09)
+    outer = particles.tagged("surface")
+    assert np.abs(shape.signed_distance(particles.positions[outer])).max() < 1e-6 * 0.09
+
+
+@given(
+    shape=st.sampled_from([Box([1.0, 0.63]), Box([0.6, 0.5, 0.4]), Disc(0.5), Annulus(0.3, 0.6)]),
+    depth=st.floats(0.0, 0.5).filter(lambda depth: abs(depth - 0.1) > 1e-3),
+)
+def test_given_points_end_on_the_surface_up_to_a_tenth_of_a_spacing(
+    shape: Shape, depth: float
+) -> None:
+    """Points of the surface, and one inside, moved inside along its normals."""
+    spacing = 0.05
+    surface = shape.surface(spacing)
+    normals = surface.area_vectors / np.linalg.norm(surface.area_vectors, axis=1)[:, None]
+    places = surface.points - depth * spacing * normals
+    assert Points(positions=places).ends_on_surface(shape, spacing) is (depth < 0.1)
+
+
+def test_most_of_the_surface_counts() -> None:
+    """Three sides of a square of four, then one."""
+    n = np.linspace(0.05, 0.95, 10)
+    for count in (3, 1):
+        depths = np.where(np.arange(4) < count, 0.0, 0.05)
+        sides = [
+            np.column_stack([n, np.full(10, depths[0])]),
+            np.column_stack([n, np.full(10, 1.0 - depths[1])]),
+            np.column_stack([np.full(10, depths[2]), n]),
+            np.column_stack([np.full(10, 1.0 - depths[3]), n]),
+        ]
+        points = Points(positions=np.concatenate(sides))
+        assert points.ends_on_surface(Box([1.0, 1.0]), 0.1) is (count == 3)
