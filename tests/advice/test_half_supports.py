@@ -78,10 +78,10 @@ def test_a_quarter_without_ghosts_is_wrong_and_warned_of_and_the_remedies_are_ri
     assert peak(mirrored) == pytest.approx(reference, rel=0.02)
     assert warnings(mirrored) == []
     # It takes the surface into account. Of 20 particles a side, the largest stress of a particle
-    # differs from that in its own whole sheet by 5.4 %; at 40 both are within 2 % of the right one.
+    # differs from that in its own whole sheet by 6.7 %; at 40 both are within 2 % of the right one.
     whole = peak(sheet("fitted", gradient="consistent", whole=True).build())
     consistent = quarter("fitted", gradient="consistent").build()
-    assert peak(consistent) == pytest.approx(whole, rel=0.06)
+    assert peak(consistent) == pytest.approx(whole, rel=0.07)
     assert warnings(consistent) == []
 
 

@@ -25,6 +25,7 @@ from solidsph.studies.receipts import (
     receipts,
     reduced,
 )
+from solidsph.studies.variant import with_settings
 from tests.commands.test_cli import solidsph
 
 DAMPED = """
@@ -212,7 +213,8 @@ def test_a_column_that_is_none() -> None:
 
 
 def test_what_a_case_measures_changes_without_it() -> None:
-    case = construct("cases", {"type": "thin-strip", "across": 3, "along": 11, "hourglass": 0.5})
+    strip = construct("cases", {"type": "thin-strip", "across": 3, "along": 11})
+    case = with_settings(strip, {"hourglass": 0.5})
     (changes,) = case_changes(case).values()
     assert changes
     assert all(0.0 <= change < np.inf for change in changes.values())

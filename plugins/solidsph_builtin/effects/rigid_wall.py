@@ -34,10 +34,11 @@ class RigidWall(Effect):
     """A spring that pushes back every particle nearer to the plane than its `clearance`.
 
     The normal points to the side of the bodies. With g the distance from the plane minus the
-    clearance, the energy is k min(g, 0)^2 / 2 with k = strength (lambda + 2 mu) V / s^2: the wall
-    is as compliant as 1 / strength spacings of material. The clearance of a particle, unless it is
-    given, is its depth below the surface of its body, at most half a spacing, so that a body
-    touches where its surface is. A wall may move by formulas in t; its work is in its account.
+    clearance, the energy is k min(g, 0)^2 / 2 with k = strength (lambda + 2 mu) V / (s h), where h
+    is the layer that a particle stands for, half a spacing and its depth below the surface of its
+    body, at most half a spacing: the wall is as compliant as 1 / strength spacings of material. The
+    clearance, unless it is given, is that depth, so that a body touches where its surface is. A
+    wall may move by formulas in t; its work is in its account.
 
     Friction is Coulomb's law with a tangential spring for each touching particle, which slides at
     `friction` times the normal force, Cundall & Strack (1979). A law of velocity alone would let
@@ -88,18 +89,19 @@ class RigidWall(Effect):
             ]
         )[indices]
         V, s = particles.volumes[indices], particles.spacings[indices]
+        depths = _depths(model)[indices]
         wall = _Wall(
             label=label,
             particles=indices,
             reference=particles.positions,
             point=_vector("point", self.point, d),
             normal=normal / np.linalg.norm(normal),
-            clearances=self._clearances(model)[indices],
-            springs=self.strength * moduli * V / s**2,
+            clearances=depths if self.clearance is None else self.clearance * s,
+            springs=self.strength * moduli * V / (s * (0.5 * s + depths)),
             friction=self.friction,
             field=field,
             # Every particle is tied to the wall alone, by k / m; the tangential spring is softer.
-            stiffness_rate=sqrt(self.strength)
+            stiffness_rate=sqrt(2.0 * self.strength)
             * max(
                 body.material.wave_speed / float(body.particles.spacings.min())
                 for body in model.bodies
@@ -108,13 +110,12 @@ class RigidWall(Effect):
         wall.motion(0.0, 0)  # a formula outside its domain raises now, not during the run
         return wall
 
-    def _clearances(self, model: DiscreteModel) -> Array:
-        """Clearance of every particle, (n,) [m]."""
-        particles = model.particles
-        if self.clearance is not None:
-            return np.asarray(self.clearance * particles.spacings)
-        distances = [body.shape.signed_distance(body.particles.positions) for body in model.bodies]
-        return np.clip(-np.concatenate(distances), 0.0, 0.5 * particles.spacings)
+
+def _depths(model: DiscreteModel) -> Array:
+    """Depth of every particle below the surface of its body, (n,) [m], at most half a spacing."""
+    distances = [body.shape.signed_distance(body.particles.positions) for body in model.bodies]
+    depths: Array = np.clip(-np.concatenate(distances), 0.0, 0.5 * model.particles.spacings)
+    return depths
 
 
 @final
