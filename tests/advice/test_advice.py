@@ -118,7 +118,7 @@ def test_its_cost_does_not_grow_with_the_body(monkeypatch: pytest.MonkeyPatch) -
     toml = next(one for one in SOUND if "pressed in space" in one)
     toml = toml.replace("hourglass-control", 'mass-damping"\nrate = 2.0 #')  # compiles nothing
     asked: dict[str, int] = {}
-    for spacing in ("0.0125", "0.00625"):
+    for spacing in ("0.02", "0.01"):
         simulation = built(toml.replace("0.0125", spacing))
         count = 0
 
@@ -136,7 +136,7 @@ def test_its_cost_does_not_grow_with_the_body(monkeypatch: pytest.MonkeyPatch) -
             advise(simulation)
         asked[spacing] = count
     # Every step along a ray is one; near a surface steps are a part of the spacing, half as long.
-    assert 0 < asked["0.00625"] < 2 * asked["0.0125"]
+    assert 0 < asked["0.01"] < 2 * asked["0.02"]
 
 
 def test_beside_an_effect_that_does_not_say_what_it_is_for_nothing_is_lacking() -> None:

@@ -46,6 +46,7 @@ def told(one: tuple[str, str, Case, Trial]) -> str:
 LONG = (
     *("cantilever-plate", "colliding-rings", "crease", "large-stretch", "nonlinear-bar"),
     *("sliding-block", "stiffness-jump", "closing-hole", "folding-strip"),
+    "twisting-column: 400 rad/s, nu 0.45",
     *("inflated-ring: beyond the limit load", "notched-sheet: to a stretch of 4, finer"),
 )
 

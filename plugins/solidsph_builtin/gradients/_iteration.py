@@ -26,7 +26,7 @@ _LEFT, _LEFT_OF_SUMS = 1e-2, 1e-7
 # Steps, at least and at most, and pairs times steps: some seconds. The least leave 2 % of what was
 # missing in a cube of 22 particles a side.
 _FEWEST, _MOST = 30, 2000
-_PAIR_STEPS = 1e8
+_PAIR_STEPS = 5e7
 
 
 def solved(

@@ -482,6 +482,7 @@ def test_total_load_on_curved_faces_and_around_corners(
         .body("body", shape=shape, spacing=0.1)
         .kernel("modified-mollifier", cover=3.0)
         .material("neo-hookean", **SOFT)
+        .formulation("total-lagrangian", gradient="corrected")
         .boundary("traction", where=face, traction={"x": 1e3}, label="load")
         .duration(1e-3)
         .build()
