@@ -55,6 +55,7 @@ def test_csm1_is_right_with_few_particles(tmp_path: Path) -> None:
     check_pictures(outcome)
 
 
+@pytest.mark.validation
 def test_csm1_approaches_the_reference_with_the_order_of_its_corners(tmp_path: Path) -> None:
     """The corners of the clamp are singular: halving the spacing about halves the error."""
     coarse, fine = (errors(run_case(Csm1("straight", across=n), tmp_path)) for n in (9, 17))
@@ -191,12 +192,12 @@ def test_sheet_with_hole_at_twenty_particles_a_quarter(tmp_path: Path) -> None:
     assert outcome.passed, outcome.measurements
     check_pictures(outcome)
     # Elsewhere nothing is known.
-    other = run_case(SheetWithHole(hole_ratio=0.4), tmp_path)
+    other = run_case(SheetWithHole(hole_ratio=0.4, spacing=0.1), tmp_path)
     assert [m.reference for m in other.measurements] == [None, None, 1.0]
 
 
 def test_the_sheets_rows_follow_the_hole() -> None:
-    for ratio in (0.1, 0.2, 0.5, 0.7):
+    for ratio in (0.2, 0.7):
         case = SheetWithHole(hole_ratio=ratio, spacing=0.05)
         particles = Simulation.builder(case.scenes()["sheet"]).build().particles
         rim = particles.positions[particles.tags["rim"]]

