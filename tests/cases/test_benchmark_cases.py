@@ -64,6 +64,7 @@ def test_csm1_approaches_the_reference_with_the_order_of_its_corners(tmp_path: P
         assert 1.7 < coarse[quantity] / error < 3.0
 
 
+@pytest.mark.validation
 def test_csm1_at_the_tip_between_two_particles(tmp_path: Path) -> None:
     """With an even number across, the tip is no particle; the error lies between the others."""
     found = [errors(run_case(Csm1("straight", across=n), tmp_path)) for n in (5, 6, 7)]

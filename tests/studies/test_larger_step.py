@@ -89,6 +89,7 @@ def test_a_sentence_says_what_it_gives_and_what_it_cost() -> None:
     assert larger_step_sentence([]) == ""
 
 
+@pytest.mark.validation
 def test_the_command_shows_it(tmp_path: Path) -> None:
     arguments = ("cost", "graded-points", "--axis", "along=8,12", "--report")
     done = solidsph(*arguments, "--json", cwd=tmp_path)
