@@ -1,7 +1,7 @@
 """The sums of `consistent` for many particles, by conjugate gradients over the fixed pairs.
 
 A factorisation couples neighbours of neighbours: in space some 600 particles a particle. Here each
-step is two passes over the pairs, and nothing is stored but a small matrix a particle.
+step is one pass over the pairs, and nothing is stored but a small matrix a particle.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _SMALLEST = 1e-300
 # the sums without their first moments.
 _LEFT, _LEFT_OF_SUMS = 1e-2, 1e-7
 
-# Steps, at least and at most, and pairs times steps: some seconds. The least leave 2 % of what was
-# missing in a cube of 22 particles a side.
+# Steps, at least and at most, and pairs times steps: some seconds. The least leave 3 % of what was
+# missing in a cube of 46 particles a side.
 _FEWEST, _MOST = 30, 2000
 _PAIR_STEPS = 5e7
 
