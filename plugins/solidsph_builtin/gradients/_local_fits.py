@@ -51,7 +51,7 @@ class LocalFits:
         reach = np.maximum.reduceat(pairs.distances, pairs.starts[:-1])
         units = np.where(reach > 0.0, reach, 1.0)
         d = pairs.offsets.shape[1]
-        factors = _factors(d, degree)
+        factors = factors_of(d, degree)
         basis = np.zeros((len(filled), d + len(factors), filled.shape[1]))
         basis.transpose(0, 2, 1)[:, :, :d][filled] = pairs.offsets / pairs.spread(units)[:, None]
         for k, (i, j) in enumerate(factors, start=d):
@@ -73,7 +73,7 @@ class LocalFits:
     def of_degree(self, degree: int) -> LocalFits:
         """Fits of polynomials up to a lower degree."""
         d = self.pairs.offsets.shape[1]
-        k = d + len(_factors(d, degree))
+        k = d + len(factors_of(d, degree))
         return attrs.evolve(self, basis=self.basis[:, :k], moments=self.moments[:, :k, :k])
 
     def gradients(self) -> tuple[Array, Array]:
@@ -120,7 +120,7 @@ class LocalFits:
 
 
 @cache
-def _factors(dimension: int, degree: int) -> Sequence[tuple[int, int]]:
+def factors_of(dimension: int, degree: int) -> Sequence[tuple[int, int]]:
     """The two earlier functions whose product each function beyond the components is."""
     powers = [tuple(map(int, row)) for row in np.eye(dimension)]
     factors: list[tuple[int, int]] = []

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solidsph.engines.compiled.jit import njit
+from solidsph_builtin.gradients._local_fits import factors_of
 
 # Sums in any order: they are vectorised.
 _FAST = {"reassoc", "contract", "nsz"}
@@ -38,7 +39,9 @@ class Passes(NamedTuple):
 def passes(dimension: int, degree: int) -> Passes:
     """The passes for functions of the first or second `degree` that keep their gradient."""
     d = dimension
-    k = d + d * (d + 1) // 2 if degree > 1 else d
+    # In the order of the inverses; an array, since there may be none.
+    factors = np.array(factors_of(d, degree), dtype=np.intp).reshape(-1, 2)
+    k = d + len(factors)
 
     # The pairs of one particle stand side by side in `w`, `x` and `b`, for loops over vectors.
     @njit
@@ -61,13 +64,10 @@ def passes(dimension: int, degree: int) -> Passes:
         for i in range(d):
             for m in range(count):
                 b[i, m] = own * x[i, m]
-        if k > d:
-            at = d
-            for i in range(d):
-                for j in range(i, d):
-                    for m in range(count):
-                        b[at, m] = b[i, m] * b[j, m]
-                    at += 1
+        for at in range(d, k):
+            i, j = factors[at - d, 0], factors[at - d, 1]
+            for m in range(count):
+                b[at, m] = b[i, m] * b[j, m]
         return begin, count
 
     @njit(fastmath=_FAST)

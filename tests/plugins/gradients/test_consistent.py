@@ -201,19 +201,23 @@ def test_a_linear_stress_has_its_divergence_and_its_traction() -> None:
     assert worst["consistent"] < 0.02 * worst["quadratic"]
 
 
-@pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.validation)])
+@pytest.mark.parametrize(
+    ("dimension", "of"),
+    [(2, "cubic"), (2, "corrected"), pytest.param(3, "cubic", marks=pytest.mark.validation)],
+)
 def test_by_iteration_the_sums_are_those_by_factorisation(
-    dimension: int, monkeypatch: pytest.MonkeyPatch
+    dimension: int, of: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Bodies of many particles: the same system, solved to a part of what was missing."""
-    factorised = block(dimension, "consistent").build()
+    gradient = {"type": "consistent", "of": of}
+    factorised = block(dimension, gradient).build()
     monkeypatch.setattr(consistent, "_FACTORISED", {dimension: 0})
-    iterated = block(dimension, "consistent").build()
-    missing = np.abs(sums(block(dimension, "quadratic").build())).max()
+    iterated = block(dimension, gradient).build()
+    missing = np.abs(sums(block(dimension, of).build())).max()
     assert np.abs(sums(iterated) - sums(factorised)).max() < 1.5e-2 * missing
     monkeypatch.setattr(_iteration, "_LEFT", 1e-9)
     monkeypatch.setattr(_iteration, "_MOST", 20_000)
-    exactly = block(dimension, "consistent").build()
+    exactly = block(dimension, gradient).build()
     assert np.abs(sums(exactly) - sums(factorised)).max() < 1e-6 * missing
 
 
