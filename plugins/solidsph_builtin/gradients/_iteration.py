@@ -13,6 +13,7 @@ import numpy as np
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs, row_starts
 from solidsph.model.particles import Particles
+from solidsph_builtin.gradients._equal_rows import distinct_rows
 from solidsph_builtin.gradients._local_fits import LocalFits, portions
 from solidsph_builtin.gradients._passes import Sums, passes
 from solidsph_builtin.gradients._softening import softening
@@ -81,8 +82,11 @@ def _sums(
     pairs: Pairs, close: Array, particles: Particles, free: Array, degree: int, length: float
 ) -> Sums:
     roots, units = [], []
-    for own, part in portions(pairs):
-        fits = LocalFits.of(part, close[own] * particles.cells[part.columns], degree)
+    first, kinds = distinct_rows(pairs, particles.cells)
+    where, rows = pairs.chosen(first)
+    weights = close[where] * particles.cells[rows.columns]
+    for own, part in portions(rows):
+        fits = LocalFits.of(part, weights[own], degree)
         roots.append(fits.inverse_root())
         units.append(fits.units)
     root = np.concatenate(roots)
@@ -94,8 +98,8 @@ def _sums(
         close[kept],
         particles.cells,
         particles.volumes**2 * free,
-        root @ root.transpose(0, 2, 1),
-        np.concatenate(units),
+        (root @ root.transpose(0, 2, 1))[kinds],
+        np.concatenate(units)[kinds],
         length,
     )
 

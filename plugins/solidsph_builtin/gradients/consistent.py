@@ -155,13 +155,17 @@ class _OfBody(Gradient):
         return self.of.exact_degree
 
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
-        weights = np.empty_like(kernel_gradients)
-        for own, part in portions(pairs):
-            fits = LocalFits.of_gradient(part, kernel_gradients[own], volumes, self.exact_degree)
-            change = _Change.of(fits, self.volumes, self.freedom, self.length)
-            weights[own] = change.weights(self.multipliers)
-        plain = self.of.weights(pairs, kernel_gradients, volumes)
-        return plain + pairs.of_differences(weights)
+        weights = self.of.weights(pairs, kernel_gradients, volumes)
+        changing = np.flatnonzero(self.freedom[pairs.rows[pairs.starts[:-1]]])
+        where, rows = pairs.chosen(changing)
+        slopes = kernel_gradients[where]
+        change = np.empty_like(slopes)
+        for own, part in portions(rows):
+            fits = LocalFits.of_gradient(part, slopes[own], volumes, self.exact_degree)
+            changed = _Change.of(fits, self.volumes, self.freedom, self.length)
+            change[own] = changed.weights(self.multipliers)
+        weights[where] += rows.of_differences(change)
+        return weights
 
 
 def _missing(particles: Particles, pairs: Pairs, weights: Array, length: float) -> Array:

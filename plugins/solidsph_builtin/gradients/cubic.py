@@ -10,6 +10,7 @@ import numpy as np
 from solidsph.interfaces.gradient import Gradient
 from solidsph.maths.arrays import Array
 from solidsph.model.neighbours import Pairs
+from solidsph_builtin.gradients._equal_rows import by_distinct_rows
 from solidsph_builtin.gradients._local_fits import LocalFits, portions
 from solidsph_builtin.gradients.quadratic import quadratic_fit
 
@@ -32,16 +33,20 @@ class Cubic(Gradient):
     exact_degree: ClassVar[int] = 2
 
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
-        weights = np.empty_like(kernel_gradients)
-        for own, part in portions(pairs):
-            slopes = kernel_gradients[own]
-            fits = LocalFits.of_gradient(part, slopes, volumes, 3)
-            found, noise = fits.gradients()
-            _, usual = fits.of_degree(1).gradients()
-            poor = ~(noise <= _NOISIER * usual)
-            if poor.any():
-                replaced = part.spread(poor)
-                quadratic, _ = quadratic_fit(fits, slopes, volumes)
-                found[replaced] = quadratic[replaced]
-            weights[own] = found
-        return pairs.of_differences(weights)
+        return by_distinct_rows(pairs, kernel_gradients, volumes, _weights)
+
+
+def _weights(pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
+    weights = np.empty_like(kernel_gradients)
+    for own, part in portions(pairs):
+        slopes = kernel_gradients[own]
+        fits = LocalFits.of_gradient(part, slopes, volumes, 3)
+        found, noise = fits.gradients()
+        _, usual = fits.of_degree(1).gradients()
+        poor = ~(noise <= _NOISIER * usual)
+        if poor.any():
+            replaced = part.spread(poor)
+            quadratic, _ = quadratic_fit(fits, slopes, volumes)
+            found[replaced] = quadratic[replaced]
+        weights[own] = found
+    return pairs.of_differences(weights)

@@ -11,6 +11,7 @@ import numpy as np
 from solidsph.interfaces.gradient import Gradient
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs
+from solidsph_builtin.gradients._equal_rows import by_distinct_rows
 from solidsph_builtin.gradients._local_fits import LocalFits, portions
 from solidsph_builtin.gradients.corrected import Corrected
 
@@ -38,21 +39,25 @@ class Quadratic(Gradient):
     exact_degree: ClassVar[int] = 2
 
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
-        weights = np.empty_like(kernel_gradients)
-        poor = False
-        for own, part in portions(pairs):
-            fits = LocalFits.of_gradient(part, kernel_gradients[own], volumes, 2)
-            weights[own], linear = quadratic_fit(fits, kernel_gradients[own], volumes)
-            poor |= bool(linear.any())
-        if poor:
-            # Without a count: an engine may compute some rows at a time, and one warning is enough.
-            warnings.warn(
-                "gradient 'quadratic': some particles have too few or too flat neighbours for a "
-                "quadratic fit and use the linear one; a larger cover or a finer spacing gives "
-                "them more",
-                stacklevel=2,
-            )
-        return pairs.of_differences(weights)
+        return by_distinct_rows(pairs, kernel_gradients, volumes, _weights)
+
+
+def _weights(pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
+    weights = np.empty_like(kernel_gradients)
+    poor = False
+    for own, part in portions(pairs):
+        fits = LocalFits.of_gradient(part, kernel_gradients[own], volumes, 2)
+        weights[own], linear = quadratic_fit(fits, kernel_gradients[own], volumes)
+        poor |= bool(linear.any())
+    if poor:
+        # Without a count: an engine may compute some rows at a time, and one warning is enough.
+        warnings.warn(
+            "gradient 'quadratic': some particles have too few or too flat neighbours for a "
+            "quadratic fit and use the linear one; a larger cover or a finer spacing gives "
+            "them more",
+            stacklevel=2,
+        )
+    return pairs.of_differences(weights)
 
 
 def quadratic_fit(fits: LocalFits, kernel_gradients: Array, volumes: Array) -> tuple[Array, Mask]:

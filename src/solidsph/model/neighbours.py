@@ -17,7 +17,7 @@ from solidsph.maths.arrays import Array, Indices, Mask
 class Pairs:
     """Ordered pairs (p, q) in rows: the row of p holds its neighbours q in rising order, with p.
 
-    The list may hold the rows of a contiguous range of particles only; rows and columns are
+    The list may hold the rows of some particles only; rows and columns are
     numbered among all. In a list of all rows every pair has its reverse.
     """
 
@@ -47,6 +47,19 @@ class Pairs:
             offsets=self.offsets[own],
             distances=self.distances[own],
         )
+
+    def chosen(self, rows: Indices) -> tuple[Indices, Pairs]:
+        """Some of the rows listed, (k,) of 0 to n - 1: where their pairs are, and these alone."""
+        counts = np.diff(self.starts)[rows]
+        own = ranges(self.starts[rows], counts)
+        part = Pairs(
+            starts=row_starts(counts),
+            rows=self.rows[own],
+            columns=self.columns[own],
+            offsets=self.offsets[own],
+            distances=self.distances[own],
+        )
+        return own, part
 
     def reversed_order(self) -> Indices:
         """Index of (q, p) for every pair (p, q), (m,)."""
