@@ -29,7 +29,7 @@ SHORT = {
     "lame-ring-whole": "8 across: radial stress 4.2 %, hoop stress 3.7 %",
     "spinning-ring": "8 across: hoop stress 2.1 %",
     "inflated-ring-0.3": "8 across: growth 2.1 %",
-    "inflated-ring-0.4999": "no equilibrium found at 8 and 15 across",
+    "inflated-ring-0.4999": "8 across: growth 3.5 %; pressure zigzags by 10 %",
     "sheet-0.49-quarter": "peak stress -0.07 % at 20 across, -0.5 % at 40",
     "sheet-0.49-whole": "extension 0.08 % at 10 across, 0.2 % at 20",
     "kirsch": "peak stress -0.1 % at 20 across, -0.7 % at 40",

@@ -35,7 +35,8 @@ MAY_IMPORT = {
     "costs": "errors system interfaces registry engines scene run simulation",
     "studies": "errors maths model interfaces registry scene run results conformance simulation "
     "costs",
-    "testing": "errors maths interfaces registry engines run conformance assembly simulation",
+    "testing": "errors maths interfaces registry engines run statics conformance assembly "
+    "simulation",
     "commands": "errors system interfaces registry scene run statics results watch advice "
     "conformance simulation resumption costs studies testing",
     "cli": "errors commands",

@@ -99,8 +99,7 @@ class FollowerLoad(SurfaceLoad):
         return np.asarray(np.einsum("kij,kj->ki", cof, self.face.area_vectors))
 
     def stiffness(self, displacements: Array, time: float) -> csr_array:
-        """The symmetric part of K (d n, d n) [N/m]; K is symmetric if the surface is closed, or its
-        edge held."""
+        """K (d n, d n) [N/m]; it is symmetric if the surface is closed, or its edge held."""
         n, d = displacements.shape
         p = self.field.values(0, self.reference[self.particles], time)
         F = self._deformation(self.reference + displacements)
@@ -118,7 +117,7 @@ class FollowerLoad(SurfaceLoad):
                 place = np.zeros((d, d))
                 place[k, i] = 1.0
                 total = total + kron(block, place, format="csr")
-        return csr_array(0.5 * (total + total.T))
+        return total
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         state = observation.state

@@ -63,7 +63,7 @@ class EquilibriumResult:
     steps: tuple[LoadStep, ...]
     iterations: int  # factorisations, those of failed load steps included
     residual: float  # norm of the imbalance over that of all applied forces [-]
-    stable: bool | None  # last tangent positive definite; None if it is not symmetric
+    stable: bool | None  # pivots of the last tangent positive; None if forces have no energy
     seconds: float  # wall time [s]
 
 
@@ -269,7 +269,12 @@ class _Newton:
         raise _LoadStepError(cause, _TOO_LITTLE if imbalance <= self.coarsest else _PATH_ENDS, u)
 
     def stable(self) -> bool | None:
-        """Whether the last tangent was positive definite; None if it is not symmetric."""
+        """Whether the pivots of the last tangent were positive; None if the internal forces have no
+        energy.
+
+        The stiffness of a load that follows its surface need not be symmetric. Where a path of
+        equilibria turns or branches, a pivot changes its sign all the same.
+        """
         return self.last.positive if self.symmetric and self.last is not None else None
 
     def _free_motion(self, error: SingularError) -> str:

@@ -31,9 +31,9 @@ class Factors:
 
     @property
     def positive(self) -> bool:
-        """Whether the matrix, which must be symmetric, is positive definite.
+        """Whether all pivots are positive: a symmetric matrix is positive definite then.
 
-        The pivots have the signs of the eigenvalues. SuperLU copies its factors, which takes as
+        SuperLU copies its factors, which takes as
         long as the factorisation.
         """
         return bool(np.all(self.lu.U.diagonal() > 0.0))
@@ -47,8 +47,9 @@ class Factors:
 def factorise(matrix: csr_array, *, symmetric: bool) -> Factors:
     """Factorise `matrix` (k, k).
 
-    A symmetric matrix is ordered by minimum degree with pivots on its diagonal: half the time of
-    the general ordering for a beam, a sixth for a square.
+    A `symmetric` matrix is ordered by minimum degree with pivots on its diagonal: half the time of
+    the general ordering for a beam, a sixth for a square. Loads may make it
+    slightly less than symmetric.
 
     Raises:
         SingularError: some motion has no stiffness to working precision.

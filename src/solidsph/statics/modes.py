@@ -37,7 +37,7 @@ class Modes:
 def frequencies(simulation: BuiltScene, count: int, state: State | None = None) -> Modes:
     """The `count` lowest natural frequencies about `state`, by shift-and-invert.
 
-    Loads contribute their stiffness; damping is neglected.
+    Loads contribute the symmetric part of their stiffness; damping is neglected.
 
     Args:
         simulation: a built scene in the total Lagrangian form with an adjoint divergence.
@@ -63,7 +63,9 @@ def frequencies(simulation: BuiltScene, count: int, state: State | None = None) 
     u = np.zeros_like(particles.positions)
     if state is not None:
         u = state.positions - particles.positions
-    K = free.reduced(tangent(simulation, u))
+    whole = free.reduced(tangent(simulation, u))
+    # A load that follows its surface may have no energy: its symmetric part alone has modes.
+    K = csr_array(0.5 * (whole + whole.T))
     mass = np.repeat(model.masses, particles.dimension)[free.free.ravel()]
     extent = float(np.ptp(particles.positions, axis=0).max())
     speed = min(body.material.wave_speed for body in model.bodies)

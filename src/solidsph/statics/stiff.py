@@ -24,6 +24,5 @@ class Stiff(Protocol):
             displacements: u = x - X of all particles, (n, d) [m].
             time: time of the load [s].
 
-        Component i of particle p has the index p d + i. The symmetric part suffices for the
-        convergence of Newton's method if the force has no energy.
+        Component i of particle p has the index p d + i. It need not be symmetric.
         """

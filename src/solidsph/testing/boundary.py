@@ -29,6 +29,7 @@ from solidsph.testing.terms import (
     force_problem,
     observed,
     residual,
+    stiffness_error,
 )
 
 _LABEL = "handler"
@@ -209,6 +210,19 @@ def forces(handler: BoundaryHandler) -> Iterator[str]:
         for term in sample.terms:
             if isinstance(term, Load):
                 yield force_problem(sample.simulation, term, sample.random())
+
+
+# Differences leave the square of their step, 1e-8, and rounding over it.
+@KIT.errors(1e-6, none="it has no stiffness")
+def stiffness(handler: BoundaryHandler) -> Iterator[float]:
+    """The stiffness that it tells Newton's method is minus the derivative of its force."""
+    for sample in _samples(handler):
+        for term in sample.terms:
+            if isinstance(term, Load):
+                u, du = 100.0 * sample.random(), sample.random()
+                error = stiffness_error(sample.simulation, term, u, du)
+                if error is not None:
+                    yield error
 
 
 @KIT.check

@@ -30,6 +30,7 @@ from solidsph.testing.terms import (
     field_verdict,
     force_problem,
     residual,
+    stiffness_error,
 )
 
 _LABEL = "effect"
@@ -305,6 +306,16 @@ def stiffness_rate(effect: Effect) -> Verdict:
     """No small motion about rest has, by the effect alone, a higher angular frequency than
     declared."""
     return _bounded(effect, lambda sample: np.sqrt(max(_stiffness(sample), 0.0)), "stiffness_rate")
+
+
+# Differences leave the square of their step, 1e-8, and rounding over it.
+@KIT.errors(1e-6, none="it has no stiffness")
+def stiffness(effect: Effect) -> Iterator[float]:
+    """The stiffness that it tells Newton's method is minus the derivative of its force."""
+    for sample in _samples(effect):
+        error = stiffness_error(sample.simulation, sample.load, sample.smooth(), sample.smooth())
+        if error is not None:
+            yield error
 
 
 @KIT.check

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import attrs
 import numpy as np
+from scipy.sparse import csr_array, diags_array
 
 from solidsph import (
     BoundaryHandler,
@@ -135,6 +136,34 @@ class PushesMoreAndMore(BoundaryHandler):
         return [Push(label, model.select("left"))]
 
 
+@attrs.frozen(eq=False)
+class Springs(Load):
+    """Particles on springs to their places, of half the stiffness that is told."""
+
+    label: str
+    particles: Indices
+    reference: Array
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        forces: Array = self.reference[self.particles] - positions[self.particles]
+        return forces
+
+    def stiffness(self, displacements: Array, time: float) -> csr_array:
+        held = np.zeros(displacements.shape)
+        held[self.particles] = 2.0
+        return csr_array(diags_array(held.ravel()))
+
+    def report(self, observation: Observation) -> dict[str, float]:
+        return {}
+
+
+class StiffByHalf(BoundaryHandler):
+    def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
+        particles = model.particles
+        surface = np.any(particles.area_vectors != 0.0, axis=1)
+        return [Springs(label, np.flatnonzero(surface & ~particles.ghosts), particles.positions)]
+
+
 class HeldWithFields(HeldInPlace, FieldTerm):
     def fields(self, observation: Observation) -> dict[str, Array]:
         return {"held [-]": np.full(len(self.held), np.nan)}
@@ -176,5 +205,6 @@ BOUNDARIES = [
     (ForgetsGhosts, {"virtual power"}),
     (StressFree, {"stresses"}),
     (PushesMoreAndMore, {"forces"}),
+    (StiffByHalf, {"stiffness"}),
     (ReportsWithoutUnits, {"report"}),
 ]

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import attrs
 import numpy as np
+from scipy.sparse import csr_array, diags_array
 
 from solidsph import (
     Effect,
@@ -109,6 +110,23 @@ class StiffUndeclared(GoodEffect):
     condition = Anchor
 
 
+class Springs(Drag):
+    """Declared in full as a frequency, by half for Newton's method."""
+
+    stiffness_rate = 1.0
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return super().forces(time, positions, velocities + positions)
+
+    def stiffness(self, displacements: Array, time: float) -> csr_array:
+        every = np.repeat(self.resistance, displacements.shape[1])
+        return csr_array(diags_array(0.5 * every))
+
+
+class StiffByHalf(GoodEffect):
+    condition = Springs
+
+
 class DragNoUnits(Drag):
     def report(self, observation: Observation) -> dict[str, float]:
         return {"resistance": 1.0}
@@ -174,6 +192,7 @@ EFFECTS = [
     (Drives, {"stored energy"}),
     (DampsMoreThanDeclared, {"damping rate"}),
     (StiffUndeclared, {"stiffness rate"}),
+    (StiffByHalf, {"stiffness"}),
     (EffectWithoutUnits, {"report"}),
     (LeavesItsMark, {"nothing when absent"}),
 ]
