@@ -226,6 +226,32 @@ traction = {{x = "2e4*min(t/0.01, 1)"}}
 """,
     ),
     Flawed(
+        "small-step",
+        "cover = 2.6 gives each particle more",
+        f"""
+title = "eight neighbours for a quadratic fit that is to be consistent"
+duration = 0.01
+silence = ["small-cover"]
+material = {RUBBER}
+[body.plate]
+shape = {{type = "box", lengths = [0.6, 0.12]}}
+spacing = 0.01
+[kernel]
+type = "cubic-spline"
+cover = 1.8
+[formulation]
+type = "total-lagrangian"
+gradient = "consistent"
+[[boundary]]
+type = "clamp"
+where = "left"
+[[boundary]]
+type = "traction"
+where = "right"
+traction = {{y = "1e2*min(t/0.005, 1)"}}
+""",
+    ),
+    Flawed(
         "large-cover",
         "cover = 2.6, or add [[effect]] 'hourglass-control'",
         """

@@ -17,6 +17,9 @@ from solidsph_builtin.shapes._sampling import cells_along
 # Points handled at once: enough for NumPy to be efficient, few enough to stay in the cache.
 _CHUNK = 1 << 15
 
+# What is thinner than this part of its length has no extent: rounding moves its surface.
+_FLAT = 1e-9
+
 
 @attrs.frozen(eq=False)
 class Grid:
@@ -126,15 +129,22 @@ def grid_over(
         beyond: layers of lattice points beyond the box.
 
     Raises:
-        SceneError: the shape has no extent, or there would be too many points.
+        SceneError: the shape has no extent, the spacing exceeds it, or there would be too many
+            points.
     """
     lower, upper = shape.bounds()
     lengths = upper - lower
-    if not (np.isfinite(lengths).all() and (lengths > 0.0).all()):
+    if not (np.isfinite(lengths).all() and lengths.min() > _FLAT * lengths.max()):
         raise refusal(
             discretisation,
             f"the shape has no extent: its bounds are {lower.tolist()} and {upper.tolist()} m; "
             "give it sizes that do not vanish beside its coordinates",
+        )
+    if on_boundary and spacing > 2.0 * lengths.max():
+        raise refusal(
+            discretisation,
+            f"spacing = {spacing:.4g} m is larger than the shape, of {lengths.max():.4g} m; take a "
+            "sixth of its thickness or less",
         )
     extra = int(on_boundary) + 2 * beyond
     # In floating point: the product may be too large for an integer.

@@ -41,6 +41,7 @@ _NAMES = (
     "twice",
     "coarse-outputs",
     "few-steps",
+    "small-step",
 )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -851,3 +852,20 @@ def test_most_of_the_surface_counts() -> None:
         ]
         points = Points(positions=np.concatenate(sides))
         assert points.ends_on_surface(Box([1.0, 1.0]), 0.1) is (count == 3)
+
+
+@pytest.mark.parametrize("kind", [partial(Lattice, on_boundary=True), Fitted, ConformingLattice])
+@pytest.mark.parametrize(
+    ("lengths", "spacing", "words"),
+    [
+        ([1.0, 0.5], 1e30, "larger than the shape, of 1 m"),
+        ([1.0, 0.5], 125.0, "larger than the shape, of 1 m"),
+        ([1.0, 5e-324], 0.1, "no extent"),
+        ([1.0, 1e-12], 0.1, "no extent"),
+    ],
+)
+def test_what_no_spacing_fits_is_refused(
+    kind: Callable[[], Discretisation], lengths: list[float], spacing: float, words: str
+) -> None:
+    with pytest.raises(SceneError, match=words):
+        kind().particles(Box(lengths), spacing)
