@@ -23,8 +23,9 @@ import numpy as np
 import scipy
 from table import Table
 
-from solidsph.errors import SceneError
+from solidsph.errors import BuildError, SceneError
 from solidsph.registry import registry
+from solidsph.simulation import Simulation
 from solidsph.studies.case import Case
 from solidsph.studies.cost import SweepSetup, frontier
 from solidsph.studies.frontier import Frontier
@@ -34,7 +35,7 @@ from solidsph.studies.point import Point, format_setting
 from solidsph.studies.processes import Processes
 from solidsph.studies.search import Goal, search
 from solidsph.studies.sweep import SweepStatus
-from solidsph.studies.variant import setting_of
+from solidsph.studies.variant import setting_of, with_settings
 
 # Each with the accuracy that is searched for.
 CASES: Mapping[str, float] = {
@@ -182,12 +183,23 @@ def one_at_a_time(case: Case, default: Point, means: SweepSetup) -> str:
             chosen = setting_of(case, choice)
         except SceneError:  # a case without scenes
             continue
-        points = means.points(case, [{choice: value} for value in values])
-        for value, point in zip(values, points, strict=True):
+        changed = [value for value in values if _can_be(case, choice, value)]
+        points = means.points(case, [{choice: value} for value in changed])
+        for value, point in zip(changed, points, strict=True):
             mark = " (own)" if chosen == value else ""
             rows.append((f"{choice} {format_setting(value)}{mark}", *row(point, default)[1:3]))
     columns = ("one choice changed", "error, %", "time, s")
     return "#" + Table("One choice at a time", columns, tuple(rows)).markdown()
+
+
+def _can_be(case: Case, choice: str, value: Any) -> bool:
+    """Whether scenes of the case can be built with a choice: one at rest has no step."""
+    scene = next(iter(with_settings(case, {choice: value}).scenes().values()))
+    try:
+        Simulation.builder(scene).build()
+    except BuildError:
+        return False
+    return True
 
 
 def by_search(case: Case, made: Frontier, accuracy: float) -> str:

