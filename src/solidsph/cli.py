@@ -17,10 +17,20 @@ import click
 
 from solidsph.errors import BuildError, ConvergenceError, DivergedError, SolidsphError, UnsoundError
 
-VERBS = (
-    *("run", "resume", "explain", "cases", "plugins", "check", "plot"),
-    *("reproduce", "cost", "stability", "cache"),
-)
+VERBS: Mapping[str, str] = {
+    "run": "Run a scene or a case, and record it.",
+    "resume": "Continue the run of a record.",
+    "explain": "Show what a run would simulate and cost.",
+    "cases": "List the cases with their parameters.",
+    "plugins": "List the installed parts and where they come from.",
+    "check": "Check a part, or certify a scheme.",
+    "plot": "Draw the pictures of a record.",
+    "reproduce": "Reproduce figures of the paper.",
+    "cost": "Show the time that accuracy costs for a case.",
+    "stability": "Run the hard cases, or draw a stability map.",
+    "cache": "Show or clear the compiled functions on disk.",
+}
+"""Each verb and what it does, so that a list of them loads none."""
 
 TRACEBACK = "SOLIDSPH_TRACEBACK"
 """Environment variable: if 1, an unexpected error shows its traceback."""
@@ -36,7 +46,7 @@ _OUTCOMES: Mapping[type[SolidsphError], str] = {
 
 
 class _Verbs(click.Group):
-    """Group that imports a verb's module only when that verb, or the list of verbs, is needed."""
+    """Group that imports a verb's module only when that verb is needed."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(VERBS)
@@ -46,6 +56,10 @@ class _Verbs(click.Group):
             return None
         command: click.Command = getattr(import_module(f"solidsph.commands.{cmd_name}"), cmd_name)
         return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(VERBS.items()))
 
 
 @click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})

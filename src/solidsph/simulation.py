@@ -110,3 +110,10 @@ class Simulation(BuiltScene):
             except UnsoundError as unsound:
                 unsound.result = recorded(unsound.result)
                 raise
+
+
+solve = Simulation.run
+"""The run as a function: `solve(simulation)`."""
+
+carry_out = solve
+"""The former name of `solve`."""

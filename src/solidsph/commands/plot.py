@@ -24,7 +24,10 @@ class _Options(Output):
 @click.argument("result", metavar="RECORD", type=click.Path(path_type=Path))
 @options(_Options)
 def plot(result: Path, options: _Options) -> None:
-    """Draw the pictures of a record: the deformed body, coloured by a field, and the energies."""
+    """Draw the pictures of a record.
+
+    They show the deformed body, coloured by a field, and the energies.
+    """
     from solidsph.results.pictures import draw
 
     folder = options.output or result.parent
