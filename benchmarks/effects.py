@@ -50,9 +50,10 @@ def _effect(name: str, **parameters: Any) -> Addition:
     return lambda builder, spacing: builder.effect(name, **parameters)
 
 
-def _material(name: str) -> Addition:
-    """With the values that the part holds for `solidsph check`."""
-    return lambda builder, spacing: builder.material(example_part("materials", name))
+def _material(name: str, **changed: Any) -> Addition:
+    """With the values that the part holds for `solidsph check`, some of them changed."""
+    law = attrs.evolve(example_part("materials", name), **changed)
+    return lambda builder, spacing: builder.material(law)
 
 
 def _pressed(builder: SceneBuilder, spacing: float) -> SceneBuilder:
@@ -79,8 +80,10 @@ SCENES: Mapping[str, Scene] = {
     "mooney-rivlin": Scene(_material("mooney-rivlin"), 1.2),
     "holzapfel-ogden": Scene(_material("holzapfel-ogden"), 1.5),
     "viscoelastic": Scene(_material("viscoelastic"), 1.5),
-    "j2-plasticity": Scene(_material("j2-plasticity"), 1.8),
-    "johnson-cook": Scene(_material("johnson-cook"), 2.5),
+    "j2-plasticity, elastic": Scene(_material("j2-plasticity"), 1.8),
+    "j2-plasticity, flowing": Scene(_material("j2-plasticity", yield_stress=10.0), 1.8),
+    "johnson-cook, elastic": Scene(_material("johnson-cook"), 2.5),
+    "johnson-cook, flowing": Scene(_material("johnson-cook", yield_stress=10.0), 2.5),
     "body-force": Scene(_effect("body-force", acceleration={"z": -9.81}), 1.05),
     "mass-damping": Scene(_effect("mass-damping", rate=1.0), 1.05),
     "dynamic-relaxation": Scene(_effect("dynamic-relaxation"), 1.1),

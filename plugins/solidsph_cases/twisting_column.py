@@ -24,7 +24,8 @@ from solidsph_cases.drawing.sheet import Bar, Panel, Sheet, line, mark, zero
 SIDE, HEIGHT = 1.0, 6.0  # [m]
 
 # At 400 rad/s corners are faster than waves, and so twisted a column writhes, so that its axis need
-# not stay: it sways by a tenth of its side, from rounding. Viscosity takes 85 % of the energy with nu 0.45; the ledger has to add up all the same.
+# not stay: it sways by a tenth of its side, from rounding. Viscosity takes 85 % of the energy with
+# nu 0.45; the ledger has to add up all the same.
 _FAST: Mapping[str, Any] = {"time_step_factor": 0.1, "axis_tolerance": 0.2}
 
 _VISCOUS: Mapping[str, Any] = {"artificial-viscosity.linear": 0.5, "energy_tolerance": 1.0}

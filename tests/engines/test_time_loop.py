@@ -14,6 +14,7 @@ from solidsph.engines.compiled.fixed import partition
 from solidsph.engines.compiled.time_loop.loop import CompiledLoop
 from solidsph.interfaces.compilable_terms import PointwiseLoad
 from solidsph.interfaces.effect import Effect
+from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.terms import Load, Observation
 from solidsph.interfaces.time_loop import StepError
 from solidsph.maths.arrays import Array, Indices, Vector
@@ -21,6 +22,7 @@ from solidsph.model.particles import State
 from solidsph.registry import registry
 from solidsph.run.step_by_step import StepByStep, steps_of
 from solidsph.scene.scene_builder import SceneBuilder
+from solidsph.testing.examples import example_part
 from tests.helpers.scenes import box, with_effect
 
 STEPS = 25
@@ -106,6 +108,9 @@ def test_hourglass_control_of_a_bar() -> None:
     assert_agree(box(1, 24).boundary("clamp", where="left").effect("hourglass-control"))
 
 
+# The others are under validation: each takes some seconds to compile.
+QUICK = {(2, "j2-plasticity"), (3, "johnson-cook")}
+
 # Of no declared kind: who is near whom is asked anew at every step.
 BY_STEP = {
     *("contact", "rigid-wall", "heat", "kelvin-voigt", "dynamic-relaxation", "bond-failure"),
@@ -124,6 +129,40 @@ BY_STEP = {
 )
 def test_every_effect(effect: str) -> None:
     assert_agree(with_effect(effect, 2, 7))
+
+
+HISTORIES = [
+    name
+    for name in registry.names("materials")
+    if issubclass(registry.load("materials", name), HistoryMaterial)
+    and name != "viscoelastic"  # the number of its internal variables is that of its elements
+]
+
+
+@pytest.mark.parametrize(
+    ("material", "dimension"),
+    [
+        pytest.param(name, d, marks=() if (d, name) in QUICK else pytest.mark.validation)
+        for name in HISTORIES
+        for d in (1, 2, 3)
+    ],
+)
+def test_every_material_that_remembers(material: str, dimension: int) -> None:
+    """With what it remembers; metals flow, at ten times the strain of first yield."""
+    law = example_part("materials", material)
+    builder = box(dimension, 7).material(law).boundary("clamp", where="left")
+    simulation, loop, _ = loops(builder)
+    state = simulation.start()
+    before, after = (one.memory["history of block"] for one in (state, loop.advance(state, STEPS)))
+    assert np.abs(after - before).max() > 1e-3
+    assert_agree(builder)
+
+
+def test_ghosts_of_a_material_that_remembers_go_step_by_step() -> None:
+    ghosts = {"type": "lattice", "on_boundary": True, "ghosts": 3}
+    law = example_part("materials", "j2-plasticity")
+    builder = box(1, 12, discretisation=ghosts).material(law).boundary("ghost-extension")
+    assert isinstance(builder.engine("compiled").build().time_loop(), StepByStep)
 
 
 @pytest.mark.parametrize("effect", sorted(BY_STEP))

@@ -16,6 +16,10 @@ SCENES = {
     "arrays": (box(1, 12).engine("matrix"), False),
     "a law of F alone": (box(1, 12).engine("compiled"), True),
     "a law that remembers": (
+        box(1, 12).engine("compiled").material("j2-plasticity", yield_stress=1e4, **SOFT),
+        True,
+    ),
+    "a law that remembers as much as it is asked to, which does not compile": (
         box(1, 12)
         .engine("compiled")
         .material("viscoelastic", prony=[{"share": 0.3, "time": 0.01}], **SOFT),

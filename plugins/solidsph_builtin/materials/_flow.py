@@ -36,6 +36,12 @@ ROOT = sqrt(2.0 / 3.0)
 # first. Two steps suffice for metals, whose x is some thousandths, five for a flow stress near mu.
 _CUBIC_STEPS = 5
 
+# After so small a change of c, which is about 1, what is left is its square.
+_SQUARE_IS_ROUNDING = 1e-8
+
+# Relative changes below this are rounding; iterations end there.
+ROUNDING = 1e-15
+
 _NONE = 1e-30  # keeps the direction of a zero deviator finite
 
 
@@ -73,7 +79,10 @@ def spherical_part(x: Scalar, det_n: Scalar) -> Scalar:
     """c of det(c I + x n) = c^3 - c x^2 / 2 + x^3 det n = 1."""
     c = 1.0 + 0.5 * x**2  # never below the root
     for _ in range(_CUBIC_STEPS):
-        c = c - (c**3 - 0.5 * c * x**2 + x**3 * det_n - 1.0) / (3.0 * c**2 - 0.5 * x**2)
+        change = (c**3 - 0.5 * c * x**2 + x**3 * det_n - 1.0) / (3.0 * c**2 - 0.5 * x**2)
+        c = c - change
+        if not np.any(np.abs(change) > _SQUARE_IS_ROUNDING):
+            break
     return c
 
 

@@ -15,6 +15,7 @@ from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.materials import _plastic
 from solidsph_builtin.materials._flow import (
     ROOT,
+    ROUNDING,
     chosen,
     deviator_length,
     direction_determinant,
@@ -120,13 +121,18 @@ class J2Plasticity(HistoryMaterial):
         trial = deviator_length(b)
         det_n = direction_determinant(b, trial)
         least = ROOT * _flow_stress(e_before, params) / mu
+        if not np.any(trial > least):
+            return history
         x = trial
         for _ in range(_STEPS):
             share = strain_of_flow(x, trial, det_n)
             e = e_before + share * (trial - x)
             miss = mu * x - ROOT * _flow_stress(e, params)
+            before = x
             x = x - miss / (mu + ROOT * share * _slope(e, params))
             x = np.minimum(np.maximum(x, least), trial)
+            if not np.any(np.abs(x - before) > ROUNDING * trial):
+                break
         flows = 1.0 * (trial > least)
         e = e_before + flows * strain_of_flow(x, trial, det_n) * (trial - x)
         after = components(narrowed(flowed(wide, G, b, x, trial, det_n), F))

@@ -15,6 +15,7 @@ from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.materials import _plastic
 from solidsph_builtin.materials._flow import (
     ROOT,
+    ROUNDING,
     chosen,
     deviator_length,
     direction_determinant,
@@ -154,6 +155,8 @@ class JohnsonCook(HistoryMaterial):
         trial = deviator_length(b)
         det_n = direction_determinant(b, trial)
         begin = ROOT * _flow_stress(e, 0.0, T, step, params) / mu
+        if not np.any(trial > begin):
+            return history
         fall = np.maximum(trial - begin, _SMALLEST)
         for _ in range(_STEPS):
             share = strain_of_flow(trial - fall, trial, det_n)
@@ -161,8 +164,11 @@ class JohnsonCook(HistoryMaterial):
             after = T + params[10] * _plastic_work(e, added, T, step, params)
             miss = mu * (trial - fall) - ROOT * _flow_stress(e, added, after, step, params)
             slope = mu + ROOT * share * _slope(e, added, after, step, params)
+            before = fall
             longer = fall * np.exp(miss / (slope * fall))
             fall = np.maximum(np.minimum(longer, trial), _SMALLEST)
+            if not np.any(np.abs(fall - before) > ROUNDING * fall):
+                break
         flows, x = 1.0 * (trial > begin), trial - fall
         added = flows * strain_of_flow(x, trial, det_n) * fall
         work = _plastic_work(e, added, T, step, params)

@@ -11,12 +11,15 @@ import numpy as np
 from solidsph.engines.array_law import ArrayLaw
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import InternalForces, StressFields
+from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.forces_modifier import ForcesModifier
 from solidsph.interfaces.history import History, HistoryMaterial
+from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.law import Law, memory_name
 from solidsph.interfaces.memory import Memory
-from solidsph.interfaces.plan import Compilation, Operations
+from solidsph.interfaces.plan import Compilation, Operations, Plan
 from solidsph.interfaces.terms import FieldTerm, Observation, StressTerm, Term
+from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import components_first, particles_first
 
@@ -78,6 +81,22 @@ class HistoryForces(InternalForces):
     @property
     def precision(self) -> float:
         return self.sums.precision
+
+    def plan(self, equation: EquationOfMotion, integrator: Integrator) -> Plan:
+        if self._engine_has_laws:
+            return self.sums.plan(equation, integrator)
+        return super().plan(equation, integrator)
+
+    def time_loop(self, equation: EquationOfMotion, integrator: Integrator) -> TimeLoop | None:
+        return self.sums.time_loop(equation, integrator) if self._engine_has_laws else None
+
+    @property
+    def _engine_has_laws(self) -> bool:
+        """Whether the engine has its own form of all laws with internal variables."""
+        return not any(
+            isinstance(law, ArrayLaw) and isinstance(law.body.material, HistoryMaterial)
+            for law in self.laws
+        )
 
     def forces(self, time: float, displacements: Array) -> Array:
         return self.advance(time, 0.0, displacements, {})[0]

@@ -150,7 +150,10 @@ class InternalForces(ABC):
         return Plan(False, self.operations, operations, self.compilations | sweeps)
 
     def time_loop(self, equation: EquationOfMotion, integrator: Integrator) -> TimeLoop | None:
-        """The engine's own time loop under these forces; None, the default, to step by step."""
+        """The engine's own time loop under these forces; None, the default, to step by step.
+
+        It advances the internal variables of materials that have some.
+        """
         return None
 
 

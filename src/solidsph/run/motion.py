@@ -82,7 +82,12 @@ def run_motion(
                 try:
                     state = loop.advance(state, follower.next_check(state, output))
                 except StepError as failed:
-                    raise simulation.diverged(failed.state, failed.cause) from failed
+                    repeated = follower.repeated(simulation, state, failed.cause)
+                    if repeated is None:
+                        raise simulation.diverged(failed.state, failed.cause) from failed
+                    simulation, state = repeated
+                    loop = time_loop(simulation)
+                    continue
                 if state.step < output:
                     observation = simulation.dynamics.observe(state)
                     continue

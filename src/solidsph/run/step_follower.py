@@ -36,6 +36,11 @@ _CHECKED = 250
 # A step that is a thousandth of the first has not helped.
 _MOST_CUTS = 10
 
+# How often a stretch that fails is repeated, each time with half the step. A front that sharpens
+# may stiffen a body between two looks: a sheet of rubber pulled by half its modulus lost three
+# quarters of its critical step within 30 steps.
+_MOST_REPEATS = 3
+
 _KEPT, _MODE = "step follower", "step follower mode"
 
 
@@ -58,6 +63,7 @@ class StepFollower:
             self._allowed = max(_LIMIT, simulation.step_size * 2**simulation.halvings / safe.step)
         self._time = simulation.initial.time  # of the last look [s]
         self._strain = 0.0  # the largest at the last look [-]
+        self._failed_from, self._failures = -np.inf, 0  # where the last stretch that failed began
 
     @implementation(tryfirst=True)  # an unusable checkpoint is reported before the record changes
     def solidsph_resume(self, observation: Observation, kept: Mapping[str, Array]) -> None:
@@ -101,6 +107,21 @@ class StepFollower:
             f"critical step of the deformed bodies is {safe.step:.6g} s"
         )
         return simulation, restarted(simulation, state, before.halvings)
+
+    def repeated(self, simulation: S, state: State, cause: str) -> tuple[S, State] | None:
+        """The scene and the state to go on with, in half the step, where steps from `state` on
+        failed; None if that has not helped, or if the scene asks for a longer step than is safe."""
+        self._failures = self._failures + 1 if state.time == self._failed_from else 1
+        self._failed_from = state.time
+        tried = self._failures > _MOST_REPEATS or simulation.halvings >= _MOST_CUTS
+        if self._mode is None or self._allowed > _LIMIT or tried:
+            return None
+        shorter = simulation.halved()
+        self.cuts.append(
+            f"the step was cut to {shorter.step_size:.6g} s at t = {state.time:.6g} s: with a "
+            f"longer one {cause}"
+        )
+        return shorter, restarted(shorter, state, simulation.halvings)
 
     def _is_due(self, simulation: BuiltScene, state: State, observation: Observation) -> bool:
         strain = _largest_strain(observation)

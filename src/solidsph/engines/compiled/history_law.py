@@ -41,23 +41,8 @@ class CompiledLaw(Law):
         Raises:
             NotCompilableError: the material has no history, or does not compile.
         """
-        material, formulation = body.material, body.formulation
-        if not isinstance(material, HistoryMaterial):
-            raise NotCompilableError(f"{type(material).__name__} has no history")
         d = body.smoothing.dimension
-        count = len(material.initial_history(d))
-        F, h, params = tensor_type(d), numbers_type(count), numbers_type(len(material.params))
-        compiled_function(material.advance, F, h, types.float64, params)
-        compiled_function(material.stress, F, h, params)
-        loop = _loop(
-            d,
-            count,
-            formulation.deformation_gradient,
-            material.advance,
-            material.stress,
-            formulation.flux,
-        )
-        return cls(body, loop)
+        return cls(body, _loop(d, history_count(body), history_flux(body)))
 
     def flux(self, H: Array, history: Array, step: float) -> tuple[Array, Array]:
         n, d, _ = H.shape
@@ -66,24 +51,57 @@ class CompiledLaw(Law):
         return stress, after
 
 
+def history_count(body: Body) -> int:
+    """Number of internal variables of a particle of the body."""
+    material = body.material
+    if not isinstance(material, HistoryMaterial):
+        return 0
+    return len(material.initial_history(body.smoothing.dimension))
+
+
+def history_flux(body: Body) -> Any:
+    """Compiled (H, h, step, params) -> flux(F(H), P(F, h')) and h' at one point.
+
+    Raises:
+        NotCompilableError: the material has no history, or does not compile.
+    """
+    material, formulation = body.material, body.formulation
+    if not isinstance(material, HistoryMaterial):
+        raise NotCompilableError(f"{type(material).__name__} has no history")
+    F, h = tensor_type(body.smoothing.dimension), numbers_type(history_count(body))
+    params = numbers_type(len(material.params))
+    compiled_function(material.advance, F, h, types.float64, params)
+    compiled_function(material.stress, F, h, params)
+    return _flux(
+        formulation.deformation_gradient, material.advance, material.stress, formulation.flux
+    )
+
+
 @cache
-def _loop(
-    dimension: int, count: int, deformation_gradient: Any, advance: Any, stress: Any, flux: Any
-) -> Any:
+def _flux(deformation_gradient: Any, advance: Any, stress: Any, flux: Any) -> Any:
     functions = (deformation_gradient, advance, stress, flux)
     F_of, advanced, P_of, T_of = (registered(function) for function in functions)
-    matrix = MATRIX[dimension]
 
     @njit(error_model="numpy")
+    def law(H, h, step, params):
+        F = F_of(H)
+        if step > 0.0:
+            h = advanced(F, h, step, params)
+        return numbers(T_of(F, P_of(F, h, params))), h
+
+    return law
+
+
+@cache
+def _loop(dimension: int, count: int, law: Any) -> Any:
+    matrix = MATRIX[dimension]
+
+    @njit
     def loop(H, history, step, params, out, after):
         for p in range(len(H)):
-            F = F_of(matrix(H, p))
-            h = to_fixed_tuple(history[p], count)
-            if step > 0.0:
-                h = advanced(F, h, step, params)
+            T, h = law(matrix(H, p), to_fixed_tuple(history[p], count), step, params)
             for k in range(count):
                 after[p, k] = h[k]
-            T = numbers(T_of(F, P_of(F, h, params)))
             for i in range(dimension):
                 for k in range(dimension):
                     out[i, k, p] = T[i][k]

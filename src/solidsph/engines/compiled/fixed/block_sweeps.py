@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from solidsph.engines.compiled.constants import STRIDE
 from solidsph.engines.compiled.fixed.blocks import block_loops
@@ -56,6 +57,34 @@ def block_sweeps(dimension: int, dtype: str, law: Any) -> BlockSweeps:
                         out[i, k, start + slot] = T[i][k]
 
     return BlockSweeps(forces, stress)
+
+
+@cache
+def history_sweep(dimension: int, dtype: str, law: Any, count: int) -> Any:
+    """Loop (rows, first, last, u, params, factors, f, shift, history (n, k), step): f += from u,
+    and the history at the end of the step, for a law (H, h, step, params) -> (T, h)."""
+    d, D = dimension, STRIDE[dimension]
+    gather, scatter, tensor, margin, plane = block_loops(dimension, dtype)
+
+    @njit
+    def forces(rows, first, last, u, params, factors, f, shift, history, step):
+        scratch = np.zeros(d * plane, u.dtype)
+        for block in range(first, last):
+            gather(rows, block, u, scratch)
+            start, size = rows.blocks[block, 0], rows.blocks[block, 1]
+            for slot in range(size):
+                p = start + slot
+                h = to_fixed_tuple(history[p], count)
+                T, h = law(tensor(scratch, slot), h, step, params)
+                for k in range(count):
+                    history[p, k] = h[k]
+                at = (margin + slot) * D
+                for i in range(d):
+                    for k in range(d):
+                        scratch[k * plane + at + i] = T[i][k] * factors[p]
+            scatter(rows, block, scratch, f, shift)
+
+    return forces
 
 
 @cache

@@ -15,6 +15,7 @@ from solidsph.engines.compiled.fixed.partition import (
     Partition,
     Passes,
     flat_field,
+    history_pass,
     partitioned,
     passes,
     spread_pass,
@@ -22,6 +23,7 @@ from solidsph.engines.compiled.fixed.partition import (
 )
 from solidsph.engines.compiled.fixed.rows import Rows, compressed
 from solidsph.engines.compiled.fixed.subset_rows import part_of_rows
+from solidsph.engines.compiled.history_law import history_count, history_flux
 from solidsph.engines.compiled.pointwise import no_law
 from solidsph.interfaces.body import Body, part_of
 from solidsph.interfaces.plan import Operations, SumMethod, vectors
@@ -117,6 +119,22 @@ class ReferenceBody:
     def fused(self) -> bool:
         """True if both passes are one call where no term changes the stress between them."""
         return self.force is self.gradient and not self._ghosts_act
+
+    @property
+    def remembers(self) -> bool:
+        """True if its material has internal variables."""
+        return history_count(self.body) > 0
+
+    @property
+    def history_pass(self) -> Any:
+        """The compiled pass of `forces` that advances the internal variables.
+
+        Raises:
+            NotCompilableError: the law does not compile.
+        """
+        d, dtype = self.body.smoothing.dimension, self.u.dtype.name
+        law, count = history_flux(self.body), history_count(self.body)
+        return history_pass(d, dtype, law, count, self.gradient_partition.threaded)
 
     @property
     def _ghosts_act(self) -> bool:

@@ -17,7 +17,11 @@ from numba import prange
 from numpy.typing import NDArray
 
 from solidsph.engines.compiled.constants import STRIDE, WORTH_A_THREAD
-from solidsph.engines.compiled.fixed.block_sweeps import block_sweeps, spread_sweep
+from solidsph.engines.compiled.fixed.block_sweeps import (
+    block_sweeps,
+    history_sweep,
+    spread_sweep,
+)
 from solidsph.engines.compiled.fixed.blocks import group
 from solidsph.engines.compiled.fixed.rows import Rows
 from solidsph.engines.compiled.jit import njit
@@ -140,6 +144,25 @@ def passes(dimension: int, dtype: str, law: Any, threaded: bool) -> Passes:
             sweep_stress(rows, table[t, 0], table[t, 1], u, params, out)
 
     return Passes(forces, stress)
+
+
+@cache
+def history_pass(dimension: int, dtype: str, law: Any, count: int, threaded: bool) -> Any:
+    """Compiled pass (table, rows, displacements, u, params, factors, buffers, forces, history
+    (n, `count`), step) for a compiled law (H, h, step, params) -> (T, h)."""
+    place, cleared, total = _fields(dimension, dtype, threaded)
+    sweep = history_sweep(dimension, dtype, law, count)
+
+    @njit(parallel=threaded)
+    def forces(table, rows, displacements, u, params, factors, buffers, out, history, step):
+        place(len(table), displacements, u)
+        for t in prange(len(table)):
+            cleared(table[t], buffers)
+            first, last, shift = table[t, 0], table[t, 1], table[t, 4]
+            sweep(rows, first, last, u, params, factors, buffers, shift, history, step)
+        total(table, buffers, out)
+
+    return forces
 
 
 @cache

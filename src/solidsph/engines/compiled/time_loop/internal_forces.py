@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solidsph.engines.compiled.fixed.rows import Rows
+from solidsph.engines.compiled.history_law import history_count
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.engines.compiled.time_loop.call_each import call_each
@@ -36,6 +37,8 @@ class BodyData(NamedTuple):
     force_rows: Rows
     stress: Array  # (d, d, n)
     ghosts: Indices  # (g,)
+    history: Array  # (n, k) internal variables; k is 0 for a material without
+    step: float  # by which they advance [s]
 
 
 class Internal(NamedTuple):
@@ -45,15 +48,18 @@ class Internal(NamedTuple):
     data: Any
 
 
-def internal_forces(parts: Sequence[ReferenceBody], conditions: Sequence[StressTerm]) -> Internal:
-    """The internal forces of prepared bodies under these conditions.
+def internal_forces(
+    parts: Sequence[ReferenceBody], conditions: Sequence[StressTerm], step: float
+) -> Internal:
+    """The internal forces of prepared bodies under these conditions, in steps of `step` [s].
 
     Raises:
         NotCompilableError: a condition is not of a compilable kind, or there are several bodies.
     """
     if all(part.fused for part in parts) and not conditions:
-        functions = tuple(_fused(part.passes.forces) for part in parts)
-        return Internal(call_each(functions), tuple(_data(part, staged=False) for part in parts))
+        functions = tuple(map(_at_once, parts))
+        data = tuple(_data(part, step, staged=False) for part in parts)
+        return Internal(call_each(functions), data)
     if len(parts) > 1:
         raise NotCompilableError("conditions on the stress of several bodies")
     (part,) = parts
@@ -66,8 +72,14 @@ def internal_forces(parts: Sequence[ReferenceBody], conditions: Sequence[StressT
     forces = _staged(part.passes.stress, imposed, part.spread_pass, acts)
     extensions = [c for c in conditions if isinstance(c, LinearExtension)]
     return Internal(
-        forces, (_data(part, staged=True), tuple(following(c, c.stress) for c in extensions))
+        forces, (_data(part, step, staged=True), tuple(following(c, c.stress) for c in extensions))
     )
+
+
+def _at_once(part: ReferenceBody) -> Any:
+    if not part.remembers:
+        return _fused(part.passes.forces)
+    return _with_history(part.history_pass)
 
 
 @cache
@@ -84,6 +96,27 @@ def _fused(forces: Any) -> Any:
             body.factors,
             body.buffers,
             total[a:b],
+        )
+
+    return fused
+
+
+@cache
+def _with_history(forces: Any) -> Any:
+    @njit
+    def fused(body, u, total):
+        a, b = body.extent
+        forces(
+            body.table,
+            body.rows,
+            u[a:b],
+            body.u,
+            body.params,
+            body.factors,
+            body.buffers,
+            total[a:b],
+            body.history,
+            body.step,
         )
 
     return fused
@@ -110,7 +143,7 @@ def _staged(stress_pass: Any, imposed: Any, spread: Any, ghosts_act: bool) -> An
     return forces
 
 
-def _data(part: ReferenceBody, *, staged: bool) -> BodyData:
+def _data(part: ReferenceBody, step: float, *, staged: bool) -> BodyData:
     extent, ghosts = part.body.extent, part.body.particles.ghosts
     n, d = part.body.particles.positions.shape
     return BodyData(
@@ -125,6 +158,8 @@ def _data(part: ReferenceBody, *, staged: bool) -> BodyData:
         force_rows=part.force,
         stress=np.zeros((d, d, n if staged else 0)),
         ghosts=np.flatnonzero(ghosts),
+        history=np.zeros((n, history_count(part.body))),
+        step=step,
     )
 
 

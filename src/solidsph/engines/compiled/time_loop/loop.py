@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 from numba import prange, types
 
+from solidsph.engines.array_law import ArrayLaw
 from solidsph.engines.compiled.constants import PER_PARTICLE
 from solidsph.engines.compiled.fixed.partition import thread_count
 from solidsph.engines.compiled.jit import njit
@@ -33,6 +34,7 @@ from solidsph.interfaces.compilable_terms import LinearExtension, ScheduledConst
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
+from solidsph.interfaces.law import Law, memory_name
 from solidsph.interfaces.terms import GhostConstraint, StressTerm
 from solidsph.interfaces.time_loop import NOT_FINITE, StepError, TimeLoop
 from solidsph.maths.arrays import Array
@@ -68,8 +70,12 @@ def are_compilable(
     """True if everything in a step is of a compilable kind, though a formula may still fail."""
     kinds = tuple(kind.kind for kind in LOAD_KINDS)
     labels = [c.label for c in (*equation.loads, *equation.constraints)]
+    remember = any(body.remembers for body in bodies)
+    ghosts = any(body.body.particles.ghosts.any() for body in bodies)
     fused = not conditions and all(body.fused for body in bodies)
-    alone = len(bodies) == 1 and all(isinstance(term, LinearExtension) for term in conditions)
+    fused &= not (remember and ghosts)  # ghosts have no rows, and would forget
+    extended = all(isinstance(term, LinearExtension) for term in conditions)
+    alone = len(bodies) == 1 and extended and not remember
     return (
         isinstance(integrator, PointwiseIntegrator)
         and (fused or alone)
@@ -103,7 +109,7 @@ def compiled_loop(
     threads = thread_count(PER_PARTICLE * particles.count)  # for loops over particles
     for body in bodies:
         body.gradient_partition.check()
-    internal = internal_forces(bodies, conditions)
+    internal = internal_forces(bodies, conditions, equation.step_size)
     loads = [compiled_load(load, particles.positions, threads > 1) for load in equation.loads]
     calls = [constraint_calls(motion, d) for motion in equation.constraints]
     by_call = [tuple(call[k] for call in calls) for k in range(len(ConstraintCalls._fields))]
@@ -116,7 +122,16 @@ def compiled_loop(
         call_each(tuple(load.apply for load in loads)),
         ConstraintCalls(*(call_each(functions) for functions in by_call)),
     )
-    return CompiledLoop(sums, equation, internal, loads, steps, threads)
+    histories = (
+        [
+            (ArrayLaw(body.body), data.history)
+            for body, data in zip(bodies, internal.data, strict=True)
+            if body.remembers
+        ]
+        if not conditions
+        else []
+    )
+    return CompiledLoop(sums, equation, internal, histories, loads, steps, threads)
 
 
 @final
@@ -127,6 +142,7 @@ class CompiledLoop(TimeLoop):
     sums: InternalForces
     equation: EquationOfMotion
     internal: Internal
+    histories: Sequence[tuple[Law, Array]]  # laws with internal variables, and the loop's of them
     loads: Sequence[CompiledLoad]
     steps: Any  # compiled
     threads: int
@@ -167,6 +183,8 @@ class CompiledLoop(TimeLoop):
         inverse_masses = np.zeros_like(equation.masses)
         np.divide(1.0, equation.masses, out=inverse_masses, where=equation.masses > 0.0)
         accounts = _Accounts.of(self.sums, equation, state)
+        for law, history in self.histories:
+            history[...] = law.history_of(state.memory)
         done = 0
         while state.step + done < stop:
             count = min(stop - state.step - done, self.most_steps)
@@ -198,7 +216,11 @@ class CompiledLoop(TimeLoop):
             accelerations=moving.a,
             applied=accounts.applied(time, moving.u),
             work=accounts.work,
-            memory={**state.memory, MEAN_VELOCITY: moving.h},
+            memory={
+                **state.memory,
+                **{memory_name(law.body): history.copy() for law, history in self.histories},
+                MEAN_VELOCITY: moving.h,
+            },
         )
         if not np.isfinite(moving.a.sum()):
             raise StepError(end, NOT_FINITE)
