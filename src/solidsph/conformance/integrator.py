@@ -66,6 +66,7 @@ class _Damper(Load):
     """f = -c v on the first particle."""
 
     label: str = "damper"
+    rate: float = _RATE  # c over the mass [1/s]
 
     def report(self, observation: Observation) -> Mapping[str, float]:
         return {}
@@ -75,7 +76,7 @@ class _Damper(Load):
         return np.array([0])
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
-        return -_MASS * _RATE * velocities[:1]
+        return -_MASS * self.rate * velocities[:1]
 
 
 @final
@@ -183,6 +184,17 @@ def unstable_above_limit(integrator: Integrator) -> Verdict:
     return more_than(_largest(integrator, 1.01 * integrator.stability_limit), 1e5)
 
 
+@KIT.check
+def stable_with_damping(integrator: Integrator) -> Verdict:
+    """At 0.99 of the step that it calls stable an oscillation stays bounded, however damped."""
+    worst = 0.0
+    for share in (0.3, 1.0, 3.0, 10.0, 30.0):
+        rate = share * _FREQUENCY
+        step = 0.99 * integrator.stable_step(_FREQUENCY, rate)
+        worst = max(worst, _largest(integrator, step * _FREQUENCY, _Damper(rate=rate)))
+    return at_most(worst, 100.0)
+
+
 # They are overwritten, so nothing but the sum X + u may round.
 @KIT.errors(1e-15)
 def imposed_motion(integrator: Integrator) -> Iterator[float]:
@@ -246,10 +258,10 @@ def _order(integrator: Integrator, dynamics: Dynamics, rate: float) -> Verdict:
     return Verdict(passed, f"{fitted:.3f} (declared {integrator.order})")
 
 
-def _largest(integrator: Integrator, product: float) -> float:
+def _largest(integrator: Integrator, product: float, *terms: _Damper) -> float:
     """Largest |u| over 2000 steps with omega dt = `product`, up to a million."""
     largest = 0.0
-    for state in _run(integrator, _dynamics(), product / _FREQUENCY, 2000):
+    for state in _run(integrator, _dynamics(*terms), product / _FREQUENCY, 2000):
         largest = max(largest, float(abs(state.positions[0, 0])))
         if not largest < 1e6:
             break

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from math import sqrt
 from typing import ClassVar
 
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
@@ -22,6 +23,17 @@ class Integrator(Part):
 
     stability_limit: ClassVar[float]
     """Largest stable product of the time step and the highest angular frequency [-]."""
+
+    def stable_step(self, frequency: float, damping: float) -> float:
+        """Largest stable step [s] of vibrations up to an angular `frequency` [rad/s], damped at a
+        rate of up to `damping` [1/s]; infinite if both are zero.
+
+        Forces that depend on velocities get that which the last acceleration predicts. With a limit
+        of 2 that is stable where (w dt)^2 / 4 + c dt is at most 1, for the frequency w and the rate
+        c of -c v: at half the step of a damper without that delay.
+        """
+        total = damping + sqrt(damping**2 + frequency**2)
+        return self.stability_limit / total if total > 0.0 else float("inf")
 
     @abstractmethod
     def start(self, state: State, dynamics: EquationOfMotion, step_size: float) -> State:

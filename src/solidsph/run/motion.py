@@ -60,6 +60,7 @@ def run_motion(
         )
 
     follower = StepFollower(simulation)
+    failure: tuple[BuiltScene, StepError] | None = None  # the first of a stretch that is repeated
     try:
         with session(simulation, [follower, *listeners]):
             loop = time_loop(simulation)
@@ -82,12 +83,15 @@ def run_motion(
                 try:
                     state = loop.advance(state, follower.next_check(state, output))
                 except StepError as failed:
+                    failure = failure or (simulation, failed)
                     repeated = follower.repeated(simulation, state, failed.cause)
                     if repeated is None:
-                        raise simulation.diverged(failed.state, failed.cause) from failed
+                        failing, failed = failure
+                        raise failing.diverged(failed.state, failed.cause) from failed
                     simulation, state = repeated
                     loop = time_loop(simulation)
                     continue
+                failure = None
                 if state.step < output:
                     observation = simulation.dynamics.observe(state)
                     continue

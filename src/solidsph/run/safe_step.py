@@ -82,5 +82,4 @@ def stable_step_of(square: float, integrator: Integrator, loads: Iterable[Load])
     """
     loads = list(loads)
     square += sum(load.stiffness_rate**2 for load in loads if not load.acts_always)
-    total = sqrt(square) + sum(load.damping_rate for load in loads)
-    return integrator.stability_limit / total if total > 0.0 else float("inf")
+    return integrator.stable_step(sqrt(square), sum(load.damping_rate for load in loads))

@@ -172,7 +172,6 @@ def certificate(
     (fastest, *_) = waves.extremes(
         grid, -frequencies, lambda k: -waves.wave(k).frequency, below=-0.99 * frequencies.max()
     )
-    limit = scheme.integrator.stability_limit
     F = deformation(stretches)
     return Certificate(
         scheme=scheme,
@@ -182,7 +181,7 @@ def certificate(
         zero_modes=tuple(zero),
         growing=tuple(growing),
         fastest=fastest,
-        critical_step=limit / (fastest.frequency + rate * unit),
+        critical_step=scheme.integrator.stable_step(fastest.frequency, rate * unit),
         rule_step=simulation_step / unit,
         wavelengths=np.array(WAVELENGTHS),
         speeds=waves.speeds(F),
@@ -348,14 +347,13 @@ def _free_body(scheme: Scheme, dimension: int, rate: float) -> FreeBody:
     highest = modes.highest_frequency
     still = int(np.sum(np.abs(exponents) < _STILL * highest))
     rigid = _free_rigid_motions(simulation, (_STILL * highest) ** 2)
-    limit = scheme.integrator.stability_limit
     return FreeBody(
         particles=simulation.particles.count,
         rigid_modes=rigid,
         zero_modes=still - rigid,
         growth_rate=modes.growth_rate * scheme.transit,
         highest_frequency=highest * scheme.transit,
-        critical_step=limit / (highest + rate) / scheme.transit,
+        critical_step=scheme.integrator.stable_step(highest, rate) / scheme.transit,
     )
 
 

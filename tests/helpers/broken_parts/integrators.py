@@ -11,6 +11,7 @@ from solidsph import (
     State,
 )
 from solidsph.run.dynamics import Dynamics
+from solidsph_builtin.integrators.velocity_verlet import VelocityVerlet
 
 
 @attrs.frozen
@@ -98,9 +99,17 @@ class DampedByOldVelocity(GoodIntegrator):
         )
 
 
+class StableByTheSum(VelocityVerlet):
+    """As if velocities came without delay: twice as much as strong damping bears."""
+
+    def stable_step(self, frequency: float, damping: float) -> float:
+        return self.stability_limit / (frequency + damping)
+
+
 INTEGRATORS = [
     (FirstOrderClaimingSecond, {"order", "order with damping"}),
     (LimitTooHigh, {"stable below limit"}),
+    (StableByTheSum, {"stable with damping"}),
     (LimitTooModest, {"unstable above limit"}),
     (NoMotionImposed, {"imposed motion"}),
     (NoWork, {"work of loads"}),
