@@ -18,7 +18,7 @@ from solidsph.interfaces.terms import (
     GhostConstraint,
     Observation,
 )
-from solidsph.maths.arrays import Array, Mask
+from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.particles import Particles, State, locked
 
 
@@ -29,6 +29,9 @@ class Dynamics(EquationOfMotion):
 
     internal: InternalForces
     held: Sequence[Mask] = attrs.field(init=False)  # (n, d) components that each motion determines
+
+    every: Indices = attrs.field(init=False, repr=False)
+    inverse_masses: Array = attrs.field(init=False, repr=False)  # (n, 1) [1/kg]; 0 for ghosts
 
     # Read-only views for observers.
     shown: Particles = attrs.field(init=False, repr=False)
@@ -41,6 +44,16 @@ class Dynamics(EquationOfMotion):
     @shown_masses.default
     def _masses_to_look_at(self) -> Array:
         return locked(self.masses)
+
+    @every.default
+    def _every_particle(self) -> Indices:
+        return np.arange(self.particles.count)
+
+    @inverse_masses.default
+    def _inverse_masses(self) -> Array:
+        inverse = np.zeros_like(self.masses)  # ghosts have no mass, and no equation of motion
+        np.divide(1.0, self.masses, out=inverse, where=self.masses > 0.0)
+        return inverse[:, None]
 
     @held.default
     def _held_components(self) -> Sequence[Mask]:
@@ -93,16 +106,17 @@ class Dynamics(EquationOfMotion):
         for load in self.loads:
             force, changed = load.advance(time, step, positions, velocities, memory)
             advanced |= changed
-            applied[load.label][load.particles] += force
-            total[load.particles] += force
+            own = load.particles
+            # A slice takes a tenth of the time of as many indices.
+            places = slice(None) if np.array_equal(own, self.every) else own
+            applied[load.label][places] += force
+            total[places] += force
         for motion in self.constraints:
             if isinstance(motion, GhostConstraint):
                 before = total.copy()
                 motion.return_forces(total)
                 applied[motion.label] += total - before
-        real = ~self.particles.ghosts
-        accelerations = np.zeros_like(positions)
-        accelerations[real] = total[real] / self.masses[real, None]
+        accelerations = total * self.inverse_masses
         for motion in self.constraints:
             motion.impose(time, 2, accelerations, self.step_size)
         if self.constraints:
