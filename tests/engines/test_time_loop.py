@@ -109,7 +109,7 @@ def test_hourglass_control_of_a_bar() -> None:
 
 
 # The others are under validation: each takes some seconds to compile.
-QUICK = {(2, "j2-plasticity"), (3, "johnson-cook")}
+QUICK = {(2, "j2-plasticity")}
 
 # Of no declared kind: who is near whom is asked anew at every step.
 BY_STEP = {

@@ -421,6 +421,28 @@ class Springs(Load):
         return {}
 
 
+@attrs.frozen(eq=False)
+class Wind(Load):
+    """A constant force, of a load that has a number for a stiffness."""
+
+    label: str
+    particles: Indices
+    stiffness: float = 3.0
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return np.ones((len(self.particles), positions.shape[1]))
+
+    def report(self, observation: Observation) -> Mapping[str, float]:
+        return {}
+
+
+def test_a_number_called_stiffness_is_none() -> None:
+    simulation = box(1, 10).boundary("clamp", where="left").build()
+    wind = Wind("wind", np.arange(1, 10))
+    blown = attrs.evolve(simulation, dynamics=attrs.evolve(simulation.dynamics, loads=[wind]))
+    assert equilibrium(blown).residual < 1e-9
+
+
 def on_springs(builder: SceneBuilder, constant: float) -> Simulation:
     simulation = builder.build()
     X = simulation.particles.positions
@@ -578,7 +600,8 @@ def test_damping_shortens_the_critical_step() -> None:
     free = critical_step(box(1).build())
     damped = critical_step(box(1).effect("mass-damping", rate=1e3).build())
     assert damped.highest_frequency == pytest.approx(free.highest_frequency, rel=1e-6)
-    assert damped.step == pytest.approx(2.0 / (free.highest_frequency + 1e3), rel=1e-6)
+    total = 1e3 + np.hypot(1e3, free.highest_frequency)
+    assert damped.step == pytest.approx(2.0 / total, rel=1e-6)
 
 
 # --- Small loads ---------------------------------------------------------------------------------

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypeGuard
 
 from scipy.sparse import csr_array
 
 from solidsph.maths.arrays import Array
 
 
-@runtime_checkable
 class Stiff(Protocol):
     """A Load with a known stiffness.
 
@@ -26,3 +25,8 @@ class Stiff(Protocol):
 
         Component i of particle p has the index p d + i. It need not be symmetric.
         """
+
+
+def is_stiff(load: object) -> TypeGuard[Stiff]:
+    """Whether a load tells its stiffness; a number of that name is a parameter of its own."""
+    return callable(getattr(load, "stiffness", None))

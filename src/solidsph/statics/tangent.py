@@ -18,7 +18,7 @@ from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import components_first, particles_first
 from solidsph.run.built_scene import BuiltScene
 from solidsph.statics.linear_part import linear_part
-from solidsph.statics.stiff import Stiff
+from solidsph.statics.stiff import is_stiff
 
 
 @attrs.frozen(eq=False)
@@ -139,7 +139,7 @@ class Tangent:
         ]
         total = parts[0] if len(parts) == 1 else csr_array(block_diag(parts, format="csr"))
         for load in self.loads:
-            if isinstance(load, Stiff):
+            if is_stiff(load):
                 stiffness = load.stiffness(displacements, time)
                 total = total if stiffness is None else csr_array(total + stiffness)
         return total

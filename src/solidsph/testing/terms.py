@@ -12,7 +12,7 @@ from solidsph.interfaces.terms import FieldTerm, Load, Observation, Term
 from solidsph.maths.arrays import Array, Mask
 from solidsph.run.energy import kinetic_energy, ledger, strain_energy
 from solidsph.simulation import Simulation
-from solidsph.statics.stiff import Stiff
+from solidsph.statics.stiff import is_stiff
 
 
 def observed(simulation: Simulation) -> Iterator[Observation]:
@@ -61,7 +61,8 @@ def force_problem(simulation: Simulation, load: Load, u: Array) -> str:
 def stiffness_error(simulation: Simulation, load: Load, u: Array, du: Array) -> float | None:
     """By how much the stiffness of a load misses minus the derivative of its force along `du`, over
     the larger of both, at displacements `u` (n, d); None if it declares none."""
-    if not isinstance(load, Stiff):
+    told: object = load
+    if not is_stiff(told):
         return None
     time, still = 1e-3, np.zeros_like(u)
     X, step = simulation.particles.positions, 1e-4
@@ -69,7 +70,7 @@ def stiffness_error(simulation: Simulation, load: Load, u: Array, du: Array) -> 
     for sign in (-1.0, 1.0):
         change[load.particles] += sign * load.forces(time, X + u + sign * step * du, still)
     measured = -0.5 * change / step
-    stiffness = load.stiffness(u, time)
+    stiffness = told.stiffness(u, time)
     declared = np.zeros_like(u) if stiffness is None else (stiffness @ du.ravel()).reshape(u.shape)
     size = max(float(np.abs(measured).max()), float(np.abs(declared).max()))
     return float(np.abs(declared - measured).max()) / size if size > 0.0 else 0.0
