@@ -15,6 +15,7 @@ from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.constraints import following
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.compilable_terms import LinearExtension
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Indices
@@ -46,6 +47,7 @@ class Internal(NamedTuple):
 
     forces: Any  # (data, u (n, d), total (n, d)): total = internal forces of all bodies
     data: Any
+    histories: Sequence[tuple[Body, Array]] = ()  # of bodies that have some, in the data
 
 
 def internal_forces(
@@ -59,7 +61,12 @@ def internal_forces(
     if all(part.fused for part in parts) and not conditions:
         functions = tuple(map(_at_once, parts))
         data = tuple(_data(part, step, staged=False) for part in parts)
-        return Internal(call_each(functions), data)
+        histories = [
+            (part.body, one.history)
+            for part, one in zip(parts, data, strict=True)
+            if part.remembers
+        ]
+        return Internal(call_each(functions), data, histories)
     if len(parts) > 1:
         raise NotCompilableError("conditions on the stress of several bodies")
     (part,) = parts
@@ -77,13 +84,23 @@ def internal_forces(
 
 
 def _at_once(part: ReferenceBody) -> Any:
-    if not part.remembers:
-        return _fused(part.passes.forces)
-    return _with_history(part.history_pass)
+    if part.remembers:
+        return _fused(part.history_pass, _history_and_step)
+    return _fused(part.passes.forces, _nothing)
+
+
+@njit
+def _nothing(body):
+    return ()
+
+
+@njit
+def _history_and_step(body):
+    return body.history, body.step
 
 
 @cache
-def _fused(forces: Any) -> Any:
+def _fused(forces: Any, more: Any) -> Any:
     @njit
     def fused(body, u, total):
         a, b = body.extent
@@ -96,27 +113,7 @@ def _fused(forces: Any) -> Any:
             body.factors,
             body.buffers,
             total[a:b],
-        )
-
-    return fused
-
-
-@cache
-def _with_history(forces: Any) -> Any:
-    @njit
-    def fused(body, u, total):
-        a, b = body.extent
-        forces(
-            body.table,
-            body.rows,
-            u[a:b],
-            body.u,
-            body.params,
-            body.factors,
-            body.buffers,
-            total[a:b],
-            body.history,
-            body.step,
+            *more(body),
         )
 
     return fused

@@ -34,7 +34,7 @@ from solidsph.interfaces.compilable_terms import LinearExtension, ScheduledConst
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
-from solidsph.interfaces.law import Law, memory_name
+from solidsph.interfaces.law import memory_name
 from solidsph.interfaces.terms import GhostConstraint, StressTerm
 from solidsph.interfaces.time_loop import NOT_FINITE, StepError, TimeLoop
 from solidsph.maths.arrays import Array
@@ -122,16 +122,7 @@ def compiled_loop(
         call_each(tuple(load.apply for load in loads)),
         ConstraintCalls(*(call_each(functions) for functions in by_call)),
     )
-    histories = (
-        [
-            (ArrayLaw(body.body), data.history)
-            for body, data in zip(bodies, internal.data, strict=True)
-            if body.remembers
-        ]
-        if not conditions
-        else []
-    )
-    return CompiledLoop(sums, equation, internal, histories, loads, steps, threads)
+    return CompiledLoop(sums, equation, internal, loads, steps, threads)
 
 
 @final
@@ -142,7 +133,6 @@ class CompiledLoop(TimeLoop):
     sums: InternalForces
     equation: EquationOfMotion
     internal: Internal
-    histories: Sequence[tuple[Law, Array]]  # laws with internal variables, and the loop's of them
     loads: Sequence[CompiledLoad]
     steps: Any  # compiled
     threads: int
@@ -183,8 +173,8 @@ class CompiledLoop(TimeLoop):
         inverse_masses = np.zeros_like(equation.masses)
         np.divide(1.0, equation.masses, out=inverse_masses, where=equation.masses > 0.0)
         accounts = _Accounts.of(self.sums, equation, state)
-        for law, history in self.histories:
-            history[...] = law.history_of(state.memory)
+        for body, history in self.internal.histories:
+            history[...] = ArrayLaw(body).history_of(state.memory)
         done = 0
         while state.step + done < stop:
             count = min(stop - state.step - done, self.most_steps)
@@ -218,7 +208,7 @@ class CompiledLoop(TimeLoop):
             work=accounts.work,
             memory={
                 **state.memory,
-                **{memory_name(law.body): history.copy() for law, history in self.histories},
+                **{memory_name(body): own.copy() for body, own in self.internal.histories},
                 MEAN_VELOCITY: moving.h,
             },
         )
