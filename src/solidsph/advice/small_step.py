@@ -23,11 +23,11 @@ def small_step(facts: SceneFacts) -> Iterator[Advice]:
     by_effects = stable_step_of(0.0, simulation.integrator, simulation.dynamics.loads)
     if step >= _SMALL * wanted or by_effects < 2.0 * step:
         return
-    best = kernel_cover(facts.simulation.model.bodies[0].smoothing.kernel)
+    best = kernel_cover(simulation.model.bodies[0].smoothing.kernel)
     larger = f"cover = {best:g} gives each particle more; else " if facts.cover < best else ""
     yield Advice(
-        finding=f"a step of {simulation.step_size:.2g} s is {step / wanted:.1g} of the time of a "
-        f"wave across a spacing: the run takes {simulation.steps} steps",
+        finding=f"the critical step of {step:.2g} s is {step / wanted:.2g} of the time of a wave "
+        f"across a spacing: the run takes {simulation.steps} steps",
         expected=f"{_SMALL:g} or more: with too few neighbours a gradient is a small difference of "
         "large weights",
         remedy=f"{larger}gradient = 'corrected', or particles that stand more evenly",
