@@ -16,10 +16,13 @@ from solidsph.interfaces.plan import BodySize, Plan
 from solidsph.interfaces.terms import StressTerm
 
 # Rough times [s] of the matrix engine per step and per pair, for constant and for moving
-# neighbours, and of compilation; the steps of the compiled engine are negligible beside them.
+# neighbours; the steps of the compiled engine are negligible beside them.
 _STEP, _PAIR = 1e-4, 25e-9
 _MOVING_STEP, _MOVING_PAIR = 1e-3, 400e-9
-_COMPILATION = 10.0
+
+# Time of the matrix engine from which compiling pays [s]. The first run of a kind of scene compiles for
+# some ten seconds, the others read in less than one: it pays for whoever runs four.
+_WORTH_COMPILING = 3.0
 
 # Number of pairs beyond which the matrices alone fill a gigabyte.
 _MANY_PAIRS = 1e7
@@ -28,7 +31,7 @@ _MANY_PAIRS = 1e7
 @final
 @attrs.frozen
 class AutomaticEngine(Engine):
-    """The compiled engine if the matrix engine would take longer than compiling takes."""
+    """The compiled engine if compiling pays, else the matrix engine."""
 
     def prepare(
         self, bodies: Sequence[Body], conditions: Sequence[StressTerm], evaluations: int = 1
@@ -46,9 +49,9 @@ class AutomaticEngine(Engine):
 
 
 def compiling_pays(sizes: Sequence[BodySize], evaluations: int) -> bool:
-    """True if evaluations by matrices take longer than compiling, or matrices too much memory."""
+    """True if evaluations by matrices take long, or matrices too much memory."""
     work = evaluations * sum(_matrix_time(size) for size in sizes)
-    return work > _COMPILATION or sum(size.pairs for size in sizes) > _MANY_PAIRS
+    return work > _WORTH_COMPILING or sum(size.pairs for size in sizes) > _MANY_PAIRS
 
 
 def _matrix_time(size: BodySize) -> float:
