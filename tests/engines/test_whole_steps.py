@@ -29,11 +29,11 @@ SCENES = {
         box(1, 12).engine("compiled").effect("bond-failure", critical_stretch=0.1),
         False,
     ),
-    "heat, which swells": (
+    "heat, which is called": (
         box(1, 12)
         .engine("compiled")
         .effect("heat", conductivity=1.0, heat_capacity=500.0, initial="X", expansion=1e-4),
-        False,
+        True,
     ),
     "neighbours that move": (
         box(1, 12).engine("compiled").formulation("updated-lagrangian"),

@@ -101,7 +101,7 @@ def measured(toml: str, engine: str) -> dict[str, Any]:
     else:
         loop = simulation.time_loop()
         loop.advance(simulation.start(), STEPS)
-        (text,) = loop.steps.inspect_llvm().values()  # type: ignore[attr-defined]
+        (text,) = loop.steps.all.inspect_llvm().values()  # type: ignore[attr-defined]
         found["lines of code"] = text.count("\n")
         found["loads"] = len(loop.loads)  # type: ignore[attr-defined]
     return found

@@ -109,9 +109,9 @@ class _Relaxation(Load):
         return f"{self.label}: {name}"
 
     def _rate(self, way: Array, acceleration: Array, c: float) -> float:
+        weighted = self.masses[:, None] * way
         weight, power = (
-            float(np.einsum("n,ni,ni->", self.masses, way, change))
-            for change in (way, acceleration)
+            float(np.einsum("ni,ni->", weighted, change)) for change in (way, acceleration)
         )
         # The rate is kept before the first motion and while a load drives the body on.
         if not (weight > 0.0 and power < 0.0):

@@ -153,8 +153,10 @@ class _Wall(EnergyTerm, FieldTerm, Load):
 
     def gaps(self, time: float, positions: Array) -> Array:
         """Distance of each particle's surface from the plane, (k,) [m]."""
-        plane = self.point + self.motion(time, 0)
-        return np.asarray((positions[self.particles] - plane) @ self.normal - self.clearances)
+        # Of all particles, as choosing numbers is cheaper than choosing vectors.
+        along = np.einsum("ni,i->n", positions, self.normal)
+        plane = (self.point + self.motion(time, 0)) @ self.normal
+        return np.asarray(along[self.particles] - (plane + self.clearances))
 
     def pressed(self, time: float, positions: Array) -> Array:
         """Normal force on every particle, (k,) [N]."""
@@ -162,7 +164,10 @@ class _Wall(EnergyTerm, FieldTerm, Load):
 
     def forces(self, time: float, positions: Array, velocities: Array) -> Array:
         """Normal forces; friction depends on memory."""
-        return np.asarray(self.pressed(time, positions)[:, None] * self.normal)
+        pressed = self.pressed(time, positions)
+        if not pressed.any():  # bodies are far from most walls for most of the time
+            return np.zeros((len(pressed), len(self.normal)))
+        return np.asarray(pressed[:, None] * self.normal)
 
     def advance(
         self, time: float, step: float, positions: Array, velocities: Array, memory: Memory

@@ -319,7 +319,9 @@ def _of_motion(simulation: Simulation) -> Iterator[tuple[str, Any, str]]:
         slow = f"slabs slower than {sleep.tolerance:g} of the largest speed sleep, and cost nothing"
         yield "sleep", f"up to {sleep.slabs} slabs", slow
     if simulation.plan.compiles_steps:
-        yield "time loop", "compiled", "whole steps: all parts are of kinds that can be compiled"
+        called = ", ".join(simulation.plan.called)
+        how = f"but for {called}, called at every step" if called else "whole steps"
+        yield "time loop", "compiled", how
     else:
         yield "time loop", "step by step", "by the parts themselves, which works for all kinds"
 

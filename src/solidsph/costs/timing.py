@@ -48,8 +48,8 @@ class Timings:
 
 
 def time_uncounted(simulation: Simulation, work: Work) -> Timings:
-    """Time the parts that the model does not know, unless steps are compiled or there are none."""
-    if work.loop is not Loop.STEPS:
+    """Time the parts that the model does not know, unless there are no steps."""
+    if work.loop is Loop.NEWTON:
         return Timings()
     dynamics = simulation.dynamics
     # `simulation.start()` could have to compile the forces first.

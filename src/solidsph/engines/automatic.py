@@ -20,8 +20,8 @@ from solidsph.interfaces.terms import StressTerm
 _STEP, _PAIR = 1e-4, 25e-9
 _MOVING_STEP, _MOVING_PAIR = 1e-3, 400e-9
 
-# Time of the matrix engine from which compiling pays [s]. The first run of a kind of scene compiles for
-# some ten seconds, the others read in less than one: it pays for whoever runs four.
+# Time of the matrix engine from which compiling pays [s]. The first run of a kind of scene compiles
+# for some ten seconds, the others read in less than one: it pays for whoever runs four.
 _WORTH_COMPILING = 3.0
 
 # Number of pairs beyond which the matrices alone fill a gigabyte.

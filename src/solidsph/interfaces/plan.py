@@ -74,10 +74,11 @@ class Compilation:
 class Plan:
     """How a run is carried out."""
 
-    compiles_steps: bool  # True if whole steps are one compiled function
+    compiles_steps: bool  # True if steps are compiled, but for loads that are called
     engine: Sequence[Operations]  # of the internal forces, per evaluation
     loads: Sequence[Operations] = ()  # of everything else, per evaluation
     compilations: frozenset[Compilation] = frozenset()
+    called: Sequence[str] = ()  # labels of loads that compiled steps call
 
 
 @attrs.frozen

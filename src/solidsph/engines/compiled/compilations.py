@@ -47,9 +47,11 @@ def of_steps(
     laws = tuple(sorted({_law(part) for part in parts}, key=repr))
     yield Compilation(CompilationUnit.STEPS, d, threaded, (type(integrator), laws, kinds))
     for load in equation.loads:
-        unit = kind_of(load).unit
-        key = None if unit is CompilationUnit.LOAD and not kind_of(load).formula else type(load)
-        yield Compilation(unit, d, threaded, key)
+        kind = kind_of(load)
+        if kind is None:  # called: what it adds is the same for all
+            yield Compilation(CompilationUnit.LOAD, d, threaded)
+        else:
+            yield Compilation(kind.unit, d, threaded, type(load) if kind.formula else None)
     if any(isinstance(term, GhostConstraint) for term in equation.constraints):
         yield Compilation(CompilationUnit.EXTENSION, d, threaded)
 

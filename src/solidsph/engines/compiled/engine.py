@@ -16,6 +16,7 @@ from solidsph.engines.compiled.history_law import CompiledLaw
 from solidsph.engines.compiled.moving.body import MovingBody, moving_body
 from solidsph.engines.compiled.notes import looked_up, note
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_flux
+from solidsph.engines.compiled.time_loop.loads import kind_of
 from solidsph.engines.compiled.time_loop.loop import are_compilable, compiled_loop
 from solidsph.engines.matrix import MatrixEngine
 from solidsph.interfaces.body import Body
@@ -115,9 +116,14 @@ class CompiledForces(InternalForces):
         ):
             return super().plan(equation, integrator)
         d = equation.particles.dimension
-        loads = [o for load in equation.loads for o in load.operations(d, compiled=True)]
+        called = [load.label for load in equation.loads if kind_of(load) is None]
+        loads = [
+            operations
+            for load in equation.loads
+            for operations in load.operations(d, compiled=load.label not in called)
+        ]
         steps = looked_up(of_steps(fixed, equation, integrator))
-        return Plan(True, self.operations, loads, self.compilations | steps)
+        return Plan(True, self.operations, loads, self.compilations | steps, called)
 
     @property
     def _fixed(self) -> Sequence[ReferenceBody]:
@@ -128,7 +134,7 @@ class CompiledForces(InternalForces):
             return None
         try:
             return compiled_loop(self._fixed, self.conditions, self, equation, integrator)
-        except NotCompilableError:  # a formula whose kind is known, but which does not compile
+        except NotCompilableError:  # its kind is known, but it does not compile
             return None
 
     def forces(self, time: float, displacements: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -65,11 +66,19 @@ class HourglassData(NamedTuple):
     now: ScheduledForces  # of the current step
 
 
+class Call(NamedTuple):
+    """A load that is called at every step, and where its forces go."""
+
+    load: Load
+    forces: Array  # (k, d) [N]
+
+
 class CompiledLoad(NamedTuple):
     """A load prepared for the loop."""
 
     apply: Any  # compiled (load, step, u, v, path, total): total += force, work += that along path
     own: Callable[[Array], Any]  # times (t,) at which the steps to come end -> `LoadData.own`
+    called: Call | None = None  # if its forces are those that a call has put into `own`
 
 
 class LoadKind(NamedTuple):
@@ -81,25 +90,27 @@ class LoadKind(NamedTuple):
     formula: bool = True  # True if each class of the kind is compiled separately
 
 
-def kind_of(load: Load) -> LoadKind:
-    """The kind of a load.
-
-    Raises:
-        NotCompilableError: the loop does not know its kind.
-    """
-    for known in LOAD_KINDS:
-        if isinstance(load, known.kind):
-            return known
-    raise NotCompilableError(f"load {load.label!r} is not of a compilable kind")
+def kind_of(load: Load) -> LoadKind | None:
+    """The kind of a load; None if the loop does not know it, and calls the load."""
+    return next((known for known in LOAD_KINDS if isinstance(load, known.kind)), None)
 
 
 def compiled_load(load: Load, reference: Array, threaded: bool) -> CompiledLoad:
     """A load on particles with reference positions (n, d) [m], prepared.
 
-    Raises:
-        NotCompilableError: the loop does not know its kind, or its formula does not compile.
+    One of no known kind, or with a formula that does not compile, is called.
     """
-    return kind_of(load).prepare(load, reference, threaded)
+    kind = kind_of(load)
+    if kind is not None:
+        with suppress(NotCompilableError):
+            return kind.prepare(load, reference, threaded)
+    return _called(load, reference.shape[1], threaded)
+
+
+def _called(load: Load, dimension: int, threaded: bool) -> CompiledLoad:
+    now = ScheduledForces(np.zeros((1, len(load.particles), dimension)))
+    add = _accounted(_scheduled(dimension), dimension, threaded)
+    return CompiledLoad(add, lambda times: now, Call(load, now.table[0]))
 
 
 def _prepare_scheduled(load: ScheduledLoad, reference: Array, threaded: bool) -> CompiledLoad:

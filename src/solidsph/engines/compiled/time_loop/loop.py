@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple, final
 
@@ -15,27 +15,18 @@ from solidsph.engines.compiled.constants import PER_PARTICLE
 from solidsph.engines.compiled.fixed.partition import thread_count
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function
+from solidsph.engines.compiled.time_loop.accounts import Accounts
 from solidsph.engines.compiled.time_loop.call_each import call_each
-from solidsph.engines.compiled.time_loop.constraints import (
-    ConstraintCalls,
-    FollowingGhosts,
-    ScheduledMotion,
-    constraint_calls,
-    constraint_data,
-)
+from solidsph.engines.compiled.time_loop.constraints import ConstraintCalls, constraint_calls
 from solidsph.engines.compiled.time_loop.internal_forces import Internal, internal_forces
-from solidsph.engines.compiled.time_loop.loads import (
-    LOAD_KINDS,
-    CompiledLoad,
-    LoadData,
-    compiled_load,
-)
+from solidsph.engines.compiled.time_loop.loads import Call, CompiledLoad, compiled_load
 from solidsph.interfaces.compilable_terms import LinearExtension, ScheduledConstraint, ScheduledLoad
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
 from solidsph.interfaces.law import memory_name
-from solidsph.interfaces.terms import GhostConstraint, StressTerm
+from solidsph.interfaces.memory import Memory
+from solidsph.interfaces.terms import StressTerm
 from solidsph.interfaces.time_loop import NOT_FINITE, StepError, TimeLoop
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
@@ -67,8 +58,7 @@ def are_compilable(
     equation: EquationOfMotion,
     integrator: Integrator,
 ) -> bool:
-    """True if everything in a step is of a compilable kind, though a formula may still fail."""
-    kinds = tuple(kind.kind for kind in LOAD_KINDS)
+    """True if all in a step but loads is of a compilable kind."""
     labels = [c.label for c in (*equation.loads, *equation.constraints)]
     remember = any(body.remembers for body in bodies)
     ghosts = any(body.body.particles.ghosts.any() for body in bodies)
@@ -79,7 +69,6 @@ def are_compilable(
     return (
         isinstance(integrator, PointwiseIntegrator)
         and (fused or alone)
-        and all(isinstance(load, kinds) for load in equation.loads)
         and all(labels.count(load.label) == 1 for load in equation.loads)
         and all(
             isinstance(term, (ScheduledConstraint, LinearExtension))
@@ -99,8 +88,10 @@ def compiled_loop(
 
     `sums` are the forces of the same bodies, one evaluation at a time.
 
+    A load that does not compile is called between the halves of every step.
+
     Raises:
-        NotCompilableError: a part is not of a compilable kind, or does not compile.
+        NotCompilableError: another part is not of a compilable kind, or does not compile.
     """
     if not isinstance(integrator, PointwiseIntegrator):
         raise NotCompilableError(f"integrator {type(integrator).__name__} is not pointwise")
@@ -134,7 +125,7 @@ class CompiledLoop(TimeLoop):
     equation: EquationOfMotion
     internal: Internal
     loads: Sequence[CompiledLoad]
-    steps: Any  # compiled
+    steps: _Steps
     threads: int
     most_steps: int = attrs.field(init=False)  # that share one set of tables
 
@@ -172,27 +163,22 @@ class CompiledLoop(TimeLoop):
         # Ghosts have no mass, and no equation of motion.
         inverse_masses = np.zeros_like(equation.masses)
         np.divide(1.0, equation.masses, out=inverse_masses, where=equation.masses > 0.0)
-        accounts = _Accounts.of(self.sums, equation, state)
+        accounts = Accounts.of(self.sums, equation, state)
         for body, history in self.internal.histories:
             history[...] = ArrayLaw(body).history_of(state.memory)
-        done = 0
+        done, memory = 0, state.memory
         while state.step + done < stop:
             count = min(stop - state.step - done, self.most_steps)
             numbers = np.arange(done + 1, done + count + 1, dtype=np.float64)
             times = state.time + self.equation.step_size * numbers
             loads = accounts.loads([one.own(times) for one in self.loads], self.threads)
             motions = accounts.motions(times)
-            carried_out = self.steps(
-                count,
-                self.equation.step_size,
-                self.threads,
-                moving,
-                equation.masses,
-                inverse_masses,
-                self.internal.data,
-                loads,
-                motions,
-            )
+            data = equation.masses, inverse_masses, self.internal.data, loads, motions
+            if self._calls:
+                carried_out, memory = self._by_calls(times, moving, data, memory)
+            else:
+                dt = self.equation.step_size
+                carried_out = self.steps.all(count, dt, self.threads, moving, *data)
             done += carried_out
             accounts.settle(loads, motions)
             if not np.isfinite(moving.a.sum()):
@@ -207,7 +193,7 @@ class CompiledLoop(TimeLoop):
             applied=accounts.applied(time, moving.u),
             work=accounts.work,
             memory={
-                **state.memory,
+                **memory,
                 **{memory_name(body): own.copy() for body, own in self.internal.histories},
                 MEAN_VELOCITY: moving.h,
             },
@@ -216,90 +202,36 @@ class CompiledLoop(TimeLoop):
             raise StepError(end, NOT_FINITE)
         return end
 
+    @property
+    def _calls(self) -> Sequence[Call]:
+        return [one.called for one in self.loads if one.called is not None]
 
-@attrs.define(eq=False)
-class _Accounts:
-    """Forces and work of every load and constraint, between the loop's arrays and a state's."""
-
-    sums: InternalForces
-    equation: EquationOfMotion
-    work: dict[str, float]  # by account [J]
-    load_forces: list[Array]  # (k, d) of each load, on its particles [N]
-    reactions: list[Array]  # (m,) of each constraint [N]; empty for ghosts that follow
-
-    @classmethod
-    def of(cls, sums: InternalForces, equation: EquationOfMotion, state: State) -> _Accounts:
-        """The accounts of a state."""
-        u = state.positions - equation.particles.positions
-        loads = [state.applied[load.label][load.particles] for load in equation.loads]
-        # An account also holds the forces that ghosts of the same handler return.
-        handed = _handed_on(sums, equation, state.time, u, loads)
-        reactions = [
-            (state.applied[motion.label] - handed.get(motion.label, 0.0))[motion.entries]
-            if isinstance(motion, ScheduledConstraint)
-            else np.empty(0)
-            for motion in equation.constraints
-        ]
-        return cls(sums, equation, dict(state.work), loads, reactions)
-
-    def loads(self, own: Sequence[Any], threads: int) -> tuple[LoadData, ...]:
-        """The data of the loads, with the `own` data of each."""
-        each = zip(self.equation.loads, self.load_forces, own, strict=True)
-        return tuple(
-            LoadData(load.particles, before, np.zeros(threads), one) for load, before, one in each
-        )
-
-    def motions(self, times: Array) -> tuple[ScheduledMotion | FollowingGhosts, ...]:
-        """The data of the constraints."""
-        pairs = zip(self.equation.constraints, self.reactions, strict=True)
-        return tuple(
-            constraint_data(motion, times, before, self.equation.step_size)
-            for motion, before in pairs
-        )
-
-    def settle(
-        self, loads: Sequence[LoadData], motions: Sequence[ScheduledMotion | FollowingGhosts]
-    ) -> None:
-        """Add the work done in the loop; it has updated the forces in place."""
-        conditions = (*self.equation.loads, *self.equation.constraints)
-        for condition, part in zip(conditions, (*loads, *motions), strict=True):
-            self.work[condition.label] += float(part.work.sum())
-
-    def applied(self, time: float, u: Array) -> Mapping[str, Array]:
-        """Force of every account on every particle, (n, d) [N], at displacements u (n, d) [m]."""
-        equation = self.equation
-        applied = {c.label: np.zeros_like(u) for c in (*equation.loads, *equation.constraints)}
-        for load, force in zip(equation.loads, self.load_forces, strict=True):
-            applied[load.label][load.particles] += force
-        for motion, reaction in zip(equation.constraints, self.reactions, strict=True):
-            if isinstance(motion, ScheduledConstraint):
-                applied[motion.label][motion.entries] += reaction
-        for label, force in _handed_on(self.sums, equation, time, u, self.load_forces).items():
-            applied[label] += force
-        return applied
+    def _by_calls(
+        self, times: Array, moving: _Moving, data: tuple[Any, ...], memory: Memory
+    ) -> tuple[int, Memory]:
+        """Steps that end at `times` (t,) [s], with calls of loads between their halves: how many
+        were made, and what the loads remember."""
+        X, dt, threads = self.equation.particles.positions, self.equation.step_size, self.threads
+        *_, motions = data
+        for step, time in enumerate(times.tolist()):
+            self.steps.begin(step, dt, threads, moving, motions)
+            positions, velocities = X + moving.u, moving.v.copy()  # for whoever keeps them
+            now = memory
+            for load, forces in self._calls:
+                forces[...], changed = load.advance(time, dt, positions, velocities, memory)
+                now = {**now, **changed}
+            memory = now
+            if not self.steps.end(step, dt, threads, moving, *data):
+                return step + 1, memory
+        return len(times), memory
 
 
-def _handed_on(
-    sums: InternalForces,
-    equation: EquationOfMotion,
-    time: float,
-    u: Array,
-    load_forces: Sequence[Array],
-) -> Mapping[str, Array]:
-    """Forces that ghosts return to the particles they follow, (n, d) [N] by account."""
-    extensions = [c for c in equation.constraints if isinstance(c, GhostConstraint)]
-    if not extensions:
-        return {}
-    with np.errstate(all="ignore"):
-        total = sums.forces(time, u)
-    for load, force in zip(equation.loads, load_forces, strict=True):
-        total[load.particles] += force
-    handed = {c.label: np.zeros_like(u) for c in extensions}
-    for extension in extensions:
-        before = total.copy()
-        extension.return_forces(total)
-        handed[extension.label] += total - before
-    return handed
+class _Steps(NamedTuple):
+    """Compiled steps, whole or in halves; `data` are (masses, 1/masses, bodies, loads, motions)."""
+
+    begin: Any  # (step, dt, threads, moving, motions): to the positions at the end of the step
+    end: Any  # (step, dt, threads, moving, *data) -> True if all accelerations are finite
+    all: Any  # (count, dt, threads, moving, *data) -> steps made, up to one that is not finite
 
 
 @cache
@@ -311,7 +243,7 @@ def _steps(
     internal: Any,
     loads: Any,
     motion: ConstraintCalls,
-) -> Any:
+) -> _Steps:
     move, hand_on, react = motion
 
     @njit(parallel=threaded)
@@ -338,18 +270,28 @@ def _steps(
                     v[p, i] = end_velocity(h[p, i], a[p, i], dt)
 
     @njit
+    def begin(step, dt, threads, moving, motion_parts):
+        u, v, _, h, path, _ = moving
+        drift(threads, dt, moving)
+        move(motion_parts, step, dt, u, h, path, v)
+
+    @njit
+    def end(step, dt, threads, moving, masses, inverse_masses, bodies, load_parts, motion_parts):
+        u, v, a, _, path, total = moving
+        internal(bodies, u, total)
+        loads(load_parts, step, u, v, path, total)
+        hand_on(motion_parts, total)
+        kick(threads, dt, moving, inverse_masses)
+        react(motion_parts, step, masses, total, path, a, v)
+        return np.isfinite(a.sum())
+
+    @njit
     def steps(count, dt, threads, moving, masses, inverse_masses, bodies, load_parts, motion_parts):
-        u, v, a, h, path, total = moving
         for step in range(count):
-            drift(threads, dt, moving)
-            move(motion_parts, step, dt, u, h, path, v)
-            internal(bodies, u, total)
-            loads(load_parts, step, u, v, path, total)
-            hand_on(motion_parts, total)
-            kick(threads, dt, moving, inverse_masses)
-            react(motion_parts, step, masses, total, path, a, v)
-            if not np.isfinite(a.sum()):
+            begin(step, dt, threads, moving, motion_parts)
+            data = masses, inverse_masses, bodies, load_parts, motion_parts
+            if not end(step, dt, threads, moving, *data):
                 return step + 1
         return count
 
-    return steps
+    return _Steps(begin, end, steps)
