@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from math import prod
-
 import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph_builtin.effects._contact_passes import Passes, passes
 from solidsph_builtin.effects._crowding import REACH
-from solidsph_builtin.effects._search import NeighbourList, Search
+from solidsph_builtin.effects._search import NeighbourList, Search, together
 from solidsph_builtin.effects._slip import slid
 
 # Relative to the squared reach: moments of inertia below this are those of particles on a line.
@@ -55,6 +54,16 @@ class Meeting:
     def _no_list(self) -> NeighbourList:
         return NeighbourList(self.search, self.kernel.support_radius)
 
+    places: slice | Indices = attrs.field(init=False, repr=False)  # the particles
+
+    @places.default
+    def _as_a_slice(self) -> slice | Indices:
+        return together(self.particles)
+
+    @property
+    def _passes(self) -> Passes:
+        return passes(self.kernel.kernel, self.kernel.dimension)
+
     @property
     def name(self) -> str:
         """Names of the bodies."""
@@ -64,19 +73,16 @@ class Meeting:
         """Pairs at `positions` (n, d) of all particles [m]; None while the boxes are apart."""
         if self.search.far_apart(positions):
             return None
-        x = positions[self.particles]
-        i, j = self._near.pairs(x)
-        offsets = x[i] - x[j]
-        distances = np.sqrt(np.sum(offsets**2, axis=1))
-        values = self.kernel.value(distances)
-        return Touch(
-            i,
-            j,
-            offsets,
-            values,
-            self.kernel.slope_by_distance(distances),
-            np.maximum(self._filled(i, j, values) - self.room, 0.0),
-        )
+        return self._touch(positions[self.places], *self._near.pairs(positions[self.places]))
+
+    def _touch(self, x: Array, i: Indices, j: Indices) -> Touch:
+        kernel = self.kernel
+        H, d = kernel.support_radius, kernel.dimension
+        norm = kernel.normalisation / H**d
+        near = self._passes.near(x, i, j, H, norm, kernel.kernel.params)
+        i, j, offsets, values, slopes = near
+        filled = self._passes.filled(i, j, values, self.volumes)
+        return Touch(i, j, offsets, values, slopes, np.maximum(filled - self.room, 0.0))
 
     def unloaded(self, X: Array) -> Meeting:
         """The meeting without forces at the reference positions X (m, d) of its particles [m].
@@ -86,26 +92,20 @@ class Meeting:
         and in corners of the other, which fill more than a plane face does.
         """
         i, j = self.search.within(X, self.kernel.support_radius)
-        values = self.kernel.value(np.linalg.norm(X[i] - X[j], axis=1))
-        filled = (1.0 + _ROUNDING) * self._filled(i, j, values)
-        return attrs.evolve(self, room=np.maximum(self.room, filled))
-
-    def _filled(self, i: Indices, j: Indices, values: Array) -> Array:
-        """Volume fraction of the other body around every particle, (m,) [-], by W of pairs."""
-        filled = self._summed_here(i, values * self.volumes[j])
-        return filled + self._summed_here(j, values * self.volumes[i])
+        touch = attrs.evolve(self, room=np.zeros_like(self.room))._touch(X, i, j)
+        return attrs.evolve(self, room=np.maximum(self.room, (1.0 + _ROUNDING) * touch.excess))
 
     def pushes(self, touch: Touch) -> Array:
         """Force on i of every pair along the line between the two, (k, d) [N]; opposite on j."""
-        i, j = touch.i, touch.j
-        both = touch.excess[i] + touch.excess[j]
-        pull = self.modulus * self.volumes[i] * self.volumes[j] * both
-        return np.asarray(-(pull * touch.slopes)[:, None] * touch.offsets)
+        of_pairs = touch.i, touch.j, touch.offsets, touch.slopes
+        found: Array = self._passes.pushes(*of_pairs, self.volumes, touch.excess, self.modulus)
+        return found
 
     def normal_forces(self, touch: Touch) -> Array:
         """Normal force on every particle, (m, d) [N]: minus the derivative of the energies."""
         pushes = self.pushes(touch)
-        return self._summed_here(touch.i, pushes) - self._summed_here(touch.j, pushes)
+        forces: Array = self._passes.summed(touch.i, touch.j, pushes, len(self.volumes))
+        return forces
 
     def energies(self, touch: Touch) -> Array:
         """Energy K V o^2 / 2 of every particle, (m,) [J]."""
@@ -121,48 +121,23 @@ class Meeting:
         contribution to the volume fraction. The spring acts on them as a force and a moment with
         the same weights, so that all momenta are conserved and the power is that of the spring.
         """
-        m, d = x.shape
-        forces, slipped = np.zeros((m, d)), np.zeros((m, d))
-        # Both directions: particle p with an excess, renumbered, beside particle q of the other
-        # body.
-        active = np.flatnonzero(touch.excess > 0.0)
-        count = len(active)
-        if not count:
+        forces, slipped = np.zeros_like(x), np.zeros_like(x)
+        if not touch.excess.any():
             return forces, slipped
-        number = np.full(m, -1, dtype=np.intp)
-        number[active] = np.arange(count)
-        p = number[np.concatenate([touch.i, touch.j])]
-        chosen = np.flatnonzero(p >= 0)
-        p, q = p[chosen], np.concatenate([touch.j, touch.i])[chosen]
-        pair = chosen % len(touch.i)
-        sign = np.where(chosen < len(touch.i), 1.0, -1.0)
-        fills = self.volumes[q]
-        slope = (fills * touch.slopes[pair] * sign)[:, None] * touch.offsets[pair]
-        inward = _summed(p, slope, count)  # gradient of the volume fraction
-        shares = fills * touch.values[pair]
-        shares /= np.bincount(p, shares, count)[p]
-        centre = _summed(p, shares[:, None] * x[q], count)
-        mean = _summed(p, shares[:, None] * v[q], count)
-        arms = x[q] - centre[p]
-        inertia = _summed(p, shares[:, None, None] * _inertia(arms), count)
-        spin = _summed(p, shares[:, None] * _cross(arms, v[q] - mean[p]), count)
-        steep = np.linalg.norm(inward, axis=1)
+        i, j, values, V = touch.i, touch.j, touch.values, self.volumes
         floor = _SLENDER * self.kernel.support_radius**2
-        k = np.flatnonzero((steep > 0.0) & (np.linalg.eigvalsh(inertia)[:, 0] > floor))
-        own = active[k]
-        reach = x[own] - centre[k]
-        rate = np.linalg.solve(inertia[k], spin[k][..., None])[..., 0]
-        there = mean[k] + _turning(np.asarray(rate, dtype=np.float64), reach)
-        limits = friction * self.modulus * self.volumes[own] * touch.excess[own] * steep[k]
-        normals = inward[k] / steep[k][:, None]
-        slipped[own] = slid(slip[own], v[own] - there, normals, step, self.spring[own], limits)
-        pull = -self.spring[own][:, None] * slipped[own]
-        forces[own] = pull
-        turn = np.zeros((count, inertia.shape[1]))
-        turn[k] = np.linalg.solve(inertia[k], -_cross(reach, pull)[..., None])[..., 0]
-        back = np.zeros((count, d))
-        back[k] = -pull
-        forces += _summed(q, shares[:, None] * (back[p] + _turning(turn[p], arms)), m)
+        of_pairs = i, j, touch.offsets, values, touch.slopes
+        around = self._passes.surroundings(*of_pairs, V, touch.excess, x, v, floor)
+        steep = np.linalg.norm(around.slope, axis=1)
+        k = np.flatnonzero((steep > 0.0) & around.sound)
+        own = around.own[k]
+        limits = friction * self.modulus * V[own] * touch.excess[own] * steep[k]
+        normals = around.slope[k] / steep[k][:, None]
+        relative = v[own] - around.velocity[k]
+        slipped[own] = slid(slip[own], relative, normals, step, self.spring[own], limits)
+        pull = np.zeros_like(around.slope)
+        pull[k] = forces[own] = -self.spring[own][:, None] * slipped[own]
+        self._passes.react(around, i, j, values, V, x, forces, pull)
         return forces, slipped
 
     def least_gap(self, positions: Array) -> float:
@@ -173,38 +148,3 @@ class Meeting:
         distances, nearest = cKDTree(x[other]).query(x[one])
         gaps = distances - self.depths[one] - self.depths[other[nearest]]
         return float(gaps.min())
-
-    def _summed_here(self, rows: Indices, values: Array) -> Array:
-        return _summed(rows, values, len(self.particles))
-
-
-def _summed(rows: Indices, values: Array, count: int) -> Array:
-    """Sum of `values` (k, ...) by their rows, (count, ...), in the order of the pairs."""
-    shape = values.shape[1:]
-    columns = values.reshape(len(values), prod(shape))
-    sums = np.empty((count, columns.shape[1]))
-    for k, column in enumerate(columns.T):
-        sums[:, k] = np.bincount(rows, column, count)
-    return sums.reshape(count, *shape)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """a x b of vectors (k, d): (k, 3), in the plane (k, 1)."""
-    if a.shape[1] == 2:
-        return np.asarray(a[:, :1] * b[:, 1:] - a[:, 1:] * b[:, :1])
-    return np.cross(a, b)
-
-
-def _turning(w: Array, r: Array) -> Array:
-    """w x r with w (k, 3), in the plane (k, 1), and r (k, d): (k, d)."""
-    if r.shape[1] == 2:
-        return np.column_stack([-w[:, 0] * r[:, 1], w[:, 0] * r[:, 0]])
-    return np.cross(w, r)
-
-
-def _inertia(r: Array) -> Array:
-    """|r|^2 I - r r^T of vectors (k, d): (k, 3, 3), in the plane (k, 1, 1)."""
-    squares = np.sum(r**2, axis=1)[:, None, None]
-    if r.shape[1] == 2:
-        return np.asarray(squares)
-    return np.asarray(squares * np.eye(3) - r[:, :, None] * r[:, None, :])

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.maths.arrays import Array, Indices
+from solidsph_builtin.effects._contact_passes import MOVED, NOT_FINITE, change
 
 # Margin of a list of pairs, relative to the reach.
 _SKIN = 0.2
@@ -92,10 +93,9 @@ class Within(Search):
 
 @attrs.define(eq=False)
 class NeighbourList:
-    """All pairs closer than a reach, in ascending order.
+    """All pairs closer than a reach, in ascending order, among some that are a little further.
 
-    The search is repeated only when particles have moved by half the margin; the result does not
-    depend on earlier calls.
+    The search is repeated only when particles have moved by half the margin.
     """
 
     search: Search
@@ -103,22 +103,20 @@ class NeighbourList:
     _made: tuple[Array, Indices, Indices] | None = None  # positions, and pairs within both
 
     def pairs(self, x: Array) -> tuple[Indices, Indices]:
-        """Pairs (k,), (k,) at positions x (m, d) [m]."""
-        if not np.isfinite(x).all():  # the run has diverged and is stopped elsewhere
+        """Pairs (k,), (k,) at positions x (m, d) [m]; none if one is not finite."""
+        if self._made is None:
+            changed = MOVED if np.isfinite(x).all() else NOT_FINITE
+        else:
+            # A little less than half, for rounding.
+            changed = change(self._made[0], x, 0.49 * _SKIN * self.reach)
+        if changed == NOT_FINITE:  # the run has diverged and is stopped elsewhere
             return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
-        if self._made is None or self._moved(self._made[0], x):
+        if changed == MOVED or self._made is None:
             i, j = self.search.within(x, (1.0 + _SKIN) * self.reach)
             order = np.lexsort((j, i))
             self._made = x.copy(), i[order], j[order]
         _, i, j = self._made
-        squares = np.sum((x[i] - x[j]) ** 2, axis=1)
-        near = squares < self.reach**2
-        return i[near], j[near]
-
-    def _moved(self, before: Array, x: Array) -> bool:
-        # A little less than half, for rounding.
-        largest = 0.49 * _SKIN * self.reach
-        return bool(np.max(np.sum((x - before) ** 2, axis=1), initial=0.0) > largest**2)
+        return i, j
 
 
 def _inside(x: Array, other: Array, margin: float) -> Array:

@@ -155,6 +155,11 @@ class _Contact(EnergyTerm, FieldTerm, Load):
     friction: float
     dimension: int
     stiffness_rate: float  # [rad/s]
+    places: slice | Indices = attrs.field(init=False, repr=False)  # the particles
+
+    @places.default
+    def _as_a_slice(self) -> slice | Indices:
+        return together(self.particles)
 
     @property
     def arrays(self) -> Mapping[str, int]:
@@ -177,8 +182,8 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         for meeting in self.meetings:
             touch = meeting.touch(positions)
             if touch is not None:
-                forces[meeting.particles] += meeting.normal_forces(touch)
-        return np.asarray(forces[self.particles])
+                forces[meeting.places] += meeting.normal_forces(touch)
+        return np.asarray(forces[self.places])
 
     def advance(
         self, time: float, step: float, positions: Array, velocities: Array, memory: Memory
@@ -195,11 +200,11 @@ class _Contact(EnergyTerm, FieldTerm, Load):
                 continue
             if forces is None:
                 forces = np.zeros_like(positions)
-            forces[meeting.particles] += force
+            forces[meeting.places] += force
         before = memory.get(self._asleep, np.zeros(1))
         count = before + asleep if step > 0.0 else before
         none = (len(self.particles), positions.shape[1])
-        found = np.zeros(none) if forces is None else forces[self.particles]
+        found = np.zeros(none) if forces is None else forces[self.places]
         return found, {self._asleep: count, **slips}
 
     def _contact_force(
@@ -217,7 +222,7 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         slip = self._slip(meeting, memory)
         if touch is None:
             return None, {self._slip_name(meeting): np.zeros_like(slip)}
-        x, v = positions[meeting.particles], velocities[meeting.particles]
+        x, v = positions[meeting.places], velocities[meeting.places]
         rubbed, slipped = meeting.rubbed(touch, x, v, slip, step, self.friction)
         return meeting.normal_forces(touch) + rubbed, {self._slip_name(meeting): slipped}
 
