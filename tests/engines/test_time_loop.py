@@ -145,7 +145,6 @@ HISTORIES = [
     name
     for name in registry.names("materials")
     if issubclass(registry.load("materials", name), HistoryMaterial)
-    and name != "viscoelastic"  # the number of its internal variables is that of its elements
 ]
 
 

@@ -27,11 +27,32 @@ def components(A: Tensor) -> History:
     return (A[0][0], A[1][1], A[2][2], A[1][2], A[0][2], A[0][1])
 
 
-def symmetric(values: History, dimension: int) -> Tensor:
-    """The symmetric tensor with these components."""
-    if dimension == 1:
+def symmetric(values: History, like: Tensor) -> Tensor:
+    """The symmetric tensor with these components, of the dimension of another."""
+    if len(like) == 1:
         return ((values[0],),)
-    if dimension == 2:
+    if len(like) == 2:
         return ((values[0], values[2]), (values[2], values[1]))
-    xx, yy, zz, yz, xz, xy = values
-    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    return (
+        (values[0], values[5], values[4]),
+        (values[5], values[1], values[3]),
+        (values[4], values[3], values[2]),
+    )
+
+
+def first_components(values: History, like: Tensor) -> History:
+    """As many of the values as a symmetric tensor has components."""
+    if len(like) == 1:
+        return values[:1]
+    if len(like) == 2:
+        return values[:3]
+    return values[:6]
+
+
+def later(values: History, like: Tensor) -> History:
+    """The values after those."""
+    if len(like) == 1:
+        return values[1:]
+    if len(like) == 2:
+        return values[3:]
+    return values[6:]

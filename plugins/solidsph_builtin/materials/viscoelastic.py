@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, final
+from functools import cache
+from typing import Any, ClassVar, Protocol, final
 
 import attrs
 import numpy as np
@@ -13,19 +14,25 @@ from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.maths.arrays import Scalar, Tensor
 from solidsph.maths.tensors import (
     add,
-    contraction,
     green_lagrange,
-    identity,
     product,
     scale,
-    trace,
     transpose,
 )
 from solidsph.registry.parameters import number
 from solidsph_builtin.materials._lame import RUBBER, check_elastic, lame
+from solidsph_builtin.materials._maxwell import (
+    after,
+    creep,
+    deviator,
+    deviator_product,
+    overstress,
+    stored,
+)
 from solidsph_builtin.materials._symmetric import (
-    component_count,
     components,
+    first_components,
+    later,
     names,
     symmetric,
 )
@@ -35,6 +42,16 @@ from solidsph_builtin.materials.neo_hookean import NeoHookean
 _spring_energy = NeoHookean.energy
 _spring_stress = NeoHookean.first_piola
 _spring_tangent = NeoHookean.tangent
+
+
+class _Advance(Protocol):
+    def __call__(
+        self, F: Tensor, history: History, step: float, params: tuple[float, ...]
+    ) -> History: ...
+
+
+class _Stress(Protocol):
+    def __call__(self, F: Tensor, history: History, params: tuple[float, ...]) -> Tensor: ...
 
 
 def _elements(given: Any) -> tuple[tuple[float, float], ...]:
@@ -114,14 +131,14 @@ class Viscoelastic(HistoryMaterial):
     def energy(F: Tensor, params: tuple[float, ...]) -> Scalar:
         E, psi = green_lagrange(F), _spring_energy(F, params[:2])
         for i in range(2, len(params), 2):
-            psi = psi + params[i] * _deviator_product(E, E)
+            psi = psi + params[i] * deviator_product(E, E)
         return psi
 
     @staticmethod
     def first_piola(F: Tensor, params: tuple[float, ...]) -> Tensor:
         E, P = green_lagrange(F), _spring_stress(F, params[:2])
         for i in range(2, len(params), 2):
-            P = add(P, product(F, scale(2.0 * params[i], _deviator(E))))
+            P = add(P, product(F, scale(2.0 * params[i], deviator(E))))
         return P
 
     @staticmethod
@@ -130,75 +147,51 @@ class Viscoelastic(HistoryMaterial):
         half = product(transpose(F), dF)
         dE = scale(0.5, add(half, transpose(half)))
         for i in range(2, len(params), 2):
-            along = add(product(dF, _deviator(E)), product(F, _deviator(dE)))
+            along = add(product(dF, deviator(E)), product(F, deviator(dE)))
             dP = add(dP, scale(2.0 * params[i], along))
         return dP
 
-    @staticmethod
-    def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
-        E, d = green_lagrange(F), len(F)
-        size = component_count(d)
-        count = (len(params) - 2) // 2
-        before = symmetric(history[count * size : (count + 1) * size], d)
-        change = add(E, scale(-1.0, before))
-        kept: History = ()
-        lost = history[-1]
-        for i in range(count):
-            mu, x = params[2 + 2 * i], step / params[3 + 2 * i]
-            faded = -np.expm1(-x)
-            strain = symmetric(history[i * size : (i + 1) * size], d)
-            # E is linear over the step: q = E - E_i, at a part s of tau after its beginning, is
-            # q_0 exp(-s) + (1 - exp(-s)) change / x, and 2 mu |dev q|^2 is integrated over s.
-            q = add(before, scale(-1.0, strain))
-            lost = lost + 2.0 * mu * (
-                0.5 * faded * (2.0 - faded) * _deviator_product(q, q)
-                + faded**2 / x * _deviator_product(q, change)
-                + _rise(x) * _deviator_product(change, change)
-            )
-            q = add(scale(1.0 - faded, q), scale(faded / x, change))
-            kept = kept + components(add(E, scale(-1.0, q)))
-        return (*kept, *components(E), lost)
+    @property
+    def advance(self) -> _Advance:
+        return _advance(len(self.prony))
 
     @staticmethod
     def stored(F: Tensor, history: History, params: tuple[float, ...]) -> Scalar:
-        E, d = green_lagrange(F), len(F)
-        size = component_count(d)
-        psi = _spring_energy(F, params[:2])
-        for i in range((len(params) - 2) // 2):
-            strain = symmetric(history[i * size : (i + 1) * size], d)
-            e = add(E, scale(-1.0, strain))
-            psi = psi + params[2 + 2 * i] * _deviator_product(e, e)
+        E, psi, rest = green_lagrange(F), _spring_energy(F, params[:2]), history
+        for i in range(2, len(params), 2):
+            psi = psi + stored(E, rest, params[i : i + 2])
+            rest = later(rest, E)
         return psi
 
-    @staticmethod
-    def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:
-        E, d = green_lagrange(F), len(F)
-        size = component_count(d)
-        P = _spring_stress(F, params[:2])
-        for i in range((len(params) - 2) // 2):
-            strain = symmetric(history[i * size : (i + 1) * size], d)
-            overstress = _deviator(add(E, scale(-1.0, strain)))
-            P = add(P, product(F, scale(2.0 * params[2 + 2 * i], overstress)))
-        return P
+    @property
+    def stress(self) -> _Stress:
+        return _stress(len(self.prony))
 
     @staticmethod
     def dissipated(history: History) -> Scalar:
         return history[-1]
 
 
-def _rise(x: float) -> float:
-    """Integral over s, up to x, of (1 - exp(-s))^2 / x^2."""
-    if x < 0.02:  # the differences in the formula below are lost in rounding
-        return x * (1.0 / 3.0 - x * (1.0 / 4.0 - x * (7.0 / 60.0 - x / 24.0)))
-    faded = -np.expm1(-x)
-    return float((x - faded - 0.5 * faded**2) / x**2)
+@cache
+def _advance(count: int) -> _Advance:
+    crept, others = creep(count), after(count)
+
+    def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
+        E = green_lagrange(F)
+        before = symmetric(first_components(others(history, F), F), F)
+        change = add(E, scale(-1.0, before))
+        strains, lost = crept(E, before, change, history, step, params[2:])
+        return strains + components(E) + (history[-1] + lost,)
+
+    return advance
 
 
-def _deviator(E: Tensor) -> Tensor:
-    """The components of dev E in the dimensions of E."""
-    return add(E, scale(-trace(E) / 3.0, identity(E)))
+@cache
+def _stress(count: int) -> _Stress:
+    beyond = overstress(count)
 
+    def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:
+        S = beyond(green_lagrange(F), history, params[2:])
+        return add(_spring_stress(F, params[:2]), product(F, S))
 
-def _deviator_product(A: Tensor, B: Tensor) -> Scalar:
-    """dev A : dev B of symmetric tensors in 3D, with missing components 0."""
-    return contraction(A, B) - trace(A) * trace(B) / 3.0
+    return stress
