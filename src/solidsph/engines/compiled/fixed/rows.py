@@ -164,8 +164,8 @@ class _Compressor:
         if self._stencils:
             last, values = self._stencils[-1]
             if np.array_equal(last, offsets):
-                close = _SAME * np.abs(values).max()
-                if np.abs(values - weights).max() <= close:
+                close = _SAME * np.abs(values).max(initial=0.0)
+                if np.abs(values - weights).max(initial=0.0) <= close:
                     return len(self._stencils) - 1
         # A copy, because a view would keep the whole chunk alive.
         self._stencils.append((offsets, weights.copy()))
@@ -200,6 +200,14 @@ def compressed(
         matters[pairs.self_pairs] = True
         counts = np.add.reduceat(matters, pairs.starts[:-1], dtype=np.intp)
         compressor.add(int(pairs.rows[0]), counts, pairs.columns[matters], weights[matters])
+    return compressor.rows()
+
+
+def rows_of(starts: Indices, columns: Indices, weights: Array, shortest_run: int) -> Rows:
+    """Rows of all particles at once, from the starts (n + 1,) of their pairs, columns (m,) and
+    weights (m, k)."""
+    compressor = _Compressor(weights.shape[1], "float64", shortest_run)
+    compressor.add(0, np.diff(starts), columns, np.ascontiguousarray(weights))
     return compressor.rows()
 
 

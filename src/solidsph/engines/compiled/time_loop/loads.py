@@ -10,12 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
-from numpy.typing import NDArray
 
+from solidsph.engines.compiled.fixed.partition import thread_count
 from solidsph.engines.compiled.hourglass_sweeps import HourglassArrays, HourglassSweeps, body_sweep
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function, numbers_type
 from solidsph.engines.compiled.time_loop.call_each import call_each
+from solidsph.engines.compiled.time_loop.pair_load import PairArrays, pair_arrays, pair_sweep
 from solidsph.engines.compiled.vectors import ROW, moved
 from solidsph.interfaces.compilable_terms import (
     HourglassLoad,
@@ -53,10 +54,8 @@ class PointwiseData(NamedTuple):
 class PairData(NamedTuple):
     """Forces by a formula of pairs."""
 
-    reference: Array  # (n, d) X [m]
-    starts: Indices
-    columns: NDArray[np.int32]
-    values: Array  # (m, k)
+    arrays: PairArrays
+    now: ScheduledForces  # of the current step, in the arrays
 
 
 class HourglassData(NamedTuple):
@@ -138,8 +137,11 @@ def _prepare_pairs(load: PairLoad, reference: Array, threaded: bool) -> Compiled
     d, table = reference.shape[1], load.pairs
     count, vector = table.values.shape[1], numbers_type(d)
     pull = compiled_function(load.pull, vector, vector, numbers_type(count))
-    paired = PairData(reference, table.starts, table.columns, table.values)
-    return CompiledLoad(_accounted(_paired(pull, d, count), d, threaded), lambda times: paired)
+    threads = thread_count(len(table.columns)) if threaded else 1
+    arrays = pair_arrays(table, reference, threads)
+    own = PairData(arrays, ScheduledForces(arrays.forces[None]))
+    sweep = pair_sweep(pull, d, count, threads > 1)
+    return CompiledLoad(_paired(sweep, _accounted(_scheduled(d), d, threaded)), lambda times: own)
 
 
 def _prepare_pointwise(load: PointwiseLoad, reference: Array, threaded: bool) -> CompiledLoad:
@@ -209,24 +211,14 @@ def _hourglass(each: Any, account: Any) -> Any:
 
 
 @cache
-def _paired(pull: Any, dimension: int, count: int) -> Any:
-    row = ROW[dimension]
-
+def _paired(sweep: Any, account: Any) -> Any:
     @njit
-    def fill(own, step, m, p, u, v, force):
-        X_p, u_p, v_p = row(own.reference, p), row(u, p), row(v, p)
-        force[:] = 0.0
-        for k in range(own.starts[p], own.starts[p + 1]):
-            q = own.columns[k]
-            # Differences first, so that the offset of q from p is exactly minus that of p from q.
-            apart = moved(row(own.reference, q), -1.0, X_p)
-            offset = moved(apart, 1.0, moved(row(u, q), -1.0, u_p))
-            velocity = moved(row(v, q), -1.0, v_p)
-            s = pull(offset, velocity, to_fixed_tuple(own.values[k], count))
-            for i in range(dimension):
-                force[i] += s * offset[i]
+    def apply(load, step, u, v, path, total):
+        own = load.own
+        sweep(own.arrays, u, v)
+        account(LoadData(load.particles, load.before, load.work, own.now), 0, u, v, path, total)
 
-    return fill
+    return apply
 
 
 @cache
