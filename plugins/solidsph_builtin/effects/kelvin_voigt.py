@@ -10,10 +10,11 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from solidsph.interfaces.body import Body
+from solidsph.interfaces.compilable_terms import RateStressLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.terms import Load
-from solidsph.maths.arrays import Array, Indices, Tensor
+from solidsph.maths.arrays import Array, Tensor
 from solidsph.maths.tensors import add, identity, product, scale, trace, transpose
 from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.effects._gradients import BodyGradient, in_the_reference
@@ -51,7 +52,7 @@ class KelvinVoigt(Effect):
             label=label,
             reference=model.particles.positions,
             time=self.time,
-            gradients=gradients,
+            sums=gradients,
             damping_rate=self.time * max(_highest_square(gradient) for gradient in gradients),
         )
 
@@ -68,7 +69,8 @@ def _highest_square(gradient: BodyGradient) -> float:
 
     def stiffness(flat: Array) -> Array:
         rate = gradient.gradient(roots * flat.reshape(n, d))
-        stress = _viscous_stress(body, 0.5 * (rate + rate.transpose(1, 0, 2)))
+        symmetric = 0.5 * (rate + rate.transpose(1, 0, 2))
+        stress = _viscous_stress(symmetric, body.material.lame_parameters)
         return -(roots * gradient.forces(np.array(stress))).ravel()
 
     whole = LinearOperator((n * d, n * d), matvec=stiffness, dtype=np.float64)
@@ -80,40 +82,30 @@ def _highest_square(gradient: BodyGradient) -> float:
     return float(highest[0] * (1.0 + _FOUND))
 
 
-def _viscous_stress(body: Body, rate: Tensor) -> Tensor:
-    """lambda tr(dE/dt) I + 2 mu dE/dt [Pa/s]."""
-    lam, mu = body.material.lame_parameters
-    return add(scale(lam * trace(rate), identity(rate)), scale(2.0 * mu, rate))
+def _viscous_stress(rate: Tensor, params: tuple[float, ...]) -> Tensor:
+    """lambda tr(dE/dt) I + 2 mu dE/dt, for lambda and mu, or both times a time."""
+    return add(scale(params[0] * trace(rate), identity(rate)), scale(2.0 * params[1], rate))
 
 
 @final
 @attrs.frozen(eq=False)
-class _Dashpot(Load):
+class _Dashpot(RateStressLoad):
     label: str
     reference: Array  # X (n, d)
     time: float
-    gradients: Sequence[BodyGradient]
+    sums: Sequence[BodyGradient]
     damping_rate: float  # [1/s]
+
+    def params_of(self, body: Body) -> tuple[float, ...]:
+        """lambda and mu times the retardation time [Pa s]."""
+        lam, mu = body.material.lame_parameters
+        return self.time * lam, self.time * mu
+
+    @staticmethod
+    def stress(F: Tensor, rate: Tensor, params: tuple[float, ...]) -> Tensor:
+        half = product(transpose(F), rate)
+        return product(F, _viscous_stress(scale(0.5, add(half, transpose(half))), params))
 
     @property
     def arrays(self) -> Mapping[str, int]:
-        return {f"gradient of {g.body.name}": g.matrices.bytes for g in self.gradients}
-
-    @property
-    def pair_count(self) -> int:
-        return 3 * sum(g.pair_count for g in self.gradients)  # both gradients, the divergence
-
-    @property
-    def particles(self) -> Indices:
-        return np.arange(len(self.reference))
-
-    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
-        u, forces = positions - self.reference, np.zeros_like(positions)
-        for gradient in self.gradients:
-            extent = gradient.body.extent
-            H, rate = gradient.gradient(u[extent]), gradient.gradient(velocities[extent])
-            F = add(H, identity(H))
-            half = product(transpose(F), rate)
-            S = _viscous_stress(gradient.body, scale(0.5, add(half, transpose(half))))
-            forces[extent] = gradient.forces(self.time * np.array(product(F, S)))
-        return forces
+        return {f"gradient of {g.body.name}": g.matrices.bytes for g in self.sums}

@@ -153,7 +153,7 @@ class Viscoelastic(HistoryMaterial):
 
     @property
     def advance(self) -> _Advance:
-        return _advance(len(self.prony))
+        return advance_of(len(self.prony))
 
     @staticmethod
     def stored(F: Tensor, history: History, params: tuple[float, ...]) -> Scalar:
@@ -165,7 +165,7 @@ class Viscoelastic(HistoryMaterial):
 
     @property
     def stress(self) -> _Stress:
-        return _stress(len(self.prony))
+        return stress_of(len(self.prony))
 
     @staticmethod
     def dissipated(history: History) -> Scalar:
@@ -173,7 +173,8 @@ class Viscoelastic(HistoryMaterial):
 
 
 @cache
-def _advance(count: int) -> _Advance:
+def advance_of(count: int) -> _Advance:
+    """`Viscoelastic.advance` for this number of elements."""
     crept, others = creep(count), after(count)
 
     def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
@@ -187,7 +188,8 @@ def _advance(count: int) -> _Advance:
 
 
 @cache
-def _stress(count: int) -> _Stress:
+def stress_of(count: int) -> _Stress:
+    """`Viscoelastic.stress` for this number of elements."""
     beyond = overstress(count)
 
     def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:

@@ -13,6 +13,7 @@ from solidsph.interfaces.compilable_terms import (
     LinearExtension,
     PairLoad,
     PointwiseLoad,
+    RateStressLoad,
     ScheduledConstraint,
     ScheduledLoad,
 )
@@ -24,6 +25,7 @@ _DERIVED: Mapping[type, tuple[str, ...]] = {
     LinearExtension: ("held", "impose", "return_forces", "impose_stress"),
     ScheduledLoad: ("forces", "advance"),
     PointwiseLoad: ("forces", "advance"),
+    RateStressLoad: ("particles", "forces", "advance"),
     PairLoad: ("particles", "forces", "advance"),
     HourglassLoad: ("particles", "forces", "advance"),
     PointwiseIntegrator: ("start", "advance"),

@@ -10,18 +10,20 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar, Protocol, final
 
 import attrs
 import numpy as np
 from scipy.sparse import block_diag, csr_array, kron
 
+from solidsph.interfaces.body import Body
 from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassProducts
 from solidsph.interfaces.pair_table import PairTable
 from solidsph.interfaces.plan import Operations, SumMethod
 from solidsph.interfaces.subset import Subset
 from solidsph.interfaces.terms import Constraint, GhostConstraint, Load, StressTerm
-from solidsph.maths.arrays import Array, Indices, Mask, Scalar, Vector
+from solidsph.maths.arrays import Array, Indices, Mask, Scalar, Tensor, Vector
+from solidsph.maths.tensors import add, identity
 
 
 class ScheduledConstraint(Constraint):
@@ -211,6 +213,72 @@ class PairLoad(Load):
 
     def part(self, subset: Subset) -> Load:
         return _PartOfPairs(self.label, self.pairs.part(subset), self.pull)
+
+
+class BodySums(Protocol):
+    """The sums of which the internal forces of one body consist."""
+
+    @property
+    def body(self) -> Body:
+        """The body."""
+
+    @property
+    def pair_count(self) -> int:
+        """Ordered pairs that a gradient visits."""
+
+    def gradient(self, field: Array) -> Array:
+        """Gradient (d, d, n) of a vector field (n, d) of the body's particles."""
+
+    def forces(self, stress: Array) -> Array:
+        """Forces (n, d) [N] of a first Piola-Kirchhoff stress (d, d, n) [Pa]; ghosts have none."""
+
+
+class RateStressLoad(Load):
+    """Forces of a stress that depends on the deformation and its rate."""
+
+    is_counted: ClassVar[bool] = True
+
+    @property
+    @abstractmethod
+    def reference(self) -> Array:
+        """Reference positions X, (n, d) [m]."""
+
+    @property
+    @abstractmethod
+    def sums(self) -> Sequence[BodySums]:
+        """Gradient and divergence of every body, in order."""
+
+    @abstractmethod
+    def params_of(self, body: Body) -> tuple[float, ...]:
+        """Numbers of a body that the formula uses, the same count for every body."""
+
+    @staticmethod
+    @abstractmethod
+    def stress(F: Tensor, rate: Tensor, params: tuple[float, ...]) -> Tensor:
+        """First Piola-Kirchhoff stress [Pa], pointwise, from F and dF/dt [1/s]."""
+
+    @property
+    def particles(self) -> Indices:
+        return np.arange(len(self.reference))
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        u, forces = positions - self.reference, np.zeros_like(positions)
+        for sums in self.sums:
+            extent = sums.body.extent
+            H, rate = sums.gradient(u[extent]), sums.gradient(velocities[extent])
+            P = self.stress(add(H, identity(H)), rate, self.params_of(sums.body))
+            forces[extent] = sums.forces(np.array(P))
+        return forces
+
+    @property
+    def pair_count(self) -> int:
+        return 3 * sum(sums.pair_count for sums in self.sums)  # both gradients, the divergence
+
+    def operations(self, dimension: int, *, compiled: bool) -> Sequence[Operations]:
+        method = SumMethod.STENCILS if compiled else SumMethod.PRODUCTS
+        n, kept = len(self.reference), sum(self.arrays.values())
+        # One pass of these counts as gathering and scattering.
+        return (Operations(method, self.pair_count // 2, n, kept, kept),)
 
 
 class HourglassLoad(Load):

@@ -54,6 +54,7 @@ class CompilationUnit(Enum):
     STEPS = "the time loop"
     LOAD = "a load in the time loop"
     PAIR_LOAD = "forces of pairs in the time loop"
+    RATE_LOAD = "forces of a stress by the rate of deformation in the time loop"
     HOURGLASS_LOAD = "hourglass forces in the time loop"
     SWEEPS = "hourglass forces outside of it"
     EXTENSION = "ghosts that follow in the time loop"

@@ -25,7 +25,7 @@ from solidsph.maths.tensors import (
     trace,
     transpose,
 )
-from solidsph_builtin.materials.viscoelastic import Viscoelastic
+from solidsph_builtin.materials.viscoelastic import Viscoelastic, advance_of, stress_of
 
 LAM, MU = 2.0e6, 1.0e6
 
@@ -168,6 +168,10 @@ class StressOfTheVirgin(GoodMemory):
         return Viscoelastic.first_piola(F, params)
 
 
+def _elements(params: tuple[float, ...]) -> int:
+    return (len(params) - 2) // 2
+
+
 class GivesBack(GoodMemory):
     @staticmethod
     def dissipated(history: History) -> Scalar:
@@ -185,13 +189,13 @@ class RemembersDirections(GoodMemory):
 
     @staticmethod
     def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
-        return Viscoelastic.advance(transpose(F), history, step, params)
+        return advance_of(_elements(params))(transpose(F), history, step, params)
 
 
 class TurnedMemory(GoodMemory):
     @staticmethod
     def stress(F: Tensor, history: History, params: tuple[float, ...]) -> Tensor:
-        return transpose(Viscoelastic.stress(F, history, params))
+        return transpose(stress_of(_elements(params))(F, history, params))
 
 
 class FlatMemory(GoodMemory):
@@ -199,7 +203,7 @@ class FlatMemory(GoodMemory):
 
     @staticmethod
     def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
-        return Viscoelastic.advance(F, history, step * 3.0 / len(F), params)
+        return advance_of(_elements(params))(F, history, step * 3.0 / len(F), params)
 
 
 class Hasty(GoodMemory):
@@ -210,7 +214,8 @@ class MemoryOfArraysOnly(GoodMemory):
     @staticmethod
     def advance(F: Tensor, history: History, step: float, params: tuple[float, ...]) -> History:
         return tuple(
-            one * np.ones(F.shape[2]) for one in Viscoelastic.advance(F, history, step, params)
+            one * np.ones(F.shape[2])
+            for one in advance_of(_elements(params))(F, history, step, params)
         )
 
 

@@ -50,6 +50,19 @@ def compiled_function(function: Callable[..., Any], *arguments: Any) -> Any:
     return call
 
 
+def compiled_rate_flux(formulation: Formulation, stress: Any, dimension: int, count: int) -> Any:
+    """Compiled (H, dH/dt, params) -> flux(F(H), stress(F, dF/dt, params)) at one point, with
+    `count` params.
+
+    Raises:
+        NotCompilableError: one of the functions cannot be compiled.
+    """
+    law = _rate_flux(formulation.deformation_gradient, stress, formulation.flux)
+    tensor = tensor_type(dimension)
+    _try(law, tensor, tensor, numbers_type(count))
+    return law
+
+
 def numbers_type(count: int) -> Any:
     """The compiler's type of `params`, and of a vector."""
     return types.UniTuple(types.float64, count)
@@ -102,6 +115,18 @@ def _flux(deformation_gradient: Any, first_piola: Any, flux: Any) -> Any:
     def law(H: Tensor, params: tuple[float, ...]) -> Tensor:
         F = F_of(H)
         return numbers(T_of(F, P_of(F, params)))
+
+    return law
+
+
+@cache
+def _rate_flux(deformation_gradient: Any, stress: Any, flux: Any) -> Any:
+    F_of, P_of, T_of = (registered(f) for f in (deformation_gradient, stress, flux))
+
+    @njit(error_model="numpy")
+    def law(H: Tensor, rate: Tensor, params: tuple[float, ...]) -> Tensor:
+        F = F_of(H)
+        return numbers(T_of(F, P_of(F, rate, params)))
 
     return law
 

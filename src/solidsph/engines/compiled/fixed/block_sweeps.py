@@ -88,6 +88,31 @@ def history_sweep(dimension: int, dtype: str, law: Any, count: int) -> Any:
 
 
 @cache
+def rate_sweep(dimension: int, dtype: str, law: Any) -> Any:
+    """Loop (rows, first, last, u, v, params, factors, f, shift): f += from displacements u and
+    velocities v, for a law (H, dH/dt, params) -> T."""
+    d, D = dimension, STRIDE[dimension]
+    gather, scatter, tensor, margin, plane = block_loops(dimension, dtype)
+
+    @njit
+    def forces(rows, first, last, u, v, params, factors, f, shift):
+        scratch, rates = np.zeros(d * plane, u.dtype), np.zeros(d * plane, u.dtype)
+        for block in range(first, last):
+            gather(rows, block, u, scratch)
+            gather(rows, block, v, rates)
+            start, count = rows.blocks[block, 0], rows.blocks[block, 1]
+            for slot in range(count):
+                T = law(tensor(scratch, slot), tensor(rates, slot), params)
+                at = (margin + slot) * D
+                for i in range(d):
+                    for k in range(d):
+                        scratch[k * plane + at + i] = T[i][k] * factors[start + slot]
+            scatter(rows, block, scratch, f, shift)
+
+    return forces
+
+
+@cache
 def spread_sweep(dimension: int, dtype: str) -> Any:
     """Loop (rows, first, last, stress (d, d, n), factors, f, shift): f += from stress."""
     d, D = dimension, STRIDE[dimension]

@@ -20,6 +20,7 @@ from solidsph.engines.compiled.constants import STRIDE, WORTH_A_THREAD
 from solidsph.engines.compiled.fixed.block_sweeps import (
     block_sweeps,
     history_sweep,
+    rate_sweep,
     spread_sweep,
 )
 from solidsph.engines.compiled.fixed.blocks import group
@@ -160,6 +161,26 @@ def history_pass(dimension: int, dtype: str, law: Any, count: int, threaded: boo
             cleared(table[t], buffers)
             first, last, shift = table[t, 0], table[t, 1], table[t, 4]
             sweep(rows, first, last, u, params, factors, buffers, shift, history, step)
+        total(table, buffers, out)
+
+    return forces
+
+
+@cache
+def rate_pass(dimension: int, dtype: str, law: Any, threaded: bool) -> Any:
+    """Compiled pass (table, rows, displacements, velocities, u, v, params, factors, buffers,
+    forces) for a compiled law (H, dH/dt, params) -> T."""
+    place, cleared, total = _fields(dimension, dtype, threaded)
+    sweep = rate_sweep(dimension, dtype, law)
+
+    @njit(parallel=threaded)
+    def forces(table, rows, displacements, velocities, u, v, params, factors, buffers, out):
+        place(len(table), displacements, u)
+        place(len(table), velocities, v)
+        for t in prange(len(table)):
+            cleared(table[t], buffers)
+            first, last, shift = table[t, 0], table[t, 1], table[t, 4]
+            sweep(rows, first, last, u, v, params, factors, buffers, shift)
         total(table, buffers, out)
 
     return forces

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
+from numpy.typing import NDArray
 
-from solidsph.engines.compiled.fixed.partition import thread_count
+from solidsph.engines.compiled.fixed.partition import rate_pass, thread_count
+from solidsph.engines.compiled.fixed.rows import Rows
 from solidsph.engines.compiled.hourglass_sweeps import HourglassArrays, HourglassSweeps, body_sweep
 from solidsph.engines.compiled.jit import njit
-from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_function, numbers_type
+from solidsph.engines.compiled.pointwise import (
+    NotCompilableError,
+    compiled_function,
+    compiled_rate_flux,
+    numbers_type,
+)
 from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.pair_load import PairArrays, pair_arrays, pair_sweep
 from solidsph.engines.compiled.vectors import ROW, moved
@@ -22,11 +29,15 @@ from solidsph.interfaces.compilable_terms import (
     HourglassLoad,
     PairLoad,
     PointwiseLoad,
+    RateStressLoad,
     ScheduledLoad,
 )
 from solidsph.interfaces.plan import CompilationUnit
 from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array, Indices
+
+if TYPE_CHECKING:
+    from solidsph.engines.compiled.fixed.body import ReferenceBody
 
 
 class LoadData(NamedTuple):
@@ -65,6 +76,39 @@ class HourglassData(NamedTuple):
     now: ScheduledForces  # of the current step
 
 
+class RateBody(NamedTuple):
+    """Arrays for the stress of one body."""
+
+    extent: tuple[int, int]  # its first particle and the end of its particles
+    table: Indices  # partition among threads
+    rows: Rows
+    u: NDArray[Any]  # flat
+    v: NDArray[Any]  # flat
+    params: tuple[float, ...]
+    factors: NDArray[Any]
+    buffers: NDArray[Any]
+
+
+class RateData(NamedTuple):
+    """Forces of a stress that depends on the rate of deformation."""
+
+    bodies: tuple[RateBody, ...]
+    now: ScheduledForces  # of the current step
+
+
+class Setting(NamedTuple):
+    """What loads are prepared for."""
+
+    reference: Array  # (n, d) X of all particles [m]
+    bodies: Sequence[ReferenceBody]
+    threaded: bool  # whether several threads share loops over particles
+
+    @property
+    def dimension(self) -> int:
+        """d."""
+        return int(self.reference.shape[1])
+
+
 class Call(NamedTuple):
     """A load that is called at every step, and where its forces go."""
 
@@ -84,7 +128,7 @@ class LoadKind(NamedTuple):
     """How loads of one kind are compiled into the loop."""
 
     kind: Any  # a class of loads
-    prepare: Callable[[Any, Array, bool], CompiledLoad]  # (load, X (n, d), threaded)
+    prepare: Callable[[Any, Setting], CompiledLoad]
     unit: CompilationUnit
     formula: bool = True  # True if each class of the kind is compiled separately
 
@@ -94,69 +138,98 @@ def kind_of(load: Load) -> LoadKind | None:
     return next((known for known in LOAD_KINDS if isinstance(load, known.kind)), None)
 
 
-def compiled_load(load: Load, reference: Array, threaded: bool) -> CompiledLoad:
-    """A load on particles with reference positions (n, d) [m], prepared.
+def compiled_load(load: Load, setting: Setting) -> CompiledLoad:
+    """A load, prepared.
 
     One of no known kind, or with a formula that does not compile, is called.
     """
     kind = kind_of(load)
     if kind is not None:
         with suppress(NotCompilableError):
-            return kind.prepare(load, reference, threaded)
-    return _called(load, reference.shape[1], threaded)
+            return kind.prepare(load, setting)
+    now = ScheduledForces(np.zeros((1, len(load.particles), setting.dimension)))
+    return CompiledLoad(_given(setting), lambda times: now, Call(load, now.table[0]))
 
 
-def _called(load: Load, dimension: int, threaded: bool) -> CompiledLoad:
-    now = ScheduledForces(np.zeros((1, len(load.particles), dimension)))
-    add = _accounted(_scheduled(dimension), dimension, threaded)
-    return CompiledLoad(add, lambda times: now, Call(load, now.table[0]))
+def _given(setting: Setting) -> Any:
+    """`CompiledLoad.apply` for forces in a table."""
+    return _accounted(_scheduled(setting.dimension), setting.dimension, setting.threaded)
 
 
-def _prepare_scheduled(load: ScheduledLoad, reference: Array, threaded: bool) -> CompiledLoad:
-    d = reference.shape[1]
+def _prepare_scheduled(load: ScheduledLoad, setting: Setting) -> CompiledLoad:
     return CompiledLoad(
-        _accounted(_scheduled(d), d, threaded),
+        _given(setting),
         lambda times: ScheduledForces(np.ascontiguousarray(load.schedule(times))),
     )
 
 
-def _prepare_hourglass(load: HourglassLoad, reference: Array, threaded: bool) -> CompiledLoad:
-    d = reference.shape[1]
+def _prepare_hourglass(load: HourglassLoad, setting: Setting) -> CompiledLoad:
     sweeps = [
         operator if isinstance(operator, HourglassSweeps) else HourglassSweeps.of(operator.pairs)
         for operator in load.operators
     ]
     own = HourglassData(
-        tuple(sweep.arrays for sweep in sweeps), ScheduledForces(np.zeros((1, *reference.shape)))
+        tuple(sweep.arrays for sweep in sweeps),
+        ScheduledForces(np.zeros((1, *setting.reference.shape))),
     )
     each = call_each(tuple(body_sweep(sweep.sweep) for sweep in sweeps))
-    return CompiledLoad(_hourglass(each, _accounted(_scheduled(d), d, threaded)), lambda times: own)
+    return CompiledLoad(_hourglass(each, _given(setting)), lambda times: own)
 
 
-def _prepare_pairs(load: PairLoad, reference: Array, threaded: bool) -> CompiledLoad:
-    d, table = reference.shape[1], load.pairs
+def _prepare_rate_stress(load: RateStressLoad, setting: Setting) -> CompiledLoad:
+    d, dtype = setting.dimension, setting.bodies[0].u.dtype.name
+    passes, bodies = [], []
+    for part in setting.bodies:
+        if not part.fused:
+            raise NotCompilableError("a divergence that is not the adjoint of the gradient")
+        params, own = load.params_of(part.body), part.gradient_partition
+        law = compiled_rate_flux(part.body.formulation, load.stress, d, len(params))
+        passes.append(_rate_body(rate_pass(d, dtype, law, own.threaded)))
+        extent = part.body.extent.start, part.body.extent.stop
+        # Its flat displacements and buffers are free once the internal forces are there.
+        rates = np.zeros_like(part.u)
+        bodies.append(
+            RateBody(
+                extent,
+                own.table,
+                part.gradient,
+                part.u,
+                rates,
+                params,
+                part.factors,
+                own.buffers,
+            )
+        )
+    now = ScheduledForces(np.zeros((1, *setting.reference.shape)))
+    data = RateData(tuple(bodies), now)
+    return CompiledLoad(_rate_stress(call_each(tuple(passes)), _given(setting)), lambda times: data)
+
+
+def _prepare_pairs(load: PairLoad, setting: Setting) -> CompiledLoad:
+    d, table = setting.dimension, load.pairs
     count, vector = table.values.shape[1], numbers_type(d)
     pull = compiled_function(load.pull, vector, vector, numbers_type(count))
-    threads = thread_count(len(table.columns)) if threaded else 1
-    arrays = pair_arrays(table, reference, threads)
+    threads = thread_count(len(table.columns)) if setting.threaded else 1
+    arrays = pair_arrays(table, setting.reference, threads)
     own = PairData(arrays, ScheduledForces(arrays.forces[None]))
     sweep = pair_sweep(pull, d, count, threads > 1)
-    return CompiledLoad(_paired(sweep, _accounted(_scheduled(d), d, threaded)), lambda times: own)
+    return CompiledLoad(_paired(sweep, _given(setting)), lambda times: own)
 
 
-def _prepare_pointwise(load: PointwiseLoad, reference: Array, threaded: bool) -> CompiledLoad:
-    d, values = reference.shape[1], np.ascontiguousarray(load.values)
+def _prepare_pointwise(load: PointwiseLoad, setting: Setting) -> CompiledLoad:
+    d, values = setting.dimension, np.ascontiguousarray(load.values)
     count, vector = values.shape[1], numbers_type(d)
     force = compiled_function(load.force, vector, vector, numbers_type(count))
-    pointwise = PointwiseData(reference, values)
+    pointwise = PointwiseData(setting.reference, values)
     return CompiledLoad(
-        _accounted(_pointwise(force, d, count), d, threaded), lambda times: pointwise
+        _accounted(_pointwise(force, d, count), d, setting.threaded), lambda times: pointwise
     )
 
 
 LOAD_KINDS = (
     LoadKind(ScheduledLoad, _prepare_scheduled, CompilationUnit.LOAD, formula=False),
     LoadKind(HourglassLoad, _prepare_hourglass, CompilationUnit.HOURGLASS_LOAD),
+    LoadKind(RateStressLoad, _prepare_rate_stress, CompilationUnit.RATE_LOAD),
     LoadKind(PairLoad, _prepare_pairs, CompilationUnit.PAIR_LOAD),
     LoadKind(PointwiseLoad, _prepare_pointwise, CompilationUnit.LOAD),
 )
@@ -205,6 +278,38 @@ def _hourglass(each: Any, account: Any) -> Any:
     def apply(load, step, u, v, path, total):
         own = load.own
         each(own.bodies, u, own.now.table[0])
+        account(LoadData(load.particles, load.before, load.work, own.now), 0, u, v, path, total)
+
+    return apply
+
+
+@cache
+def _rate_body(forces: Any) -> Any:
+    @njit
+    def of_body(body, u, v, total):
+        a, b = body.extent
+        forces(
+            body.table,
+            body.rows,
+            u[a:b],
+            v[a:b],
+            body.u,
+            body.v,
+            body.params,
+            body.factors,
+            body.buffers,
+            total[a:b],
+        )
+
+    return of_body
+
+
+@cache
+def _rate_stress(each: Any, account: Any) -> Any:
+    @njit
+    def apply(load, step, u, v, path, total):
+        own = load.own
+        each(own.bodies, u, v, own.now.table[0])
         account(LoadData(load.particles, load.before, load.work, own.now), 0, u, v, path, total)
 
     return apply

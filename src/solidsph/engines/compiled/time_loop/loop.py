@@ -19,7 +19,7 @@ from solidsph.engines.compiled.time_loop.accounts import Accounts
 from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.constraints import ConstraintCalls, constraint_calls
 from solidsph.engines.compiled.time_loop.internal_forces import Internal, internal_forces
-from solidsph.engines.compiled.time_loop.loads import Call, CompiledLoad, compiled_load
+from solidsph.engines.compiled.time_loop.loads import Call, CompiledLoad, Setting, compiled_load
 from solidsph.interfaces.compilable_terms import LinearExtension, ScheduledConstraint, ScheduledLoad
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
@@ -101,7 +101,8 @@ def compiled_loop(
     for body in bodies:
         body.gradient_partition.check()
     internal = internal_forces(bodies, conditions, equation.step_size)
-    loads = [compiled_load(load, particles.positions, threads > 1) for load in equation.loads]
+    setting = Setting(particles.positions, bodies, threads > 1)
+    loads = [compiled_load(load, setting) for load in equation.loads]
     calls = [constraint_calls(motion, d) for motion in equation.constraints]
     by_call = [tuple(call[k] for call in calls) for k in range(len(ConstraintCalls._fields))]
     steps = _steps(
