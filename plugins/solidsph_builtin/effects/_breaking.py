@@ -9,21 +9,25 @@ import attrs
 import numpy as np
 
 from solidsph.engines.history import HistoryForces
-from solidsph.engines.matrix import MatrixForces, Operators, assembled, fixed_forces
+from solidsph.engines.matrix import Operators, assembled, fixed_forces
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import InternalForces, StressFields
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.law import Law, memory_name
 from solidsph.interfaces.memory import Memory
-from solidsph.interfaces.plan import Operations, array_bytes
+from solidsph.interfaces.plan import Compilation, Operations, array_bytes
 from solidsph.interfaces.terms import StressTerm
-from solidsph.maths.arrays import Array, Mask
+from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.neighbours import Pairs
 from solidsph_builtin.effects._gradients import real_pairs
 
 # Smallest singular value of the moment, which is I in a full neighbourhood and half of that at a
 # flat surface, below which the remaining neighbours do not determine a gradient.
 _LEAST_MOMENT = 0.25
+
+# Bonds that may fail soon have less than this part of their critical stretch left, of at most one.
+# They are searched for anew when particles have moved by half of it.
+_AHEAD = 0.3
 
 
 @attrs.frozen(eq=False)
@@ -60,16 +64,24 @@ class Bonds:
         """Flags (m,) of intact bonds, all 1; a bond that has failed has 0."""
         return np.ones(self.pairs.count)
 
-    def after(self, flags: Array, displacements: Array) -> Array:
-        """Flags at displacements (n, d) [m]: the same array if no bond has failed since."""
-        u = displacements
-        p, q = self.pairs.rows, self.pairs.columns
-        now = self.pairs.offsets + u[q] - u[p]
-        limit = (1.0 + self.critical_stretch) * self.pairs.distances
-        fails = self.may_fail & (flags > 0.0) & (np.einsum("mi,mi->m", now, now) > limit**2)
-        if not fails.any():
+    def left(self, displacements: Array, chosen: Indices | slice) -> Array:
+        """By how much the chosen pairs may still grow at displacements (n, d) [m], (k,) [m]."""
+        u, pairs = displacements, self.pairs
+        now = pairs.offsets[chosen] + u[pairs.columns[chosen]] - u[pairs.rows[chosen]]
+        limit = (1.0 + self.critical_stretch) * pairs.distances[chosen]
+        return np.asarray(limit - np.sqrt(np.sum(now**2, axis=1)))
+
+    def after(self, flags: Array, displacements: Array, near: Indices) -> Array:
+        """Flags at displacements (n, d) [m]: the same array if no bond has failed since.
+
+        Only bonds among the pairs `near` (k,) may have.
+        """
+        fails = near[(flags[near] > 0.0) & (self.left(displacements, near) < 0.0)]
+        if not fails.size:
             return flags
-        left = np.where(fails, 0.0, flags)
+        p, q = self.pairs.rows, self.pairs.columns
+        left = flags.copy()
+        left[fails] = 0.0
         while True:
             alone = self._alone(left)
             torn = (left > 0.0) & self.may_fail & (alone[p] | alone[q])
@@ -79,12 +91,15 @@ class Bonds:
 
     def _alone(self, flags: Array) -> Mask:
         """True for particles (n,) whose remaining bonds do not determine a gradient."""
-        weights = self.kernel_gradients * flags[:, None]
-        weights *= self.body.particles.cells[self.pairs.columns, None]
-        moments = self.pairs.row_sums(self.pairs.offsets[:, :, None] * weights[:, None, :])
-        touched = self.pairs.row_sums(flags) < np.diff(self.pairs.starts)
+        alone = self.pairs.row_sums(flags) < np.diff(self.pairs.starts)
+        touched = np.flatnonzero(alone)
+        where, rows = self.pairs.chosen(touched)
+        weights = self.kernel_gradients[where] * flags[where, None]
+        weights *= self.body.particles.cells[rows.columns, None]
+        moments = rows.row_sums(rows.offsets[:, :, None] * weights[:, None, :])
         least = np.linalg.svd(moments, compute_uv=False)[:, -1]
-        return np.asarray(touched & (least < _LEAST_MOMENT))
+        alone[touched] = least < _LEAST_MOMENT
+        return alone
 
     def damage(self, flags: Array) -> Array:
         """Fraction of the bonds of each particle that have failed, (n,) [-]."""
@@ -102,6 +117,34 @@ class Bonds:
         gradient = np.where(alone[:, None], 0.0, gradient)
         force = body.formulation.divergence.weights(pairs, gradient, body.particles.volumes)
         return assembled(pairs, gradient, force)
+
+
+@final
+@attrs.define(eq=False)
+class Watch:
+    """The pairs of bonds that are about to fail: a cache, which does not influence results."""
+
+    bonds: Bonds
+    _found: tuple[Array, Indices] | None = None  # displacements of the search, and what it found
+
+    def after(self, flags: Array, displacements: Array) -> Array:
+        """`Bonds.after`, of those that may have failed."""
+        return self.bonds.after(flags, displacements, self._near(displacements))
+
+    def _near(self, displacements: Array) -> Indices:
+        """All pairs that may be beyond their critical stretch at displacements (n, d) [m]."""
+        stretch = min(1.0, self.bonds.critical_stretch)
+        margin = _AHEAD * stretch * float(self.bonds.body.particles.spacings.min())
+        if self._found is not None:
+            moved = displacements - self._found[0]
+            moved -= moved.mean(axis=0)  # no pair grows where all move alike
+            # Both particles of a pair may have moved apart.
+            if 4.0 * np.max(np.sum(moved**2, axis=1)) < margin**2:
+                return self._found[1]
+        close = self.bonds.left(displacements, slice(None)) < 1.001 * margin
+        found = np.flatnonzero(self.bonds.may_fail & close)
+        self._found = displacements.copy(), found
+        return found
 
 
 @final
@@ -124,16 +167,23 @@ class BreakingForces(InternalForces):
     """Internal forces of the remaining bonds.
 
     The flags of bonds and the strain energy that failures have released are in `State.memory`. The
-    matrices are cached until a bond fails.
+    forces are those of the engine until a bond fails, and then products of matrices, which are
+    cached until another one does.
     """
 
     advances_histories: ClassVar[bool] = True
 
+    whole: InternalForces  # while all bonds are intact
     bonds: Sequence[Bonds]
     laws: Sequence[Law]
     conditions: Sequence[StressTerm]
     _flags: tuple[Array, ...] = ()
-    _sums: MatrixForces | None = None
+    _made: InternalForces | None = None  # with these flags
+    _watches: Sequence[Watch] = attrs.field(init=False)
+
+    @_watches.default
+    def _one_a_body(self) -> Sequence[Watch]:
+        return [Watch(bonds) for bonds in self.bonds]
 
     @property
     def pair_count(self) -> int:
@@ -141,11 +191,14 @@ class BreakingForces(InternalForces):
 
     @property
     def operations(self) -> Sequence[Operations]:
-        return self._intact.sums.operations
+        return self.whole.operations
 
     @property
-    def _intact(self) -> HistoryForces:
-        return self._of(tuple(bonds.intact() for bonds in self.bonds))
+    def compilations(self) -> frozenset[Compilation]:
+        return self.whole.compilations
+
+    def note(self, compilations: frozenset[Compilation]) -> None:
+        self.whole.note(compilations)
 
     def forces(self, time: float, displacements: Array) -> Array:
         return self.advance(time, 0.0, displacements, {})[0]
@@ -157,8 +210,8 @@ class BreakingForces(InternalForces):
         kept = {bonds.name: own for bonds, own in zip(self.bonds, flags, strict=True)}
         if step > 0.0:
             after = tuple(
-                bonds.after(own, displacements[bonds.body.extent])
-                for bonds, own in zip(self.bonds, flags, strict=True)
+                watch.after(own, displacements[watch.bonds.body.extent])
+                for watch, own in zip(self._watches, flags, strict=True)
             )
             if any(new is not old for new, old in zip(after, flags, strict=True)):
                 energies = [
@@ -211,10 +264,10 @@ class BreakingForces(InternalForces):
         return found
 
     def gradients(self, displacements: Array) -> Array:
-        return self._intact.gradients(displacements)
+        return self.whole.gradients(displacements)
 
     def spread(self, displacements: Array, stress: Array) -> Array:
-        return self._intact.spread(displacements, stress)
+        return self.whole.spread(displacements, stress)
 
     def _remembered(self, memory: Memory) -> tuple[Array, ...]:
         return tuple(
@@ -225,20 +278,25 @@ class BreakingForces(InternalForces):
         """Strain energy released so far, (n,) [J/m^3]."""
         return memory.get(_RELEASED, np.zeros(len(displacements)))
 
-    def _of(self, flags: tuple[Array, ...]) -> HistoryForces:
+    def _of(self, flags: tuple[Array, ...]) -> InternalForces:
         """The forces of bonds with these flags."""
         same = len(flags) == len(self._flags) and all(
             new is old for new, old in zip(flags, self._flags, strict=True)
         )
-        if self._sums is None or not same:
-            made = [bonds.operators(own) for bonds, own in zip(self.bonds, flags, strict=True)]
-            self._sums = fixed_forces([bonds.body for bonds in self.bonds], made, self.conditions)
+        if self._made is None or not same:
+            self._made = self.whole if all(map(np.all, flags)) else self._without(flags)
             self._flags = flags
+        return self._made
+
+    def _without(self, flags: tuple[Array, ...]) -> HistoryForces:
+        """The forces without the bonds that have failed."""
+        made = [bonds.operators(own) for bonds, own in zip(self.bonds, flags, strict=True)]
         laws = [
             _Damaged(law.body, law, 1.0 - bonds.damage(own))
             for law, bonds, own in zip(self.laws, self.bonds, flags, strict=True)
         ]
-        return HistoryForces(self._sums, laws, self.conditions)
+        sums = fixed_forces([bonds.body for bonds in self.bonds], made, self.conditions)
+        return HistoryForces(sums, laws, self.conditions)
 
 
 _RELEASED = "energy released by bonds"

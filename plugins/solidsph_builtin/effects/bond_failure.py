@@ -115,7 +115,7 @@ class _Cracks(FieldTerm, Load, ForcesModifier):
                 "critical_stretch, and places by `where`"
             )
         laws = [ArrayLaw(bonds.body) for bonds in self.bonds]
-        return BreakingForces(self.bonds, laws, stress_terms)
+        return BreakingForces(internal, self.bonds, laws, stress_terms)
 
     @property
     def arrays(self) -> Mapping[str, int]:

@@ -14,7 +14,9 @@ from solidsph.maths.arrays import Array
 from solidsph.results import checkpointer
 from solidsph.run.energy import DISSIPATED, KINETIC, RESIDUAL, STRAIN
 from solidsph.scene.scene_builder import SceneBuilder
+from solidsph_builtin.effects._breaking import Bonds, Watch
 from tests.helpers.resuming import OFTEN, Stop
+from tests.helpers.scenes import box
 
 DENSITY, E, NU = 1000.0, 1e6, 0.3
 C = np.sqrt(E * (1 - NU) / ((1 + NU) * (1 - 2 * NU)) / DENSITY)
@@ -187,3 +189,25 @@ def test_what_failed_bonds_do_not_fit_is_refused() -> None:
         sheet().effect("hourglass-control").build()
     with pytest.raises(BuildError, match="named twice"):
         sheet().effect("bond-failure", critical_stretch=0.1).build()
+
+
+@pytest.mark.parametrize("stretch", [1e-3, 0.2, 1.5])
+def test_watching_the_bonds_about_to_fail_misses_none(stretch: float) -> None:
+    """On any way, back and forth, and at another state at once."""
+    (body,) = box(2, 9).scheme("corrected").build().model.bodies
+    bonds = Bonds.of(body, stretch, np.ones(body.particles.count, dtype=np.bool_))
+    watch, every = Watch(bonds), np.flatnonzero(bonds.may_fail)
+    rng = np.random.default_rng(0)
+    X = body.particles.positions
+    failed = False
+    for _ in range(3):
+        flags = bonds.intact()
+        direction = rng.normal(size=(2, 2))
+        for part in np.cumsum(rng.normal(0.02, 0.05, 60)):
+            u = stretch * part * (X @ direction.T + 0.02 * rng.normal(size=X.shape)) + 30.0 * part
+            expected = bonds.after(flags, u, every)
+            found = watch.after(flags, u)
+            assert np.array_equal(found, expected)
+            failed |= not expected.all()
+            flags = expected
+    assert failed
