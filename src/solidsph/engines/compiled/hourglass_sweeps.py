@@ -188,10 +188,11 @@ def hourglass_sweep(dimension: int, threaded: bool) -> Any:
 
 @cache
 def body_sweep(sweep: Any) -> Any:
-    """Compiled (arrays, u (n, d), forces (n, d)): `sweep` of one body among all particles."""
+    """Compiled (arrays, u (n, d), v (n, d), forces (n, d)): `sweep` of one body among all
+    particles, which velocities v do not change."""
 
     @njit
-    def own(arrays, u, forces):
+    def own(arrays, u, v, forces):
         some = slice(arrays.extent[0], arrays.extent[1])
         sweep(arrays, u[some], forces[some])
 

@@ -173,7 +173,7 @@ def _prepare_hourglass(load: HourglassLoad, setting: Setting) -> CompiledLoad:
         ScheduledForces(np.zeros((1, *setting.reference.shape))),
     )
     each = call_each(tuple(body_sweep(sweep.sweep) for sweep in sweeps))
-    return CompiledLoad(_hourglass(each, _given(setting)), lambda times: own)
+    return CompiledLoad(_by_bodies(each, _given(setting)), lambda times: own)
 
 
 def _prepare_rate_stress(load: RateStressLoad, setting: Setting) -> CompiledLoad:
@@ -202,7 +202,7 @@ def _prepare_rate_stress(load: RateStressLoad, setting: Setting) -> CompiledLoad
         )
     now = ScheduledForces(np.zeros((1, *setting.reference.shape)))
     data = RateData(tuple(bodies), now)
-    return CompiledLoad(_rate_stress(call_each(tuple(passes)), _given(setting)), lambda times: data)
+    return CompiledLoad(_by_bodies(call_each(tuple(passes)), _given(setting)), lambda times: data)
 
 
 def _prepare_pairs(load: PairLoad, setting: Setting) -> CompiledLoad:
@@ -273,17 +273,6 @@ def _scheduled(dimension: int) -> Any:
 
 
 @cache
-def _hourglass(each: Any, account: Any) -> Any:
-    @njit
-    def apply(load, step, u, v, path, total):
-        own = load.own
-        each(own.bodies, u, own.now.table[0])
-        account(LoadData(load.particles, load.before, load.work, own.now), 0, u, v, path, total)
-
-    return apply
-
-
-@cache
 def _rate_body(forces: Any) -> Any:
     @njit
     def of_body(body, u, v, total):
@@ -305,7 +294,7 @@ def _rate_body(forces: Any) -> Any:
 
 
 @cache
-def _rate_stress(each: Any, account: Any) -> Any:
+def _by_bodies(each: Any, account: Any) -> Any:
     @njit
     def apply(load, step, u, v, path, total):
         own = load.own
