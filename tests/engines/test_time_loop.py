@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numba.core.config import NUMBA_NUM_THREADS
 
-from solidsph import DivergedError, Simulation
+from solidsph import BuildError, DivergedError, Simulation
 from solidsph.engines.compiled.fixed import partition
 from solidsph.engines.compiled.time_loop.loop import CompiledLoop
 from solidsph.interfaces.compilable_terms import PointwiseLoad
@@ -367,3 +367,37 @@ def test_a_formula_of_one_s_own_goes_into_the_loop() -> None:
 
 def test_what_declares_nothing_is_called() -> None:
     assert_agree(box(1, 24).effect(Custom(Opaque)))
+
+
+@attrs.frozen(eq=False)
+class Overflowing(Opaque):
+    """A force that is infinite once the run is on its way."""
+
+    on_its_way: list[bool] = attrs.field(factory=list)
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        return np.exp(1e3 * len(self.on_its_way) + 0.0 * velocities[self.particles])
+
+
+@attrs.frozen(eq=False)
+class Lost(Overflowing):
+    """A force that cannot be formed once the run is on its way."""
+
+    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
+        if self.on_its_way:
+            raise BuildError(["the neighbours are lost"])
+        return super().forces(time, positions, velocities)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize(
+    ("kind", "cause"), [(Overflowing, "not finite"), (Lost, "the neighbours are lost")]
+)
+def test_a_called_load_that_fails_ends_the_stretch(kind: type[Overflowing], cause: str) -> None:
+    """Without a warning of NumPy's, and as step by step."""
+    simulation = box(1, 24).effect(Custom(kind)).engine("compiled").build()
+    state, (load,) = simulation.start(), simulation.dynamics.loads
+    assert isinstance(load, kind)
+    load.on_its_way.append(True)
+    with pytest.raises(StepError, match=cause):
+        simulation.time_loop().advance(state, 10)

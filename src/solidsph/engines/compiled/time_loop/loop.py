@@ -20,6 +20,7 @@ from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.constraints import ConstraintCalls, constraint_calls
 from solidsph.engines.compiled.time_loop.internal_forces import Internal, internal_forces
 from solidsph.engines.compiled.time_loop.loads import Call, CompiledLoad, Setting, compiled_load
+from solidsph.errors import BuildError
 from solidsph.interfaces.compilable_terms import LinearExtension, ScheduledConstraint, ScheduledLoad
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
@@ -176,7 +177,12 @@ class CompiledLoop(TimeLoop):
             motions = accounts.motions(times)
             data = equation.masses, inverse_masses, self.internal.data, loads, motions
             if self._calls:
-                carried_out, memory = self._by_calls(times, moving, data, memory)
+                try:
+                    # Overflow and invalid values show in the accelerations.
+                    with np.errstate(all="ignore"):
+                        carried_out, memory = self._by_calls(times, moving, data, memory)
+                except BuildError as cause:  # a load cannot form its forces any longer
+                    raise StepError(state, cause.problems[0]) from cause
             else:
                 dt = self.equation.step_size
                 carried_out = self.steps.all(count, dt, self.threads, moving, *data)
@@ -213,14 +219,14 @@ class CompiledLoop(TimeLoop):
         """Steps that end at `times` (t,) [s], with calls of loads between their halves: how many
         were made, and what the loads remember."""
         X, dt, threads = self.equation.particles.positions, self.equation.step_size, self.threads
-        *_, motions = data
+        calls, (*_, motions) = self._calls, data
         for step, time in enumerate(times.tolist()):
             self.steps.begin(step, dt, threads, moving, motions)
             positions, velocities = X + moving.u, moving.v.copy()  # for whoever keeps them
-            now = memory
-            for load, forces in self._calls:
+            now = dict(memory)
+            for load, forces in calls:
                 forces[...], changed = load.advance(time, dt, positions, velocities, memory)
-                now = {**now, **changed}
+                now |= changed
             memory = now
             if not self.steps.end(step, dt, threads, moving, *data):
                 return step + 1, memory
