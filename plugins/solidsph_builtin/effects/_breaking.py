@@ -194,6 +194,10 @@ class BreakingForces(InternalForces):
         return self.whole.operations
 
     @property
+    def precision(self) -> float:
+        return self.whole.precision
+
+    @property
     def compilations(self) -> frozenset[Compilation]:
         return self.whole.compilations
 

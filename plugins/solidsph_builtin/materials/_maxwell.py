@@ -66,7 +66,7 @@ def after(count: int) -> Callable[..., History]:
     return beyond
 
 
-def stored(E: Tensor, history: History, params: Any) -> Scalar:
+def element_energy(E: Tensor, history: History, params: Any) -> Scalar:
     """mu |dev(E - E_i)|^2 of the first element [J/m^3]."""
     e = _elastic(E, history)
     return params[0] * deviator_product(e, e)

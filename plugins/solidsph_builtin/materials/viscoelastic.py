@@ -26,8 +26,8 @@ from solidsph_builtin.materials._maxwell import (
     creep,
     deviator,
     deviator_product,
+    element_energy,
     overstress,
-    stored,
 )
 from solidsph_builtin.materials._symmetric import (
     components,
@@ -159,7 +159,7 @@ class Viscoelastic(HistoryMaterial):
     def stored(F: Tensor, history: History, params: tuple[float, ...]) -> Scalar:
         E, psi, rest = green_lagrange(F), _spring_energy(F, params[:2]), history
         for i in range(2, len(params), 2):
-            psi = psi + stored(E, rest, params[i : i + 2])
+            psi = psi + element_energy(E, rest, params[i : i + 2])
             rest = later(rest, E)
         return psi
 

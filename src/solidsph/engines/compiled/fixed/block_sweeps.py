@@ -27,8 +27,8 @@ class BlockSweeps(NamedTuple):
 @cache
 def block_sweeps(dimension: int, dtype: str, law: Any) -> BlockSweeps:
     """Loops for one dimension, number type and compiled law (H, params) -> T."""
-    d, D = dimension, STRIDE[dimension]
-    gather, scatter, tensor, margin, plane = block_loops(dimension, dtype)
+    d = dimension
+    gather, scatter, tensor, put, _, plane = block_loops(dimension, dtype)
 
     @njit
     def forces(rows, first, last, u, params, factors, f, shift):
@@ -38,10 +38,7 @@ def block_sweeps(dimension: int, dtype: str, law: Any) -> BlockSweeps:
             start, count = rows.blocks[block, 0], rows.blocks[block, 1]
             for slot in range(count):
                 T = law(tensor(scratch, slot), params)
-                at = (margin + slot) * D
-                for i in range(d):
-                    for k in range(d):
-                        scratch[k * plane + at + i] = T[i][k] * factors[start + slot]
+                put(scratch, slot, T, factors[start + slot])
             scatter(rows, block, scratch, f, shift)
 
     @njit
@@ -63,8 +60,8 @@ def block_sweeps(dimension: int, dtype: str, law: Any) -> BlockSweeps:
 def history_sweep(dimension: int, dtype: str, law: Any, count: int) -> Any:
     """Loop (rows, first, last, u, params, factors, f, shift, history (n, k), step): f += from u,
     and the history at the end of the step, for a law (H, h, step, params) -> (T, h)."""
-    d, D = dimension, STRIDE[dimension]
-    gather, scatter, tensor, margin, plane = block_loops(dimension, dtype)
+    d = dimension
+    gather, scatter, tensor, put, _, plane = block_loops(dimension, dtype)
 
     @njit
     def forces(rows, first, last, u, params, factors, f, shift, history, step):
@@ -78,10 +75,7 @@ def history_sweep(dimension: int, dtype: str, law: Any, count: int) -> Any:
                 T, h = law(tensor(scratch, slot), h, step, params)
                 for k in range(count):
                     history[p, k] = h[k]
-                at = (margin + slot) * D
-                for i in range(d):
-                    for k in range(d):
-                        scratch[k * plane + at + i] = T[i][k] * factors[p]
+                put(scratch, slot, T, factors[p])
             scatter(rows, block, scratch, f, shift)
 
     return forces
@@ -91,8 +85,8 @@ def history_sweep(dimension: int, dtype: str, law: Any, count: int) -> Any:
 def rate_sweep(dimension: int, dtype: str, law: Any) -> Any:
     """Loop (rows, first, last, u, v, params, factors, f, shift): f += from displacements u and
     velocities v, for a law (H, dH/dt, params) -> T."""
-    d, D = dimension, STRIDE[dimension]
-    gather, scatter, tensor, margin, plane = block_loops(dimension, dtype)
+    d = dimension
+    gather, scatter, tensor, put, _, plane = block_loops(dimension, dtype)
 
     @njit
     def forces(rows, first, last, u, v, params, factors, f, shift):
@@ -103,10 +97,7 @@ def rate_sweep(dimension: int, dtype: str, law: Any) -> Any:
             start, count = rows.blocks[block, 0], rows.blocks[block, 1]
             for slot in range(count):
                 T = law(tensor(scratch, slot), tensor(rates, slot), params)
-                at = (margin + slot) * D
-                for i in range(d):
-                    for k in range(d):
-                        scratch[k * plane + at + i] = T[i][k] * factors[start + slot]
+                put(scratch, slot, T, factors[start + slot])
             scatter(rows, block, scratch, f, shift)
 
     return forces
@@ -116,7 +107,7 @@ def rate_sweep(dimension: int, dtype: str, law: Any) -> Any:
 def spread_sweep(dimension: int, dtype: str) -> Any:
     """Loop (rows, first, last, stress (d, d, n), factors, f, shift): f += from stress."""
     d, D = dimension, STRIDE[dimension]
-    _, scatter, _, margin, plane = block_loops(dimension, dtype)
+    _, scatter, _, _, margin, plane = block_loops(dimension, dtype)
 
     @njit
     def spread(rows, first, last, stress, factors, f, shift):

@@ -38,6 +38,7 @@ class BlockLoops(NamedTuple):
     gather: Any  # (rows, block, u, scratch): scratch = gradient of u
     scatter: Any  # (rows, block, scratch, f, shift): f += from scratch; particle 0 is at `shift`
     tensor: Any  # (scratch, slot) -> a particle's tensor, as pointwise functions take it
+    put: Any  # (scratch, slot, T, factor): the particle's tensor is `factor` T
     margin: int  # slots
     plane: int  # numbers in a plane of scratch
 
@@ -50,7 +51,7 @@ def block_loops(dimension: int, dtype: str) -> BlockLoops:
     margin = BAND + G
     plane = (margin + RUN + margin) * D
     # Operations on several particles, and on one.
-    load, store, zeros, weight, outer, inner, _, put, get = lane_operations(dtype, W, d)
+    load, store, zeros, weight, outer, inner, _, store_tensor, get = lane_operations(dtype, W, d)
     load_1, store_1, zeros_1, weight_1, outer_1, inner_1, total_1, put_1, get_1 = lane_operations(
         dtype, D, d
     )
@@ -68,10 +69,10 @@ def block_loops(dimension: int, dtype: str) -> BlockLoops:
                 h2 = outer(h2, load(u, at + 2 * W), g)
                 h3 = outer(h3, load(u, at + 3 * W), g)
             at = (margin + slot) * D
-            put(scratch, at, plane, h0)
-            put(scratch, at + W, plane, h1)
-            put(scratch, at + 2 * W, plane, h2)
-            put(scratch, at + 3 * W, plane, h3)
+            store_tensor(scratch, at, plane, h0)
+            store_tensor(scratch, at + W, plane, h1)
+            store_tensor(scratch, at + 2 * W, plane, h2)
+            store_tensor(scratch, at + 3 * W, plane, h3)
 
     @njit
     def gather_rows(rows, first, count, row, u, scratch):
@@ -146,7 +147,14 @@ def block_loops(dimension: int, dtype: str) -> BlockLoops:
     def tensor(scratch, slot):
         return tensor_at(scratch, (margin + slot) * D)
 
-    return BlockLoops(gather, scatter, tensor, margin, plane)
+    @njit
+    def put(scratch, slot, T, factor):
+        at = (margin + slot) * D
+        for i in range(d):
+            for k in range(d):
+                scratch[k * plane + at + i] = T[i][k] * factor
+
+    return BlockLoops(gather, scatter, tensor, put, margin, plane)
 
 
 def _tensor_at(dimension: int, plane: int) -> Any:

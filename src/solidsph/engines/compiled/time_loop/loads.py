@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from solidsph.engines.compiled.fixed.partition import rate_pass, thread_count
 from solidsph.engines.compiled.fixed.rows import Rows
-from solidsph.engines.compiled.hourglass_sweeps import HourglassArrays, HourglassSweeps, body_sweep
+from solidsph.engines.compiled.hourglass_sweeps import HourglassSweeps, body_sweep
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import (
     NotCompilableError,
@@ -23,7 +23,7 @@ from solidsph.engines.compiled.pointwise import (
     numbers_type,
 )
 from solidsph.engines.compiled.time_loop.call_each import call_each
-from solidsph.engines.compiled.time_loop.pair_load import PairArrays, pair_arrays, pair_sweep
+from solidsph.engines.compiled.time_loop.pair_load import pair_arrays, pair_sweep
 from solidsph.engines.compiled.vectors import ROW, moved
 from solidsph.interfaces.compilable_terms import (
     HourglassLoad,
@@ -62,20 +62,6 @@ class PointwiseData(NamedTuple):
     values: Array  # (k, m)
 
 
-class PairData(NamedTuple):
-    """Forces by a formula of pairs."""
-
-    arrays: PairArrays
-    now: ScheduledForces  # of the current step, in the arrays
-
-
-class HourglassData(NamedTuple):
-    """Hourglass forces."""
-
-    bodies: tuple[HourglassArrays, ...]
-    now: ScheduledForces  # of the current step
-
-
 class RateBody(NamedTuple):
     """Arrays for the stress of one body."""
 
@@ -89,10 +75,10 @@ class RateBody(NamedTuple):
     buffers: NDArray[Any]
 
 
-class RateData(NamedTuple):
-    """Forces of a stress that depends on the rate of deformation."""
+class SummedForces(NamedTuple):
+    """Forces on all particles by sums over pairs."""
 
-    bodies: tuple[RateBody, ...]
+    parts: tuple[Any, ...]  # the arrays of each body, or of all pairs
     now: ScheduledForces  # of the current step
 
 
@@ -163,46 +149,45 @@ def _prepare_scheduled(load: ScheduledLoad, setting: Setting) -> CompiledLoad:
     )
 
 
+def _summed(setting: Setting, sums: Sequence[Any], parts: Sequence[Any]) -> CompiledLoad:
+    """A load with compiled sums (part, u, v, forces (n, d)), one for each part, that write forces
+    of all particles."""
+    own = SummedForces(tuple(parts), ScheduledForces(np.zeros((1, *setting.reference.shape))))
+    return CompiledLoad(_summing(call_each(tuple(sums)), _given(setting)), lambda times: own)
+
+
 def _prepare_hourglass(load: HourglassLoad, setting: Setting) -> CompiledLoad:
     sweeps = [
         operator if isinstance(operator, HourglassSweeps) else HourglassSweeps.of(operator.pairs)
         for operator in load.operators
     ]
-    own = HourglassData(
-        tuple(sweep.arrays for sweep in sweeps),
-        ScheduledForces(np.zeros((1, *setting.reference.shape))),
-    )
-    each = call_each(tuple(body_sweep(sweep.sweep) for sweep in sweeps))
-    return CompiledLoad(_by_bodies(each, _given(setting)), lambda times: own)
+    sums = [body_sweep(sweep.sweep) for sweep in sweeps]
+    return _summed(setting, sums, [sweep.arrays for sweep in sweeps])
 
 
 def _prepare_rate_stress(load: RateStressLoad, setting: Setting) -> CompiledLoad:
     d, dtype = setting.dimension, setting.bodies[0].u.dtype.name
-    passes, bodies = [], []
+    sums, bodies = [], []
     for part in setting.bodies:
         if not part.fused:
             raise NotCompilableError("a divergence that is not the adjoint of the gradient")
         params, own = load.params_of(part.body), part.gradient_partition
         law = compiled_rate_flux(part.body.formulation, load.stress, d, len(params))
-        passes.append(_rate_body(rate_pass(d, dtype, law, own.threaded)))
-        extent = part.body.extent.start, part.body.extent.stop
-        # Its flat displacements and buffers are free once the internal forces are there.
-        rates = np.zeros_like(part.u)
+        sums.append(_rate_body(rate_pass(d, dtype, law, own.threaded)))
         bodies.append(
             RateBody(
-                extent,
-                own.table,
-                part.gradient,
-                part.u,
-                rates,
-                params,
-                part.factors,
-                own.buffers,
+                extent=(part.body.extent.start, part.body.extent.stop),
+                table=own.table,
+                rows=part.gradient,
+                # Flat displacements and buffers are free once the internal forces are there.
+                u=part.u,
+                v=np.zeros_like(part.u),
+                params=params,
+                factors=part.factors,
+                buffers=own.buffers,
             )
         )
-    now = ScheduledForces(np.zeros((1, *setting.reference.shape)))
-    data = RateData(tuple(bodies), now)
-    return CompiledLoad(_by_bodies(call_each(tuple(passes)), _given(setting)), lambda times: data)
+    return _summed(setting, sums, bodies)
 
 
 def _prepare_pairs(load: PairLoad, setting: Setting) -> CompiledLoad:
@@ -210,10 +195,8 @@ def _prepare_pairs(load: PairLoad, setting: Setting) -> CompiledLoad:
     count, vector = table.values.shape[1], numbers_type(d)
     pull = compiled_function(load.pull, vector, vector, numbers_type(count))
     threads = thread_count(len(table.columns)) if setting.threaded else 1
-    arrays = pair_arrays(table, setting.reference, threads)
-    own = PairData(arrays, ScheduledForces(arrays.forces[None]))
     sweep = pair_sweep(pull, d, count, threads > 1)
-    return CompiledLoad(_paired(sweep, _given(setting)), lambda times: own)
+    return _summed(setting, [sweep], [pair_arrays(table, setting.reference, threads)])
 
 
 def _prepare_pointwise(load: PointwiseLoad, setting: Setting) -> CompiledLoad:
@@ -294,22 +277,11 @@ def _rate_body(forces: Any) -> Any:
 
 
 @cache
-def _by_bodies(each: Any, account: Any) -> Any:
+def _summing(each: Any, account: Any) -> Any:
     @njit
     def apply(load, step, u, v, path, total):
         own = load.own
-        each(own.bodies, u, v, own.now.table[0])
-        account(LoadData(load.particles, load.before, load.work, own.now), 0, u, v, path, total)
-
-    return apply
-
-
-@cache
-def _paired(sweep: Any, account: Any) -> Any:
-    @njit
-    def apply(load, step, u, v, path, total):
-        own = load.own
-        sweep(own.arrays, u, v)
+        each(own.parts, u, v, own.now.table[0])
         account(LoadData(load.particles, load.before, load.work, own.now), 0, u, v, path, total)
 
     return apply

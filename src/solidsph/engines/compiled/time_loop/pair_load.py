@@ -21,19 +21,17 @@ from solidsph.maths.arrays import Array, Indices
 
 _SHORTEST_RUN = 8  # for which a loop over a run pays
 
-
 # Particles of a run that are summed together; beyond its end what is found is not used.
 _GROUP = 16
 
 
 class PairArrays(NamedTuple):
-    """What the sums of one load read and write."""
+    """What the sums of one load need."""
 
     reference: Array  # (n, d) X [m]
     rows: Rows  # with the values of pairs for weights
     shares: Indices  # (threads, 2) first block and end of each thread's blocks
     moving: Array  # (2 d, n + a group) positions [m], then velocities [m/s]
-    forces: Array  # (n, d) [N]
 
 
 def pair_arrays(table: PairTable, reference: Array, threads: int) -> PairArrays:
@@ -51,12 +49,12 @@ def pair_arrays(table: PairTable, reference: Array, threads: int) -> PairArrays:
     edges[-1] = len(rows.blocks)
     n, d = reference.shape
     shares = np.stack([edges[:-1], edges[1:]], axis=1).astype(np.intp)
-    return PairArrays(reference, rows, shares, np.zeros((2 * d, n + _GROUP)), np.zeros((n, d)))
+    return PairArrays(reference, rows, shares, np.zeros((2 * d, n + _GROUP)))
 
 
 @cache
 def pair_sweep(pull: Any, dimension: int, count: int, threaded: bool) -> Any:
-    """Compiled (arrays, u (n, d), v (n, d)): writes the forces, for a compiled formula `pull` of
+    """Compiled (arrays, u (n, d), v (n, d), forces (n, d)), for a compiled formula `pull` of
     `count` values."""
     d, apart, add = dimension, _APART[dimension], _ADD[dimension]
 
@@ -111,11 +109,11 @@ def pair_sweep(pull: Any, dimension: int, count: int, threaded: bool) -> Any:
                         forces[first + k, i] = sums[i * RUN + k]
 
     @njit
-    def forces(arrays, u, v):
+    def sums(arrays, u, v, forces):
         place(len(arrays.shares), arrays.reference, u, v, arrays.moving)
-        sweep(arrays.rows, arrays.shares, arrays.moving, arrays.forces)
+        sweep(arrays.rows, arrays.shares, arrays.moving, forces)
 
-    return forces
+    return sums
 
 
 # Vectors written out, by dimension: a loop over components would not be vectorised over particles.
