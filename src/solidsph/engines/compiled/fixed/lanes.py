@@ -30,6 +30,11 @@ class Lanes(types.Type):
         super().__init__(name=f"Lanes({element}, {count})")
 
 
+def lanes_type(dimension: int, count: int) -> Any:
+    """The compiler's type of a vector of lanes, `count` numbers each."""
+    return types.UniTuple(Lanes(types.float64, count), dimension)
+
+
 @register_model(Lanes)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, lanes: Lanes) -> None:
@@ -49,6 +54,14 @@ class LaneOperations(NamedTuple):
     total: Any  # (h, other) -> their sum
     put: Any  # (array, at, plane, tensor)
     get: Any  # (array, at, plane) -> tensor
+
+
+def spread(context: Any, builder: Any, number: Any, lanes: Lanes) -> Any:
+    """Lanes of one number, the builder's way."""
+    empty = ir.Constant(context.get_value_type(lanes), ir.Undefined)
+    first = builder.insert_element(empty, number, ir.Constant(ir.IntType(32), 0))
+    everywhere = ir.Constant(ir.VectorType(ir.IntType(32), lanes.count), [0] * lanes.count)
+    return builder.shuffle_vector(first, empty, everywhere)
 
 
 def register_bytes() -> int:
@@ -77,12 +90,6 @@ def lane_operations(dtype: str, count: int, dimension: int) -> LaneOperations:
         return builder.bitcast(
             address(context, builder, array_type, array, at), vector.as_pointer()
         )
-
-    def spread(context: Any, builder: Any, number: Any) -> Any:
-        empty = ir.Constant(context.get_value_type(lanes), ir.Undefined)
-        first = builder.insert_element(empty, number, ir.Constant(ir.IntType(32), 0))
-        everywhere = ir.Constant(ir.VectorType(ir.IntType(32), count), [0] * count)
-        return builder.shuffle_vector(first, empty, everywhere)
 
     def built(context: Any, builder: Any, column: Callable[[int], Any]) -> Any:
         value = ir.Constant(context.get_value_type(tensor), ir.Undefined)
@@ -127,7 +134,7 @@ def lane_operations(dtype: str, count: int, dimension: int) -> LaneOperations:
             def component(k: int) -> Any:
                 at = builder.add(first, ir.Constant(first.type, k))
                 where = address(context, builder, signature.args[0], args[0], at)
-                return spread(context, builder, builder.load(where, align=size))
+                return spread(context, builder, builder.load(where, align=size), lanes)
 
             return built(context, builder, component)
 

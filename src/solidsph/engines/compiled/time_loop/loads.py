@@ -12,10 +12,12 @@ from numba import prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
+from solidsph.engines.compiled.fixed.lanes import lanes_type
 from solidsph.engines.compiled.fixed.partition import rate_pass, thread_count
 from solidsph.engines.compiled.fixed.rows import Rows
 from solidsph.engines.compiled.hourglass_sweeps import HourglassSweeps, body_sweep
 from solidsph.engines.compiled.jit import njit
+from solidsph.engines.compiled.pair_bundles import LANES
 from solidsph.engines.compiled.pointwise import (
     NotCompilableError,
     compiled_function,
@@ -193,10 +195,15 @@ def _prepare_rate_stress(load: RateStressLoad, setting: Setting) -> CompiledLoad
 def _prepare_pairs(load: PairLoad, setting: Setting) -> CompiledLoad:
     d, table = setting.dimension, load.pairs
     count, vector = table.values.shape[1], numbers_type(d)
-    pull = compiled_function(load.pull, vector, vector, numbers_type(count))
+    pull, together = compiled_function(load.pull, vector, vector, numbers_type(count)), False
+    with suppress(NotCompilableError):
+        lanes = lanes_type(d, LANES)
+        compiled_function(load.pull, lanes, lanes, numbers_type(count))
+        together = True
     threads = thread_count(len(table.columns)) if setting.threaded else 1
-    sweep = pair_sweep(pull, d, count, threads > 1)
-    return _summed(setting, [sweep], [pair_arrays(table, setting.reference, threads)])
+    sweep = pair_sweep(pull, d, count, together, threads > 1)
+    arrays = pair_arrays(table, setting.reference, threads, together=together)
+    return _summed(setting, [sweep], [arrays])
 
 
 def _prepare_pointwise(load: PointwiseLoad, setting: Setting) -> CompiledLoad:
