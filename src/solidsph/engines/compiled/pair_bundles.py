@@ -7,6 +7,7 @@ included, since what a pair has depends on its distance alone.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,9 +51,27 @@ class PairBundles(NamedTuple):
                 end[some] = np.maximum(end[some], np.maximum.reduceat(last, starts[:-1][some]))
         return end
 
-    def costs(self) -> Array:
-        """Cost of each group, (g,), in bundles."""
-        return 1.0 + np.diff(self.starts) + np.diff(self.single_starts)
+    def shares(self, threads: int) -> Indices:
+        """The groups divided among threads by their work, (t, 5).
+
+        For each thread: its first group and the end of its groups, the first particle and the end
+        of those that they reach, and how many the threads before it reach.
+        """
+        costs = 1.0 + np.diff(self.starts) + np.diff(self.single_starts)
+        done = np.concatenate([[0.0], np.cumsum(costs)])
+        edges = np.searchsorted(done, done[-1] * np.arange(threads + 1) / threads)
+        reach, shares, size = self.reach(), np.zeros((threads, 5), dtype=np.intp), 0
+        for share, (first, end) in enumerate(pairwise(edges.tolist())):
+            if first < end:
+                low, high = LANES * first, int(reach[first:end].max())
+                shares[share] = first, end, low, high, size
+                size += high - low
+        return shares
+
+    @property
+    def padded(self) -> int:
+        """Length of a plane of numbers, one a particle, that loops over bundles may overrun."""
+        return LANES * len(self.starts)
 
 
 def pair_bundles(table: PairTable, *, together: bool = True) -> PairBundles:
@@ -64,6 +83,11 @@ def pair_bundles(table: PairTable, *, together: bool = True) -> PairBundles:
     )
     own, alone_values = table.values[pairs].ravel(), table.values[alone].ravel()
     return PairBundles(starts, bundles, own, single_starts, singles, alone_values)
+
+
+def sums_for(shares: Indices, planes: int) -> Array:
+    """Room for the sums of every thread, in planes over the particles that it reaches, flat."""
+    return np.zeros(planes * int((shares[:, 3] - shares[:, 2]).sum()))
 
 
 @njit

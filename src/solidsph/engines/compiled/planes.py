@@ -52,3 +52,12 @@ def _number(array, at):
 @njit
 def _set_number(array, at, value):
     array[at] = value
+
+
+@cache
+def plus(components: int) -> Any:
+    """Compiled (a, b) -> a + b."""
+    if components == 0:
+        return njit(lambda a, b: ())
+    fewer, last = plus(components - 1), components - 1
+    return njit(lambda a, b: fewer(a, b) + (a[last] + b[last],))  # noqa: RUF005
