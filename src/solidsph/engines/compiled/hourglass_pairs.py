@@ -36,6 +36,12 @@ class NearPairs(NamedTuple):
         jets, pulls = np.zeros((2, count * pairs.padded))
         return cls(pairs, shares, jets, pulls, sums_for(shares, count))
 
+    def tensors(self, planes: Array) -> Array:
+        """H among the jets or S among the pulls, (d, d, n and more)."""
+        count = len(planes) // self.pairs.padded
+        d = {2: 1, 6: 2, 12: 3}[count]
+        return planes.reshape(count, -1)[d:].reshape(d, d, -1)
+
 
 @cache
 def near_pass(dimension: int, threaded: bool) -> Any:

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple, final
 
 import attrs
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from solidsph.engines.compiled.fixed.blocks import group
@@ -23,6 +22,7 @@ from solidsph.engines.compiled.fixed.rows import Rows, compressed
 from solidsph.engines.compiled.fixed.subset_rows import part_of_rows
 from solidsph.engines.compiled.hourglass_pairs import NearPairs, near_pass
 from solidsph.engines.compiled.jit import njit
+from solidsph.engines.compiled.planes import adding, filling
 from solidsph.engines.compiled.pointwise import no_law
 from solidsph.engines.compiled.threads import check_alive
 from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassPairs
@@ -87,8 +87,8 @@ class HourglassSweeps(HourglassOperator):
             factors=np.full(n, -1.0),
             buffers=partition.buffers,
             near=near,
-            gradients=_tensors(near.jets, d),
-            stresses=_tensors(near.pulls, d),
+            gradients=near.tensors(near.jets),
+            stresses=near.tensors(near.pulls),
         )
         return cls(pairs, arrays, hourglass_sweep(d, threads > 1))
 
@@ -125,39 +125,19 @@ def hourglass_sweep(dimension: int, threaded: bool) -> Any:
     scatter = spread_pass(d, _DTYPE, threaded)
     pull = near_pass(d, threaded)
 
-    @njit(parallel=threaded)
-    def place(threads, displacements, jets, stride):
-        n = len(displacements)
-        for t in prange(threads):
-            for p in range(t * n // threads, (t + 1) * n // threads):
-                for i in range(d):
-                    jets[i * stride + p] = displacements[p, i]
-
-    @njit(parallel=threaded)
-    def add(threads, pulls, stride, forces):
-        n = len(forces)
-        for t in prange(threads):
-            for p in range(t * n // threads, (t + 1) * n // threads):
-                for i in range(d):
-                    forces[p, i] += pulls[i * stride + p]
+    fill, add = filling(d, threaded), adding(d, threaded)
 
     @njit
     def sweep(arrays, displacements, forces):
         near, table = arrays.near, arrays.table
         threads, stride = len(table), arrays.gradients.shape[2]
         gather(table, arrays.rows, displacements, arrays.flat, (0.0,), arrays.gradients)
-        place(threads, displacements, near.jets, stride)
+        fill(threads, displacements, near.jets, stride)
         pull(near.shares, near.pairs, near.jets, near.sums, near.pulls)
         scatter(table, arrays.rows, arrays.stresses, arrays.factors, arrays.buffers, forces)
         add(threads, near.pulls, stride, forces)
 
     return sweep
-
-
-def _tensors(planes: Array, dimension: int) -> Array:
-    """The tensors that follow vectors in planes, (d, d, ...)."""
-    d = dimension
-    return planes.reshape(d + d * d, -1)[d:].reshape(d, d, -1)
 
 
 @cache

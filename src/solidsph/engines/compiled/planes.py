@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import cache
 from typing import Any, NamedTuple
 
+from numba import prange
+
 from solidsph.engines.compiled.fixed.lanes import lane_operations
 from solidsph.engines.compiled.jit import njit
 
@@ -61,3 +63,33 @@ def plus(components: int) -> Any:
         return njit(lambda a, b: ())
     fewer, last = plus(components - 1), components - 1
     return njit(lambda a, b: fewer(a, b) + (a[last] + b[last],))  # noqa: RUF005
+
+
+@cache
+def filling(dimension: int, threaded: bool) -> Any:
+    """Compiled (threads, field (n, d), array, stride): the field in planes."""
+
+    @njit(parallel=threaded)
+    def fill(threads, field, array, stride):
+        n = len(field)
+        for t in prange(threads):
+            for p in range(t * n // threads, (t + 1) * n // threads):
+                for i in range(dimension):
+                    array[i * stride + p] = field[p, i]
+
+    return fill
+
+
+@cache
+def adding(dimension: int, threaded: bool) -> Any:
+    """Compiled (threads, array, stride, field (n, d)): planes added to the field."""
+
+    @njit(parallel=threaded)
+    def add(threads, array, stride, field):
+        n = len(field)
+        for t in prange(threads):
+            for p in range(t * n // threads, (t + 1) * n // threads):
+                for i in range(dimension):
+                    field[p, i] += array[i * stride + p]
+
+    return add

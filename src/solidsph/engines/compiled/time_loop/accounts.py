@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, final
 
 import attrs
@@ -70,6 +70,20 @@ class Accounts:
         conditions = (*self.equation.loads, *self.equation.constraints)
         for condition, part in zip(conditions, (*loads, *motions), strict=True):
             self.work[condition.label] += float(part.work.sum())
+
+    def settle_linear(
+        self, forces: Sequence[Callable[[Array], Array] | None], before: Array, now: Array
+    ) -> None:
+        """Forces and work of loads of which the loop has no account, since they are -K u.
+
+        The work from displacements `before` to those of `now` (n, d) [m] is the energy lost, which
+        the trapezoidal rule finds exactly, whatever the path.
+        """
+        for k, (load, linear) in enumerate(zip(self.equation.loads, forces, strict=True)):
+            if linear is not None:
+                old, new = self.load_forces[k], linear(now)
+                self.work[load.label] += 0.5 * float(np.sum(new * now) - np.sum(old * before))
+                self.load_forces[k] = new
 
     def applied(self, time: float, u: Array) -> Mapping[str, Array]:
         """Force of every account on every particle, (n, d) [N], at displacements u (n, d) [m]."""

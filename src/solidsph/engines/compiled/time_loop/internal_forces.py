@@ -15,8 +15,13 @@ from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.constraints import following
+from solidsph.engines.compiled.time_loop.penalised import (
+    PenalisedBody,
+    penalised_data,
+    penalised_forces,
+)
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.compilable_terms import LinearExtension
+from solidsph.interfaces.compilable_terms import HourglassLoad, LinearExtension
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Indices
 
@@ -51,16 +56,29 @@ class Internal(NamedTuple):
 
 
 def internal_forces(
-    parts: Sequence[ReferenceBody], conditions: Sequence[StressTerm], step: float
+    parts: Sequence[ReferenceBody],
+    conditions: Sequence[StressTerm],
+    step: float,
+    penalty: HourglassLoad | None = None,
 ) -> Internal:
     """The internal forces of prepared bodies under these conditions, in steps of `step` [s].
+
+    Those of a `penalty` are among them, which `takes_penalty` allows.
 
     Raises:
         NotCompilableError: a condition is not of a compilable kind, or there are several bodies.
     """
     if all(part.fused for part in parts) and not conditions:
-        functions = tuple(map(_at_once, parts))
-        data = tuple(_data(part, step, staged=False) for part in parts)
+        data: tuple[BodyData | PenalisedBody, ...]
+        if penalty is None:
+            functions = tuple(map(_at_once, parts))
+            data = tuple(_data(part, step, staged=False) for part in parts)
+        else:
+            functions = tuple(map(penalised_forces, parts))
+            near = [operator.pairs for operator in penalty.operators]
+            data = tuple(
+                penalised_data(part, own, step) for part, own in zip(parts, near, strict=True)
+            )
         histories = [
             (part.body, one.history)
             for part, one in zip(parts, data, strict=True)
@@ -81,6 +99,11 @@ def internal_forces(
     return Internal(
         forces, (_data(part, step, staged=True), tuple(following(c, c.stress) for c in extensions))
     )
+
+
+def takes_penalty(parts: Sequence[ReferenceBody], conditions: Sequence[StressTerm]) -> bool:
+    """True if internal forces can have those of a penalty among them."""
+    return not conditions and all(part.fused and part.u.dtype == np.float64 for part in parts)
 
 
 def _at_once(part: ReferenceBody) -> Any:

@@ -110,6 +110,7 @@ class CompiledLoad(NamedTuple):
     apply: Any  # compiled (load, step, u, v, path, total): total += force, work += that along path
     own: Callable[[Array], Any]  # times (t,) at which the steps to come end -> `LoadData.own`
     called: Call | None = None  # if its forces are those that a call has put into `own`
+    linear: Callable[[Array], Array] | None = None  # if they are among the internal forces: -K u
 
 
 class LoadKind(NamedTuple):
@@ -139,6 +140,24 @@ def compiled_load(load: Load, setting: Setting) -> CompiledLoad:
     return CompiledLoad(_given(setting), lambda times: now, Call(load, now.table[0]))
 
 
+def merged_load(load: HourglassLoad) -> CompiledLoad:
+    """A load whose forces are among the internal forces."""
+    sweeps = _hourglass_sweeps(load)
+
+    def forces(u: Array) -> Array:
+        extents = [sweep.pairs.body.extent for sweep in sweeps]
+        return np.concatenate(
+            [sweep.forces(u[own]) for sweep, own in zip(sweeps, extents, strict=True)]
+        )
+
+    return CompiledLoad(_nothing, lambda times: (), linear=forces)
+
+
+@njit
+def _nothing(load, step, u, v, path, total):
+    pass
+
+
 def _given(setting: Setting) -> Any:
     """`CompiledLoad.apply` for forces in a table."""
     return _accounted(_scheduled(setting.dimension), setting.dimension, setting.threaded)
@@ -158,11 +177,15 @@ def _summed(setting: Setting, sums: Sequence[Any], parts: Sequence[Any]) -> Comp
     return CompiledLoad(_summing(call_each(tuple(sums)), _given(setting)), lambda times: own)
 
 
-def _prepare_hourglass(load: HourglassLoad, setting: Setting) -> CompiledLoad:
-    sweeps = [
+def _hourglass_sweeps(load: HourglassLoad) -> Sequence[HourglassSweeps]:
+    return [
         operator if isinstance(operator, HourglassSweeps) else HourglassSweeps.of(operator.pairs)
         for operator in load.operators
     ]
+
+
+def _prepare_hourglass(load: HourglassLoad, setting: Setting) -> CompiledLoad:
+    sweeps = _hourglass_sweeps(load)
     sums = [body_sweep(sweep.sweep) for sweep in sweeps]
     return _summed(setting, sums, [sweep.arrays for sweep in sweeps])
 

@@ -18,10 +18,25 @@ from solidsph.engines.compiled.pointwise import NotCompilableError, compiled_fun
 from solidsph.engines.compiled.time_loop.accounts import Accounts
 from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.constraints import ConstraintCalls, constraint_calls
-from solidsph.engines.compiled.time_loop.internal_forces import Internal, internal_forces
-from solidsph.engines.compiled.time_loop.loads import Call, CompiledLoad, Setting, compiled_load
+from solidsph.engines.compiled.time_loop.internal_forces import (
+    Internal,
+    internal_forces,
+    takes_penalty,
+)
+from solidsph.engines.compiled.time_loop.loads import (
+    Call,
+    CompiledLoad,
+    Setting,
+    compiled_load,
+    merged_load,
+)
 from solidsph.errors import BuildError
-from solidsph.interfaces.compilable_terms import LinearExtension, ScheduledConstraint, ScheduledLoad
+from solidsph.interfaces.compilable_terms import (
+    HourglassLoad,
+    LinearExtension,
+    ScheduledConstraint,
+    ScheduledLoad,
+)
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
@@ -101,9 +116,16 @@ def compiled_loop(
     threads = thread_count(PER_PARTICLE * particles.count)  # for loops over particles
     for body in bodies:
         body.gradient_partition.check()
-    internal = internal_forces(bodies, conditions, equation.step_size)
+    penalties = [load for load in equation.loads if isinstance(load, HourglassLoad)]
+    penalty = penalties[0] if penalties and takes_penalty(bodies, conditions) else None
+    internal = internal_forces(bodies, conditions, equation.step_size, penalty)
     setting = Setting(particles.positions, bodies, threads > 1)
-    loads = [compiled_load(load, setting) for load in equation.loads]
+    loads = [
+        merged_load(penalty)
+        if penalty is not None and load is penalty
+        else compiled_load(load, setting)
+        for load in equation.loads
+    ]
     calls = [constraint_calls(motion, d) for motion in equation.constraints]
     by_call = [tuple(call[k] for call in calls) for k in range(len(ConstraintCalls._fields))]
     steps = _steps(
@@ -176,6 +198,7 @@ class CompiledLoop(TimeLoop):
             loads = accounts.loads([one.own(times) for one in self.loads], self.threads)
             motions = accounts.motions(times)
             data = equation.masses, inverse_masses, self.internal.data, loads, motions
+            before = moving.u.copy()
             if self._calls:
                 try:
                     # Overflow and invalid values show in the accelerations.
@@ -188,6 +211,7 @@ class CompiledLoop(TimeLoop):
                 carried_out = self.steps.all(count, dt, self.threads, moving, *data)
             done += carried_out
             accounts.settle(loads, motions)
+            accounts.settle_linear([one.linear for one in self.loads], before, moving.u)
             if not np.isfinite(moving.a.sum()):
                 break
         time = state.time + self.equation.step_size * done

@@ -12,6 +12,7 @@ from solidsph.engines.compiled.fixed.lane_arithmetic import chosen
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pair_bundles import PairBundles, pair_bundles, sums_for
 from solidsph.engines.compiled.pair_pass import pair_pass
+from solidsph.engines.compiled.planes import adding
 from solidsph.engines.compiled.vectors import moved, times
 from solidsph.interfaces.pair_table import PairTable
 from solidsph.maths.arrays import Array, Indices
@@ -48,6 +49,7 @@ def pair_sweep(pull: Any, dimension: int, count: int, together: bool, threaded: 
         pulled = chosen(pull(way, velocity, values), bits)
         return times(pulled, way), times(-1.0 * pulled, way)
 
+    add = adding(d, threaded)
     run = pair_pass(of_pair, 2 * d, count, d, together, threaded)
 
     @njit(parallel=threaded)
@@ -59,19 +61,12 @@ def pair_sweep(pull: Any, dimension: int, count: int, together: bool, threaded: 
                     moving[i * stride + p] = X[p, i] + u[p, i]
                     moving[(d + i) * stride + p] = v[p, i]
 
-    @njit(parallel=threaded)
-    def collect(threads, pulls, forces):
-        n, stride = len(forces), len(pulls) // d
-        for t in prange(threads):
-            for p in range(t * n // threads, (t + 1) * n // threads):
-                for i in range(d):
-                    forces[p, i] = pulls[i * stride + p]
-
     @njit
     def forces(arrays, u, v, out):
         threads = len(arrays.shares)
         place(threads, arrays.reference, u, v, arrays.moving)
         run(arrays.shares, arrays.pairs, arrays.moving, arrays.sums, arrays.pulls)
-        collect(threads, arrays.pulls, out)
+        out[:] = 0.0
+        add(threads, arrays.pulls, len(arrays.pulls) // d, out)
 
     return forces
