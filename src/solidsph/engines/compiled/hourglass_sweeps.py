@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple, final
 
@@ -115,6 +116,14 @@ class HourglassSweeps(HourglassOperator):
         forces = np.empty_like(displacements)
         self.sweep(self.arrays, np.ascontiguousarray(displacements), forces)
         return forces
+
+
+def compiled_sweeps(operators: Sequence[HourglassOperator]) -> Sequence[HourglassSweeps]:
+    """The operators as compiled sweeps."""
+    return [
+        operator if isinstance(operator, HourglassSweeps) else HourglassSweeps.of(operator.pairs)
+        for operator in operators
+    ]
 
 
 @cache

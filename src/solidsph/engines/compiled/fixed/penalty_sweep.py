@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numba import prange
-from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from solidsph.engines.compiled.constants import STRIDE
 from solidsph.engines.compiled.fixed.blocks import block_loops
@@ -21,7 +20,7 @@ def added_stress_pass(dimension: int, stress_at: Any, threaded: bool) -> Any:
     """Compiled (table, rows, H (d, d, m), S (d, d, m), params, history, step, factors, buffers,
     forces (n, d)): forces of the stress at H and of -S, for m >= n.
 
-    `stress_at` is compiled (p, H, params, history (n, k), step) -> T, and moves the history on.
+    `stress_at` is one of `fixed/stress_at.py`.
     """
     d, D = dimension, STRIDE[dimension]
     _, scatter, _, _, margin, plane = block_loops(d, "float64")
@@ -52,26 +51,6 @@ def added_stress_pass(dimension: int, stress_at: Any, threaded: bool) -> Any:
         total(table, buffers, out)
 
     return forces
-
-
-@cache
-def stress_of_law(law: Any) -> Any:
-    """`stress_at` for a compiled law (H, params) -> T."""
-    return njit(lambda p, H, params, history, step: law(H, params))
-
-
-@cache
-def stress_of_history(law: Any, count: int) -> Any:
-    """`stress_at` for a compiled law (H, h, step, params) -> (T, h) of `count` variables."""
-
-    @njit
-    def stress_at(p, H, params, history, step):
-        T, h = law(H, to_fixed_tuple(history[p], count), step, params)
-        for k in range(count):
-            history[p, k] = h[k]
-        return T
-
-    return stress_at
 
 
 _get_1, _get_2, _get_3 = (planes(d * d).get for d in (1, 2, 3))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 import attrs
@@ -14,6 +14,7 @@ from solidsph.engines.compiled.time_loop.constraints import (
     constraint_data,
 )
 from solidsph.engines.compiled.time_loop.loads import LoadData
+from solidsph.engines.compiled.time_loop.merged import MergedLoad
 from solidsph.interfaces.compilable_terms import ScheduledConstraint
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
@@ -71,19 +72,13 @@ class Accounts:
         for condition, part in zip(conditions, (*loads, *motions), strict=True):
             self.work[condition.label] += float(part.work.sum())
 
-    def settle_linear(
-        self, forces: Sequence[Callable[[Array], Array] | None], before: Array, now: Array
-    ) -> None:
-        """Forces and work of loads of which the loop has no account, since they are -K u.
-
-        The work from displacements `before` to those of `now` (n, d) [m] is the energy lost, which
-        the trapezoidal rule finds exactly, whatever the path.
-        """
-        for k, (load, linear) in enumerate(zip(self.equation.loads, forces, strict=True)):
-            if linear is not None:
-                old, new = self.load_forces[k], linear(now)
-                self.work[load.label] += 0.5 * float(np.sum(new * now) - np.sum(old * before))
-                self.load_forces[k] = new
+    def settle_merged(self, merged: Sequence[MergedLoad], before: Array, now: Array) -> None:
+        """Add forces and work of loads of which the loop has no account, from displacements
+        `before` to those of `now`, (n, d) [m]."""
+        for one in merged:
+            k = self.equation.loads.index(one.load)
+            self.load_forces[k], work = one.settle(self.load_forces[k], before, now)
+            self.work[one.load.label] += work
 
     def applied(self, time: float, u: Array) -> Mapping[str, Array]:
         """Force of every account on every particle, (n, d) [N], at displacements u (n, d) [m]."""

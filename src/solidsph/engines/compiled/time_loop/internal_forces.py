@@ -15,13 +15,9 @@ from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.constraints import following
-from solidsph.engines.compiled.time_loop.penalised import (
-    PenalisedBody,
-    penalised_data,
-    penalised_forces,
-)
+from solidsph.engines.compiled.time_loop.merged import MergedLoad
 from solidsph.interfaces.body import Body
-from solidsph.interfaces.compilable_terms import HourglassLoad, LinearExtension
+from solidsph.interfaces.compilable_terms import LinearExtension
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Indices
 
@@ -50,7 +46,7 @@ class BodyData(NamedTuple):
 class Internal(NamedTuple):
     """Compiled internal forces, and their data."""
 
-    forces: Any  # (data, u (n, d), total (n, d)): total = internal forces of all bodies
+    forces: Any  # (data, u (n, d), v (n, d), total (n, d)): total = internal forces of all bodies
     data: Any
     histories: Sequence[tuple[Body, Array]] = ()  # of bodies that have some, in the data
 
@@ -59,26 +55,20 @@ def internal_forces(
     parts: Sequence[ReferenceBody],
     conditions: Sequence[StressTerm],
     step: float,
-    penalty: HourglassLoad | None = None,
+    merged: MergedLoad | None = None,
 ) -> Internal:
-    """The internal forces of prepared bodies under these conditions, in steps of `step` [s].
-
-    Those of a `penalty` are among them, which `takes_penalty` allows.
+    """The internal forces of prepared bodies under these conditions, in steps of `step` [s], with
+    those of a `merged` load.
 
     Raises:
         NotCompilableError: a condition is not of a compilable kind, or there are several bodies.
     """
     if all(part.fused for part in parts) and not conditions:
-        data: tuple[BodyData | PenalisedBody, ...]
-        if penalty is None:
+        if merged is None:
             functions = tuple(map(_at_once, parts))
-            data = tuple(_data(part, step, staged=False) for part in parts)
+            data: tuple[Any, ...] = tuple(_data(part, step, staged=False) for part in parts)
         else:
-            functions = tuple(map(penalised_forces, parts))
-            near = [operator.pairs for operator in penalty.operators]
-            data = tuple(
-                penalised_data(part, own, step) for part, own in zip(parts, near, strict=True)
-            )
+            functions, data = merged.functions, merged.data
         histories = [
             (part.body, one.history)
             for part, one in zip(parts, data, strict=True)
@@ -101,11 +91,6 @@ def internal_forces(
     )
 
 
-def takes_penalty(parts: Sequence[ReferenceBody], conditions: Sequence[StressTerm]) -> bool:
-    """True if internal forces can have those of a penalty among them."""
-    return not conditions and all(part.fused and part.u.dtype == np.float64 for part in parts)
-
-
 def _at_once(part: ReferenceBody) -> Any:
     if part.remembers:
         return _fused(part.history_pass, _history_and_step)
@@ -125,7 +110,7 @@ def _history_and_step(body):
 @cache
 def _fused(forces: Any, more: Any) -> Any:
     @njit
-    def fused(body, u, total):
+    def fused(body, u, v, total):
         a, b = body.extent
         forces(
             body.table,
@@ -145,7 +130,7 @@ def _fused(forces: Any, more: Any) -> Any:
 @cache
 def _staged(stress_pass: Any, imposed: Any, spread: Any, ghosts_act: bool) -> Any:
     @njit
-    def forces(data, u, total):
+    def forces(data, u, v, total):
         body, followed = data
         stress_pass(body.table, body.rows, u, body.u, body.params, body.stress)
         for p in body.ghosts:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from solidsph.engines.compiled.fixed.lanes import lanes_type
 from solidsph.engines.compiled.fixed.partition import rate_pass, thread_count
 from solidsph.engines.compiled.fixed.rows import Rows
-from solidsph.engines.compiled.hourglass_sweeps import HourglassSweeps, body_sweep
+from solidsph.engines.compiled.hourglass_sweeps import body_sweep, compiled_sweeps
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pair_bundles import LANES
 from solidsph.engines.compiled.pointwise import (
@@ -25,6 +25,7 @@ from solidsph.engines.compiled.pointwise import (
     numbers_type,
 )
 from solidsph.engines.compiled.time_loop.call_each import call_each
+from solidsph.engines.compiled.time_loop.merged import MergedLoad
 from solidsph.engines.compiled.time_loop.pair_load import pair_arrays, pair_sweep
 from solidsph.engines.compiled.vectors import ROW, moved
 from solidsph.interfaces.compilable_terms import (
@@ -110,7 +111,7 @@ class CompiledLoad(NamedTuple):
     apply: Any  # compiled (load, step, u, v, path, total): total += force, work += that along path
     own: Callable[[Array], Any]  # times (t,) at which the steps to come end -> `LoadData.own`
     called: Call | None = None  # if its forces are those that a call has put into `own`
-    linear: Callable[[Array], Array] | None = None  # if they are among the internal forces: -K u
+    merged: MergedLoad | None = None  # if they are among the internal forces
 
 
 class LoadKind(NamedTuple):
@@ -127,35 +128,19 @@ def kind_of(load: Load) -> LoadKind | None:
     return next((known for known in LOAD_KINDS if isinstance(load, known.kind)), None)
 
 
-def compiled_load(load: Load, setting: Setting) -> CompiledLoad:
-    """A load, prepared.
+def compiled_load(load: Load, setting: Setting, merged: MergedLoad | None = None) -> CompiledLoad:
+    """A load, prepared, and maybe `merged` with the internal forces.
 
     One of no known kind, or with a formula that does not compile, is called.
     """
+    if merged is not None and merged.load is load:
+        return CompiledLoad(merged.apply, lambda times: (), merged=merged)
     kind = kind_of(load)
     if kind is not None:
         with suppress(NotCompilableError):
             return kind.prepare(load, setting)
     now = ScheduledForces(np.zeros((1, len(load.particles), setting.dimension)))
     return CompiledLoad(_given(setting), lambda times: now, Call(load, now.table[0]))
-
-
-def merged_load(load: HourglassLoad) -> CompiledLoad:
-    """A load whose forces are among the internal forces."""
-    sweeps = _hourglass_sweeps(load)
-
-    def forces(u: Array) -> Array:
-        extents = [sweep.pairs.body.extent for sweep in sweeps]
-        return np.concatenate(
-            [sweep.forces(u[own]) for sweep, own in zip(sweeps, extents, strict=True)]
-        )
-
-    return CompiledLoad(_nothing, lambda times: (), linear=forces)
-
-
-@njit
-def _nothing(load, step, u, v, path, total):
-    pass
 
 
 def _given(setting: Setting) -> Any:
@@ -177,15 +162,8 @@ def _summed(setting: Setting, sums: Sequence[Any], parts: Sequence[Any]) -> Comp
     return CompiledLoad(_summing(call_each(tuple(sums)), _given(setting)), lambda times: own)
 
 
-def _hourglass_sweeps(load: HourglassLoad) -> Sequence[HourglassSweeps]:
-    return [
-        operator if isinstance(operator, HourglassSweeps) else HourglassSweeps.of(operator.pairs)
-        for operator in load.operators
-    ]
-
-
 def _prepare_hourglass(load: HourglassLoad, setting: Setting) -> CompiledLoad:
-    sweeps = _hourglass_sweeps(load)
+    sweeps = compiled_sweeps(load.operators)
     sums = [body_sweep(sweep.sweep) for sweep in sweeps]
     return _summed(setting, sums, [sweep.arrays for sweep in sweeps])
 

@@ -12,13 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solidsph.engines.compiled.fixed.penalty_sweep import (
-    added_stress_pass,
-    stress_of_history,
-    stress_of_law,
-)
+from solidsph.engines.compiled.fixed.penalty_sweep import added_stress_pass
 from solidsph.engines.compiled.fixed.rows import Rows
-from solidsph.engines.compiled.history_law import history_count, history_flux
+from solidsph.engines.compiled.history_law import history_count, particle_stress
 from solidsph.engines.compiled.hourglass_pairs import NearPairs, near_pass
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.planes import adding, filling
@@ -67,10 +63,8 @@ def penalised_data(part: ReferenceBody, near: HourglassPairs, step: float) -> Pe
 
 
 def penalised_forces(part: ReferenceBody) -> Any:
-    """Compiled (data, u (n, d), total (n, d)) that sets the forces of one body."""
-    stress_at = stress_of_law(part.law)
-    if part.remembers:
-        stress_at = stress_of_history(history_flux(part.body), history_count(part.body))
+    """Compiled (data, u (n, d), v (n, d), total (n, d)) that sets the forces of one body."""
+    stress_at = particle_stress(part.body, part.law)
     dimension, threaded = part.body.smoothing.dimension, part.gradient_partition.threaded
     return _forces(dimension, part.gradients.stress, stress_at, threaded)
 
@@ -83,7 +77,7 @@ def _forces(dimension: int, gather: Any, stress_at: Any, threaded: bool) -> Any:
     fill, add = filling(d, threaded), adding(d, threaded)
 
     @njit
-    def forces(body, u, total):
+    def forces(body, u, v, total):
         a, b = body.extent
         near, threads, stride = body.near, len(body.table), body.gradients.shape[2]
         gather(body.table, body.rows, u[a:b], body.u, (0.0,), body.gradients)
