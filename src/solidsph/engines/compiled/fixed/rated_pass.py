@@ -25,8 +25,8 @@ def rated_pass(dimension: int, dtype: str, stress_at: Any, rate_law: Any, thread
     """
     d = dimension
     place, cleared, total = buffered(d, dtype, threaded)
-    gather, scatter, tensor, _, margin, plane = block_loops(d, dtype)
-    put, add = block_loops(d, dtype).put, _ADD[d]
+    gather, scatter, tensor, put, _, plane = block_loops(d, dtype)
+    add = _ADD[d]
 
     @njit
     def sweep(

@@ -1,7 +1,7 @@
 """Loads whose forces are among the internal forces, as they share the passes of these.
 
-The loop has no account of such forces. What they are at the end of a stretch of steps, and what work
-they did in it, is found afterwards: exactly as the trapezoidal rule, step by step, would have it.
+The loop has no account of such forces. What they are at the end of a stretch of steps, and what
+work they did in it, is found afterwards: exactly as the trapezoidal rule, step by step, has it.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def merged_load(
     conditions: Sequence[StressTerm],
     step: float,
 ) -> MergedLoad | None:
-    """The first load that can be merged, in steps of `step` [s]; the others have their own passes."""
+    """The first load that can be merged, in steps of `step` [s]; others have their own passes."""
     if conditions or not all(part.fused for part in parts):
         return None
     double = all(part.u.dtype == np.float64 for part in parts)
