@@ -90,7 +90,7 @@ _define_one(np.abs, "fabs")
 @intrinsic
 def chosen(typing: Any, lanes: Any, bits: Any) -> Any:
     """Lanes with a bit set, and zeros; a number itself."""
-    if not isinstance(lanes, Lanes):
+    if isinstance(lanes, types.Number):
         return lanes(lanes, bits), lambda context, builder, signature, args: args[0]
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
