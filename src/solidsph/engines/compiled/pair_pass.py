@@ -11,7 +11,6 @@ from numba import prange
 from solidsph.engines.compiled.fixed.lanes import lane_operations
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pair_bundles import LANES
-from solidsph.engines.compiled.planes import planes, plus
 
 
 @cache
@@ -30,35 +29,34 @@ def pair_pass(
         together: whether `of_pair` takes lanes.
         threaded: whether there are several threads.
     """
-    get, _ = planes(given, LANES)
-    get_1, _ = planes(given)
-    get_sum, put_sum = planes(found, LANES)
-    get_sum_1, put_sum_1 = planes(found)
-    values_of, add = planes(values).get, plus(found)
-    zeros = lane_operations("float64", LANES, found).zeros
+    get, get_1 = (lane_operations("float64", width, given).get for width in (LANES, None))
+    values_of = lane_operations("float64", None, values).get
+    # Sums are read, added to and written, as lanes and as numbers.
+    _, _, zeros, _, _, _, add, put_sum, get_sum = lane_operations("float64", LANES, found)
+    *_, add_1, put_sum_1, get_sum_1 = lane_operations("float64", None, found)
 
     # Arrays one by one: to take them from a tuple for every group would count references.
     @njit(error_model="numpy")
     def of_bundles(begin, end, bundles, numbers, fields, p, sums, size, at):
         stride = len(fields) // given
-        mine, own = get(fields, stride, p), zeros()
+        mine, own = get(fields, p, stride), zeros()
         for m in range(begin, end):
             offset = np.intp(bundles[m, 0])
-            other = get(fields, stride, p + offset)
-            a, b = of_pair(mine, other, values_of(numbers, 1, m * values), bundles[m, 1])
+            other = get(fields, p + offset, stride)
+            a, b = of_pair(mine, other, values_of(numbers, m * values, 1), bundles[m, 1])
             own = add(own, a)
-            put_sum(sums, size, at + offset, add(get_sum(sums, size, at + offset), b))
-        put_sum(sums, size, at, add(get_sum(sums, size, at), own))
+            put_sum(sums, at + offset, size, add(get_sum(sums, at + offset, size), b))
+        put_sum(sums, at, size, add(get_sum(sums, at, size), own))
 
     @njit(error_model="numpy")
     def of_singles(begin, end, singles, numbers, fields, sums, size, shift):
         stride = len(fields) // given
         for m in range(begin, end):
             p, q = np.intp(singles[m, 0]), np.intp(singles[m, 1])
-            mine, other = get_1(fields, stride, p), get_1(fields, stride, q)
-            a, b = of_pair(mine, other, values_of(numbers, 1, m * values), 1)
-            put_sum_1(sums, size, p + shift, add(get_sum_1(sums, size, p + shift), a))
-            put_sum_1(sums, size, q + shift, add(get_sum_1(sums, size, q + shift), b))
+            mine, other = get_1(fields, p, stride), get_1(fields, q, stride)
+            a, b = of_pair(mine, other, values_of(numbers, m * values, 1), 1)
+            put_sum_1(sums, p + shift, size, add_1(get_sum_1(sums, p + shift, size), a))
+            put_sum_1(sums, q + shift, size, add_1(get_sum_1(sums, q + shift, size), b))
 
     @njit(parallel=threaded)
     def sweep(shares, pairs, fields, sums):

@@ -73,10 +73,13 @@ def register_bytes() -> int:
 
 
 @cache
-def lane_operations(dtype: str, count: int, dimension: int) -> LaneOperations:
-    """The operations for lanes of `count` numbers of type `dtype`, and tensors of a dimension."""
+def lane_operations(dtype: str, count: int | None, dimension: int) -> LaneOperations:
+    """The operations for lanes of `count` numbers of type `dtype`, and tensors of a dimension.
+
+    Without a count they are for single numbers.
+    """
     element = from_dtype(np.dtype(dtype))
-    lanes = Lanes(element, count)
+    lanes = element if count is None else Lanes(element, count)
     tensor = types.UniTuple(lanes, dimension)
     size = np.dtype(dtype).itemsize
     axes = range(dimension)
@@ -165,10 +168,11 @@ def lane_operations(dtype: str, count: int, dimension: int) -> LaneOperations:
     @intrinsic
     def total(typing: Any, h: Any, other: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            part = builder.extract_value
-            return built(
-                context, builder, lambda k: builder.fadd(part(args[0], k), part(args[1], k))
-            )
+            def sum_of(k: int) -> Any:
+                a, b = (builder.extract_value(one, k) for one in args)
+                return builder.fadd(a, b, flags=("contract",))
+
+            return built(context, builder, sum_of)
 
         return tensor(tensor, tensor), code
 

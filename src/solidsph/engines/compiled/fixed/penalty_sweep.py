@@ -10,9 +10,9 @@ from numba import prange
 
 from solidsph.engines.compiled.constants import STRIDE
 from solidsph.engines.compiled.fixed.blocks import block_loops
+from solidsph.engines.compiled.fixed.lanes import lane_operations
 from solidsph.engines.compiled.fixed.partition import buffered
 from solidsph.engines.compiled.jit import njit
-from solidsph.engines.compiled.planes import planes
 
 
 @cache
@@ -53,23 +53,23 @@ def added_stress_pass(dimension: int, stress_at: Any, threaded: bool) -> Any:
     return forces
 
 
-_get_1, _get_2, _get_3 = (planes(d * d).get for d in (1, 2, 3))
+_get_1, _get_2, _get_3 = (lane_operations("float64", None, d * d).get for d in (1, 2, 3))
 
 
 @njit
 def _tensor_1(array, stride, at):
-    return (_get_1(array, stride, at),)
+    return (_get_1(array, at, stride),)
 
 
 @njit
 def _tensor_2(array, stride, at):
-    H = _get_2(array, stride, at)
+    H = _get_2(array, at, stride)
     return H[:2], H[2:]
 
 
 @njit
 def _tensor_3(array, stride, at):
-    H = _get_3(array, stride, at)
+    H = _get_3(array, at, stride)
     return H[:3], H[3:6], H[6:]
 
 
