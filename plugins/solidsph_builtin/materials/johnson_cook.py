@@ -35,8 +35,8 @@ TEMPERATURE = "temperature [K]"
 # too large. Twelve steps reach rounding for strains of up to a per cent in a step.
 _STEPS = 12
 
-# Relative change from which the next is rounding, as the iteration squares the error.
-_CLOSE = 1e-9
+# Relative change from which the next is rounding: each is a thousandth of the last or less.
+_CLOSE = 1e-12
 
 # Slopes of powers below 1, and logarithms, have no value at zero.
 _SMALLEST = 1e-30

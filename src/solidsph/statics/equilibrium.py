@@ -75,6 +75,7 @@ class EquilibriumResult:
     residual: float  # norm of the imbalance over that of all applied forces [-]
     stable: bool | None  # last tangent positive; None if forces have no energy
     seconds: float  # wall time [s]
+    products: int = 0  # with the tangent, by an iterative solver
 
 
 class _LoadStepError(PortableError):
@@ -162,6 +163,7 @@ def equilibrium(
         residual=steps[-1].residuals[-1],
         stable=newton.stable(),
         seconds=clock.perf_counter() - start,
+        products=newton.solver.products,
     )
 
 

@@ -58,7 +58,7 @@ class IterativeSolver(LinearSolver):
     smooth_at_rest: Factors | None = None  # once it is needed
     alternating: Sequence[Factors] | None = None  # likewise
     shares: Sequence[float] = ()  # of the corrections by these
-    products: int = 0  # with the tangent, so far
+    products: int = 0
 
     @classmethod
     def of(cls, simulation: BuiltScene, tangent: Tangent, freedoms: Freedoms) -> IterativeSolver:

@@ -54,6 +54,11 @@ class Linearised(ABC):
 class LinearSolver(ABC):
     """A way to solve with the tangent stiffness of a scene."""
 
+    @property
+    def products(self) -> int:
+        """Products with the tangent so far; 0, the default, if it is factorised."""
+        return 0
+
     @abstractmethod
     def linearised(self, displacements: Array, ahead: Array | None, time: float) -> Linearised:
         """The tangent at displacements (n, d) [m].
