@@ -119,19 +119,21 @@ class CoarseSpace:
         gradients = self.gradients[pattern]
         n, corners, d = gradients.shape
         own = corners * d
-        blocks = np.empty((len(self.starts), own, own))
+        blocks = np.empty((len(self.starts), corners, d, d, corners))
         ends = np.append(self.starts, n)
         first = 0
         while first < len(self.starts):
             last = int(np.searchsorted(ends, ends[first] + _CHUNK, side="right")) - 1
             last = max(last, first + 1)
-            chunk = slice(ends[first], ends[last])
-            strains = np.zeros((ends[last] - ends[first], d * d, own))
-            for j in range(d):
-                strains[:, j * d : (j + 1) * d, j::d] = gradients[chunk].transpose(0, 2, 1)
-            each = strains.transpose(0, 2, 1) @ (moduli[self.order[chunk]] @ strains)
-            blocks[first:last] = np.add.reduceat(each, ends[first:last] - ends[first])
+            B = gradients[ends[first] : ends[last]]
+            A = moduli[self.order[ends[first] : ends[last]]].reshape(-1, d, d, d, d)
+            # By k, i, j: sums over l of A_ikjl B_l, then over k with B_k.
+            right = A.transpose(0, 2, 1, 3, 4).reshape(-1, d**3, d) @ B.transpose(0, 2, 1)
+            each = B @ right.reshape(-1, d, d * d * corners)
+            sums = np.add.reduceat(each, ends[first:last] - ends[first])
+            blocks[first:last] = sums.reshape(-1, corners, d, d, corners)
             first = last
+        blocks = blocks.transpose(0, 1, 2, 4, 3)
         rows = np.repeat(self.unknowns, own, axis=1)
         columns = np.tile(self.unknowns, (1, own))
         size = len(self.kept)
