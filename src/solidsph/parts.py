@@ -88,6 +88,7 @@ from solidsph.run.hooks import implementation as hookimpl
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.studies.case import Case, Curves, Measurement, Trial
+from solidsph.studies.one_scene_case import OneSceneCase
 from solidsph.system.encoding import decoded
 from solidsph.system.files import content, located
 
@@ -135,6 +136,7 @@ __all__ = [
     "Memory",
     "Need",
     "Observation",
+    "OneSceneCase",
     "Operations",
     "PairLoad",
     "PairTable",

@@ -33,8 +33,8 @@ MAY_IMPORT = {
     "simulation": "errors interfaces scene run statics results watch assembly",
     "resumption": "errors system scene run results simulation",
     "costs": "errors system interfaces registry engines scene run simulation",
-    "studies": "errors maths model interfaces registry scene run results conformance simulation "
-    "costs",
+    "studies": "errors system maths model interfaces registry scene run results conformance "
+    "simulation costs",
     "testing": "errors maths interfaces registry engines run statics conformance assembly "
     "simulation",
     "commands": "errors system interfaces registry scene run statics results watch advice "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from math import inf, isclose, isnan, nan
+from math import inf, isclose, isnan
 
 import attrs
 import pandas
@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from solidsph.studies.frontier import Frontier, fitted_exponent
 from solidsph.studies.point import Point
-from solidsph.studies.richardson import extrapolate
 
 # error = a h^p, time = b h^-q, so that error ~ time^(-p / q)
 SCHEMES = {"first": (1.0, 1.0, 1e-5, 3.0), "second": (25.0, 2.0, 4e-5, 3.0)}
@@ -153,34 +152,3 @@ def test_a_power_needs_two_costs() -> None:
     assert isclose(fitted_exponent([1.0, 2.0, 4.0], [1.0, 0.25, 0.0625]), -2.0)
     assert isnan(fitted_exponent([1.0], [1.0]))
     assert isnan(fitted_exponent([1.0, 1.0], [1.0, 2.0]))
-
-
-@given(
-    p=st.floats(0.7, 4.0),
-    limit=st.floats(-3.0, 3.0).filter(lambda x: abs(x) > 0.1),
-    ratios=st.tuples(st.floats(1.3, 2.5), st.floats(1.3, 2.5)),
-)
-def test_the_limit_and_order_of_a_power_law_are_found(
-    p: float, limit: float, ratios: tuple[float, float]
-) -> None:
-    h = [ratios[0] * ratios[1], ratios[1], 1.0]
-    values = [limit + 0.01 * one**p for one in h]
-    found = extrapolate(h, values)
-    assert found.trusted
-    # Differences of 1e-2 of values of 1: some 1e-14 of rounding, amplified by a log of 1.3.
-    assert isclose(found.order, p, rel_tol=1e-8)
-    assert isclose(found.limit, limit, rel_tol=1e-8)
-    assert isclose(found.index, 1.25 * 0.01 / abs(values[-1]), rel_tol=1e-6)
-
-
-def test_what_may_not_be_extrapolated_says_so() -> None:
-    h = [4.0, 2.0, 1.0]
-    assert "oscillate" in extrapolate(h, [1.0, 1.2, 1.1]).warning
-    assert "asymptotic range" in extrapolate(h, [1.0, 1.1, 1.3]).warning
-    assert "asymptotic range" in extrapolate([8.0, *h], [0.0, 0.6, 0.95, 0.99]).warning
-    assert "nothing can be observed" in extrapolate(h, [1.0, 1.0, 1.0]).warning
-    assert extrapolate(h, [1.16, 1.04, 1.01]).trusted
-    with pytest.raises(ValueError, match="three results"):
-        extrapolate(h[:2], [1.0, 2.0])
-    with pytest.raises(ValueError, match="fall from coarse to fine"):
-        extrapolate([1.0, 2.0, 4.0], [1.0, 2.0, nan])

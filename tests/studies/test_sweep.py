@@ -31,7 +31,7 @@ from solidsph.studies import cluster as cluster_module
 from solidsph.studies import scratch_folder as scratch_module
 from solidsph.studies import task as task_module
 from solidsph.studies.cluster import Cluster
-from solidsph.studies.journal import Journal
+from solidsph.studies.journal import VERSION, Journal
 from solidsph.studies.point import Point
 from solidsph.studies.processes import Processes
 from solidsph.studies.remaining_time import RemainingTime
@@ -176,7 +176,7 @@ def test_what_is_no_line_of_ours_is_passed_over_and_left(tmp_path: Path) -> None
     sweep(tasks[:1], Inline(), journal)
     (own,) = lines(journal.path)
     entry = json.loads(own)
-    other = json.dumps({**entry, "key": tasks[1].key, "journal": 2}).encode()
+    other = json.dumps({**entry, "key": tasks[1].key, "journal": VERSION + 1}).encode()
     partial = json.dumps({**entry, "key": tasks[1].key, "point": {"error": 1.0}}).encode()
     foreign = b"\n".join([b"# a note", b"\xff\x00", b"[1]", b"null", b"", other, partial, b""])
     journal.path.write_bytes(foreign + own)

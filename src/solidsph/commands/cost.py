@@ -1,4 +1,4 @@
-"""solidsph cost: error against time for a case, and the best configuration for either."""
+"""solidsph cost: error against time for a scene or a case, and the best configuration."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import attrs
 import click
 
 from solidsph.commands.console import Table, present, sweep_progress
-from solidsph.commands.cost_options import axes_of, goal_of, seconds
+from solidsph.commands.cost_options import axes_of, case_of, goal_of, seconds
+from solidsph.commands.limit_tables import ESTIMATED, limit_rows, with_warnings
 from solidsph.commands.options import (
     ProgressOutput,
     flag,
@@ -22,7 +23,7 @@ from solidsph.commands.options import (
     set_option,
     verbose_option,
 )
-from solidsph.commands.target import resolve
+from solidsph.commands.target import name_of, resolve
 from solidsph.errors import SceneError
 from solidsph.studies.case import Case
 from solidsph.studies.cluster import Cluster
@@ -34,15 +35,31 @@ from solidsph.studies.processes import Processes
 from solidsph.studies.report import write_report
 from solidsph.studies.report_figures import library
 from solidsph.studies.richardson import extrapolate
+from solidsph.studies.scene_case import SceneCase
 from solidsph.studies.search import Goal, SearchResult
 from solidsph.studies.variant import with_settings
 
 
 @attrs.frozen
 class _Options(ProgressOutput):
-    settings: tuple[str, ...] = set_option("the case")
+    settings: tuple[str, ...] = set_option("the case, or a word or key of the scene")
+    of: tuple[str, ...] = option(
+        "For a scene: be accurate in this column of its history, or this probe; before it may "
+        "stand final, peak or mean.  [default: all probes]",
+        "--of",
+        multiple=True,
+        metavar="[peak] NAME",
+    )
+    references: tuple[str, ...] = option(
+        "For a scene: what a column should be, a number, a formula of t, or a file of times and "
+        "values.  [default: errors are estimated by refinement]",
+        "--reference",
+        multiple=True,
+        metavar="[NAME=]VALUE|FILE",
+    )
     axes: tuple[str, ...] = option(
-        "Values to try; the first axis refines, from coarse to fine.  [default: the case's own]",
+        "Values to try; the first axis refines, from coarse to fine.  [default: the case's own; "
+        "three spacings of a scene]",
         "--axis",
         multiple=True,
         metavar="NAME=VALUE,VALUE...",
@@ -73,7 +90,7 @@ class _Options(ProgressOutput):
         metavar="TIME",
     )
     output: Path | None = output_option(
-        "Folder for points, picture and scenes.  [default: results/cost/CASE]"
+        "Folder for points, picture and scenes.  [default: results/cost/NAME]"
     )
     report: bool = flag(
         "Also write an HTML page with interactive plots and the scene of every point."
@@ -86,17 +103,18 @@ class _Options(ProgressOutput):
 
 
 @click.command()
-@click.argument("target", metavar="CASE")
+@click.argument("target", metavar="SCENE|-|CASE")
 @options(_Options)
 def cost(target: str, options: _Options) -> None:
-    """Show the time that accuracy costs for a case.
+    """Show the time that accuracy costs for a scene or a case.
 
-    Finished points are kept: the same command continues an interrupted sweep.
+    A scene without a reference is run at three spacings or more, and the error of each is estimated
+    from what they tend to. Finished points are kept: the same command continues an interrupted
+    sweep.
     """
     goal = goal_of(options.accuracy, options.time)
-    case = resolve(target, options.settings)
-    if not isinstance(case, Case):
-        raise SceneError(f"{target!r} is a scene, which has no reference; give a case")
+    case = case_of(resolve(target, options.settings), target, options.of, options.references)
+    target = name_of(target)
     if options.accuracy is not None and options.time is not None:
         raise SceneError("--accuracy and --time are two questions; ask one at a time")
     if options.report and goal is not None:
@@ -150,6 +168,7 @@ def _sweep(
         write_report(result, case, page, faster=faster)
     facts = {
         "case": target,
+        "is a scene": isinstance(case, SceneCase),
         "points": rows,
         "orders": [
             {
@@ -192,9 +211,10 @@ def _sweep_text(
         ["scheme", "in spacing", "in time", "falls steadily"],
         [[o.label, o.in_spacing, o.in_time, not o.crosses] for o in result.orders()],
     )
-    if bars := facts["without a reference"]:
-        title = "without the reference: extrapolation of the three finest spacings"
-        yield Table.of(title, bars, list(bars[0]))
+    if result.limits:
+        yield from with_warnings(ESTIMATED, facts["without a reference"])
+    elif bars := facts["without a reference"]:
+        yield Table.of("without the reference: extrapolation", bars, list(bars[0]))
     for point in result.points:
         if not point.finished:
             yield f"failed: {point.label()}: {point.outcome.splitlines()[0]}"
@@ -203,7 +223,8 @@ def _sweep_text(
         place = "on the front" if excess == 1.0 else "failed"
         if isfinite(excess) and excess != 1.0:
             place = f"{excess:.2g} times the time of an equally accurate one on the front"
-        yield f"the case's own parameters: {default.brief()}: {place}"
+        whose = "the scene as it is" if facts["is a scene"] else "the case's own parameters"
+        yield f"{whose}: {default.brief()}: {place}"
     yield facts["sentence"]
     if facts["largest step"]:
         yield facts["largest step"]
@@ -215,6 +236,8 @@ def _sweep_text(
 
 def _extrapolations(result: Frontier) -> Sequence[Mapping[str, Any]]:
     """Error bar of every scheme on the front that has three points or more."""
+    if result.limits:
+        return limit_rows(result.limits)
     bars = []
     on_front = {result.scheme(point) for point in result.front()}
     for scheme, points in result.schemes().items():
@@ -251,6 +274,7 @@ def _search(
         "tried": [_facts(point) for point in result.tried],
         "spent [s]": result.spent,
         "sure": result.sure,
+        "estimated": limit_rows(result.limits),
         "scenes": [str(path) for path in scenes],
     }
     return facts, _search_text(facts, result, options.verbose), best is not None
@@ -260,7 +284,8 @@ def _search_text(
     facts: Mapping[str, Any], result: SearchResult, verbose: bool
 ) -> Iterator[Table | str]:
     yield _points_table(f"{facts['case']}: configurations tried", result.tried, verbose)
-    yield f"{result.sure}; {result.spent:.3g} s of runs"
+    yield from with_warnings(ESTIMATED, facts["estimated"])
+    yield f"{result.sure}; the search took {result.spent:.3g} s of runs"
     yield from (f"scene: {path}" for path in facts["scenes"])
     if result.point is None:
         yield "found: nothing; give finer values by --axis, or a longer time by --longest"

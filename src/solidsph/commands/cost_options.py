@@ -1,4 +1,4 @@
-"""Values of the options of `solidsph cost`: axes, an accuracy, a time."""
+"""Values of the options of `solidsph cost`: axes, an accuracy, a time, what it is of."""
 
 from __future__ import annotations
 
@@ -9,11 +9,24 @@ from typing import Any
 
 from solidsph.commands.target import parameters
 from solidsph.errors import SceneError
+from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case
 from solidsph.studies.cost import Axes, sweep_of
+from solidsph.studies.scene_case import SceneCase
 from solidsph.studies.search import Goal
 
 _UNITS = {"": 1.0, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+def case_of(
+    wanted: Scene | Case, target: str, of: Sequence[str] = (), references: Sequence[str] = ()
+) -> Case:
+    """The case to be priced: a scene becomes one."""
+    if isinstance(wanted, Scene):
+        return SceneCase.of(wanted, of, references)
+    if of or references:
+        raise SceneError(f"--of and --reference are for a scene; the case {target!r} has its own")
+    return wanted
 
 
 def axes_of(texts: Sequence[str], case: Case) -> Axes:

@@ -31,7 +31,7 @@ def flag(text: str, *names: str) -> Any:
 
 
 def set_option(of: str) -> Any:
-    """Field for `--set NAME=VALUE`, parameters of a case or part."""
+    """Field for `--set NAME=VALUE`, of a case, a scene or a part."""
     return option(f"Set a parameter of {of}.", "--set", multiple=True, metavar="NAME=VALUE")
 
 

@@ -26,7 +26,7 @@ class _Options(Output):
 def plot(result: Path, options: _Options) -> None:
     """Draw the pictures of a record.
 
-    They show the deformed body, coloured by a field, and the energies.
+    They show the deformed body, coloured by a field, the energies, and what the probes measured.
     """
     from solidsph.results.pictures import draw
 

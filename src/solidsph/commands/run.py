@@ -11,6 +11,7 @@ import click
 
 from solidsph.advice import Advice, advise
 from solidsph.commands import prediction as predictions
+from solidsph.commands.accuracy import Accurate, accurate, beside_references
 from solidsph.commands.console import (
     Table,
     known_facts,
@@ -20,6 +21,7 @@ from solidsph.commands.console import (
     remark,
     say,
 )
+from solidsph.commands.limit_tables import with_warnings
 from solidsph.commands.options import (
     FILE,
     ProgressOutput,
@@ -44,13 +46,15 @@ from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 from solidsph.studies.case import Case
 from solidsph.studies.case_run import CaseResult, run_case
+from solidsph.studies.quantity import columns_of
 from solidsph.studies.receipts import quantity, receipts
+from solidsph.studies.scene_case import references_of
 from solidsph.watch import Finding, run_watched
 
 
 @attrs.frozen
 class _Options(ProgressOutput):
-    settings: tuple[str, ...] = set_option("the case")
+    settings: tuple[str, ...] = set_option("the case, or a word or key of the scene")
     output: Path | None = output_option(
         "Folder for records and pictures, or for a scene the file of its record (.h5 or .vtkhdf).  "
         "[default: results/NAME]"
@@ -67,6 +71,24 @@ class _Options(ProgressOutput):
         type=click.IntRange(min=0),
         default=0,
         metavar="N",
+    )
+    accuracy: str | None = option(
+        "Search for the quickest spacing with this error, such as 1%, run that, and give every "
+        "probe with its error bar.",
+        metavar="PERCENT",
+    )
+    of: tuple[str, ...] = option(
+        "With --accuracy: of this column of the history or this probe only; before it may stand "
+        "final, peak or mean.",
+        "--of",
+        multiple=True,
+        metavar="[peak] NAME",
+    )
+    longest: str = option(
+        "With --accuracy: run nothing that is expected to take longer.",
+        default="10min",
+        show_default=True,
+        metavar="TIME",
     )
     receipts: bool = flag(
         "Then report what each effect cost and changed, by runs without it at reduced size."
@@ -108,6 +130,10 @@ def run(target: str, options: _Options) -> None:
     folder = options.output or Path("results") / name_of(target)
     watch = options.watch or options.roll_back
     if isinstance(wanted, Case):
+        if options.accuracy is not None or options.of:
+            raise SceneError(
+                "--accuracy is for a scene; of a case ask: solidsph cost CASE --accuracy"
+            )
         if watch:
             raise SceneError(
                 "--watch is for one scene, and a case is several, some of which diverge on "
@@ -120,7 +146,24 @@ def run(target: str, options: _Options) -> None:
     if watch and wanted.statics is not None:
         raise SceneError("--watch is for motions; an equilibrium is tested by itself")
     path = folder if folder.suffix in RECORD_SUFFIXES else folder / "record.h5"
-    _run_scene(target, wanted, path, options)
+    if options.accuracy is None:
+        if options.of:
+            raise SceneError("--of says what --accuracy is of; add --accuracy, such as 1%")
+        _run_scene(target, wanted, path, options)
+        return
+    options.check_record(path)
+    found = accurate(
+        name_of(target),
+        wanted,
+        options.accuracy,
+        of=options.of,
+        longest=options.longest,
+        folder=path.parent / "search",
+        shown=options.progress,
+    )
+    if found.best is None:
+        present(found.facts, found.text(), as_json=options.as_json, passed=False)
+    _run_scene(target, found.scene, path, options, found)
 
 
 def _write(wanted: Scene | Case, path: Path, *, as_json: bool) -> None:
@@ -135,12 +178,15 @@ def _write(wanted: Scene | Case, path: Path, *, as_json: bool) -> None:
     present(facts, [f"wrote {file}" for file in written], as_json=as_json)
 
 
-def _run_scene(target: str, scene: Scene, path: Path, options: _Options) -> None:
+def _run_scene(
+    target: str, scene: Scene, path: Path, options: _Options, found: Accurate | None = None
+) -> None:
     options.check_memory(scene)
     options.check_record(path)
     known = known_facts()
     known |= {"scene": target, "record": str(path), "warnings": []}
     simulation, build = predictions.build_timed(scene)
+    references = references_of(scene, columns_of(simulation)) if scene.references else ()
     advice = advise(simulation)
     known["warnings"] += [warning.line for warning in advice]
     if not options.as_json:
@@ -181,6 +227,12 @@ def _run_scene(target: str, scene: Scene, path: Path, options: _Options) -> None
     }
     # Notes and final values are not read from the file, which other processes may replace.
     known |= {**effort, "notes": list(result.notes), "final": result.final}
+    compared = beside_references(path, references)
+    bars = found.write_bars(path) if found is not None else ()
+    if found is not None:
+        known |= {"accuracy": found.facts, "error bars": bars}
+    known["references"] = compared
+    passed = all(row["as expected"] for row in compared)
     of = options.receipts_of
     effects = receipts(simulation, end=result.state, of=of) if options.receipts else None
     if effects is not None:
@@ -191,14 +243,19 @@ def _run_scene(target: str, scene: Scene, path: Path, options: _Options) -> None
         values = {name: value for name, value in effort.items() if name not in hidden}
         yield Table.of_values(target, values)
         yield Table.of_values("at the end", result.final, "quantity")
+        yield from with_warnings("with error bars", bars)
+        if compared:
+            yield Table.of("beside the references", compared, list(compared[0]))
+        if found is not None:
+            yield found.sentence
         yield from (f"note: {note}" for note in result.notes)
         yield f"record: {path} (open it in ParaView, or with: solidsph plot {path})"
         if effects is not None:
             yield from receipts_text(effects, of)
 
     if unsound is None or not options.as_json:
-        facts = {**known, "outcome": FINISHED, "exit code": 0}
-        present(facts, text(), as_json=options.as_json)
+        facts = {**known, "outcome": FINISHED, "exit code": 0 if passed else 1}
+        present(facts, text(), as_json=options.as_json, passed=passed or unsound is not None)
     if unsound is not None:
         raise unsound
 

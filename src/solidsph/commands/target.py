@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import sys
 import tomllib
 from collections.abc import Sequence
@@ -16,7 +17,7 @@ from solidsph.registry.construct import construct
 from solidsph.scene.scene import Scene
 from solidsph.scene.toml_reader import MOST_BYTES, similar_names
 from solidsph.studies.case import Case
-from solidsph.studies.scene_words import WORDS
+from solidsph.studies.scene_words import WORDS, changed, is_word
 from solidsph.studies.variant import with_settings
 from solidsph.system.encoding import decoded
 
@@ -33,11 +34,17 @@ def resolve(target: str, settings: Sequence[str]) -> Scene | Case:
     cases = registry.names("cases")
     is_case = target in cases and not path.is_file()
     if not is_case and (target == STANDARD_INPUT or target.endswith(".toml") or path.exists()):
-        if settings:
-            raise SceneError(
-                f"--set changes the parameters of a case; {target!r} is a scene file: edit it"
-            )
-        return _from_standard_input() if target == STANDARD_INPUT else Scene.read(path)
+        scene = _from_standard_input() if target == STANDARD_INPUT else Scene.read(path)
+        for name, value in parameters(settings).items():
+            if not is_word(name):
+                near = difflib.get_close_matches(name, WORDS, 1)
+                hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(WORDS)}"
+                raise SceneError(
+                    f"--set {name}: no such word of a scene; {hint}; or a key of its file, such as "
+                    "body.NAME.spacing"
+                )
+            scene = changed(scene, name, value)
+        return scene
     if target not in cases:
         what = "no file" if "/" in target or "." in target else "unknown case"
         hint = similar_names(target, *cases) or "; give a scene file, or a case: solidsph cases"

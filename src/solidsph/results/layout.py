@@ -11,6 +11,7 @@ dimensions only, so a vector is padded with zeros to 3 components and a tensor t
 | `/VTKHDF/Steps` | 1 every step | times, and the first row of each step in the above |
 | `/VTKHDF/Steps`, attribute `NSteps` | | how many steps are complete: written last |
 | `/solidsph/step`, `/solidsph/history` | 1 every step | step numbers; named columns |
+| `/solidsph/error_bars` | 1 every quantity | numbers and their estimated errors, if any |
 | `/solidsph/digests` | 1 every step | digest of everything in the step |
 | the rest of `/solidsph` | | scene, plugins, versions, bodies, tags, faces, outcome; a digest |
 """

@@ -64,6 +64,7 @@ _FIRST = (
         for name in ("versions", "fields", "tags", "bodies")
     ),
     Entry("solidsph/plugins", _TABLE, (ANY,)),
+    Entry("solidsph/error_bars", _TABLE, (ANY,), is_optional=True),
     Entry("solidsph/body_ranges", _WHOLE, (ANY, 2)),
     Entry("VTKHDF/PointData/volume", _FLOAT, (ANY,)),
 )

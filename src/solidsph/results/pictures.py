@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import largest_principal
+from solidsph.results.probe_picture import draw_probes
 from solidsph.results.record import Record
 
 _STRESS = "cauchy_stress"
@@ -31,7 +32,8 @@ def draw(record: Record, folder: Path, stem: str, field: str = _STRESS) -> Seque
     else:
         _draw_bodies(record, field, motion)
     _draw_energies(record.times, record.history, energy)
-    return [motion, energy]
+    probes = draw_probes(record, folder / f"{stem}-probes.png")
+    return [motion, energy] if probes is None else [motion, energy, probes]
 
 
 def _magnitudes(values: Array) -> Array:

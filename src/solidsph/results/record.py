@@ -18,6 +18,7 @@ from solidsph.errors import RecordError
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import Face, Particles
 from solidsph.results.contents import Output, Reference
+from solidsph.results.error_bars import read_error_bars
 from solidsph.results.hdf5_source import SIGNATURE, HDF5Source, is_unclosed
 from solidsph.results.layout import (
     FORMAT,
@@ -64,6 +65,8 @@ class Record:
         units: unit of each field, by its name.
         history: column -> (steps,) values.
         history_units: unit of each column.
+        error_bars: numbers of the history with their estimated errors, by quantity, of a run whose
+            accuracy was asked for.
         scene: what was asked for, as TOML text.
         plugins: every part used.
         versions: of the software that produced the run, by its name.
@@ -137,6 +140,7 @@ class Record:
         )
         units = table.attrs["units"] if table is not None else ()
         self.history_units = {name: unit.decode() for name, unit in zip(names, units, strict=True)}
+        self.error_bars = MappingProxyType(read_error_bars(self._file))
         check_values(self.particles, self.times, self.steps)
         if self.reference.digest().hex() != _word(run, "digest"):
             raise ValueError("the particles or the scene in it are not those that were written")

@@ -73,6 +73,17 @@ class ProbeScene:
 
 
 @attrs.frozen
+class ReferenceScene:
+    """What a column of the history should be; see `solidsph.studies.reference`."""
+
+    quantity: str | None = None  # a column, or the label of a probe: "tip y", "peak tip y"
+    value: float | str | None = None  # a number, or a formula, of the time t for a curve
+    file: str | None = None  # with columns of times and values, in place of `value`
+    source: str = ""
+    tolerance: float = 0.01  # largest error with which a run passes [-]
+
+
+@attrs.frozen
 class StaticsScene:
     """Parameters of an equilibrium; see `statics.equilibrium`."""
 
@@ -126,6 +137,7 @@ class SceneData:
     effects: Sequence[ImposedScene] = ()
     initial: Sequence[InitialScene] = ()
     probes: Sequence[ProbeScene] = ()
+    references: Sequence[ReferenceScene] = ()
     integrator: PartLike | None = None
     sleep: SleepScene | None = None  # None: no region sleeps
     statics: StaticsScene | None = None  # None: a motion, no equilibrium

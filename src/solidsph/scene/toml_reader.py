@@ -22,6 +22,7 @@ from solidsph.scene.scene_data import (
     ImposedScene,
     InitialScene,
     ProbeScene,
+    ReferenceScene,
     SceneData,
     SleepScene,
     StaticsScene,
@@ -34,7 +35,7 @@ MOST_BYTES = 2**26
 
 _MOST_FILES = 10_000  # of a folder, compared with a wrong name
 
-_SECTIONS = {
+SECTIONS = {
     "body": "[body.NAME]",
     "kernel": "[kernel]",
     "material": "[material]",
@@ -43,12 +44,13 @@ _SECTIONS = {
     "effect": "[[effect]]",
     "initial": "[[initial]]",
     "probe": "[[probe]]",
+    "reference": "[[reference]]",
     "integrator": "[integrator]",
     "sleep": "[sleep]",
     "statics": "[statics]",
 }
 _SCALARS = ("title", "scheme", "duration", "outputs", "engine", "energy_tolerance", "silence")
-_KEYS = (*_SCALARS, *_SECTIONS)
+_KEYS = (*_SCALARS, *SECTIONS)
 
 # Fields of a scene that stand in the table of a part.
 _NESTED = {"kernel": ("cover",), "integrator": ("time_step_factor", "time_step")}
@@ -131,6 +133,7 @@ def _scene(table: Mapping[str, Any], problems: Problems) -> tuple[dict[str, Any]
         ("effect", "effects", _imposed),
         ("initial", "initial", _initial),
         ("probe", "probes", _probe),
+        ("reference", "references", _reference),
     ):
         entries = problems.attempt(_list, table, key) or []
         several = [problems.attempt(read_entry, entry, key, problems) for entry in entries]
@@ -200,6 +203,21 @@ def _probe(entry: Any, what: str, problems: Problems) -> Any:
     return _simple(entry, what, ProbeScene, problems)
 
 
+def _reference(entry: Any, what: str, problems: Problems) -> Any:
+    reference = _simple(entry, what, ReferenceScene, problems)
+    if not reference.quantity:
+        raise SceneError(
+            f"{what}: no quantity; add quantity = ..., a column of the history or the label of a "
+            "probe"
+        )
+    if (reference.value is None) == (reference.file is None):
+        raise SceneError(
+            f"{what} of {reference.quantity!r}: give either value = ..., a number or a formula, or "
+            "file = ..., a table of times and values"
+        )
+    return reference
+
+
 def _simple(entry: Any, what: str, kind: type[Any], problems: Problems) -> Any:
     """An object of class `kind` from a table of its fields."""
     known = _check_keys(_mapping(entry, what), _names_of(kind), what, problems)
@@ -256,7 +274,7 @@ _READERS: Mapping[Any, Callable[[Any, str], Any]] = {
 
 def _mapping(value: Any, what: str) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
-        shown = _SECTIONS.get(what, f"a table {what}")
+        shown = SECTIONS.get(what, f"a table {what}")
         raise SceneError(f"{what} must be a table, got {value!r}; write {shown}")
     return value
 
@@ -264,7 +282,7 @@ def _mapping(value: Any, what: str) -> Mapping[str, Any]:
 def _list(table: Mapping[str, Any], key: str) -> list[Any]:
     value = table.get(key, [])
     if not isinstance(value, list):
-        raise SceneError(f"{key} must be a list of tables; write {_SECTIONS[key]}")
+        raise SceneError(f"{key} must be a list of tables; write {SECTIONS[key]}")
     return value
 
 

@@ -15,6 +15,7 @@ from solidsph.scene.scene_data import (
     BodyScene,
     ImposedScene,
     PartLike,
+    ReferenceScene,
     SceneData,
 )
 
@@ -46,6 +47,7 @@ def toml_of(scene: SceneData) -> str:
         "effect": _imposed("effects", scene.effects),
         "initial": [attrs.asdict(entry) for entry in scene.initial] or None,
         "probe": [attrs.asdict(entry) for entry in scene.probes] or None,
+        "reference": [_reference(entry) for entry in scene.references] or None,
     }
     return tomli_w.dumps({key: _plain(v, key) for key, v in table.items() if v is not None})
 
@@ -73,6 +75,10 @@ def _integrator(scene: SceneData) -> dict[str, Any]:
 
 def _imposed(kind: str, entries: Sequence[ImposedScene]) -> list[Mapping[str, Any]] | None:
     return [{**_part(kind, e.part), "label": e.label or None} for e in entries] or None
+
+
+def _reference(reference: ReferenceScene) -> dict[str, Any]:
+    return {**attrs.asdict(reference), "source": reference.source or None}
 
 
 def _optional(kind: str, part: PartLike | None) -> Mapping[str, Any] | None:

@@ -38,6 +38,7 @@ class Measurement:
     verdict: str = ""  # its meaning in a word or two
     passed: bool = True  # whether the outcome is as the source predicts
     paper: str = ""  # statement of the paper about it, if any
+    scale: float | None = None  # what an error is relative to where there is no reference
 
 
 @attrs.frozen

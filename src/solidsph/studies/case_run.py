@@ -32,6 +32,7 @@ class SceneRun:
     steps: int  # recorded steps in time, or load steps
     evaluations: int  # of the forces, or of the tangent
     particles: int
+    spacing: float  # the smallest, of the particles as they are placed [m]
     pairs: int
     pairs_visited: int  # in an evaluation, those of effects included
     bytes_touched: int  # in an evaluation, at least
@@ -125,6 +126,7 @@ def run_scenes(
                 steps=steps,
                 evaluations=effort.get("iterations", steps),
                 particles=simulation.particles.count,
+                spacing=float(simulation.particles.spacings.min()),
                 pairs=simulation.dynamics.internal.pair_count,
                 pairs_visited=work.visited,
                 bytes_touched=work.touched,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import product
 from pathlib import Path
@@ -13,13 +13,17 @@ import attrs
 
 from solidsph.errors import SceneError
 from solidsph.registry.construct import construct
+from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case
 from solidsph.studies.frontier import Frontier
 from solidsph.studies.journal import Journal
 from solidsph.studies.point import Point
 from solidsph.studies.processes import Processes
+from solidsph.studies.refine import refine
+from solidsph.studies.refinement import judged, limits, needs_estimate
 from solidsph.studies.runner import Runner
-from solidsph.studies.search import Goal, SearchResult, Settings, search
+from solidsph.studies.scene_case import SceneCase
+from solidsph.studies.search import Goal, SearchResult, Settings, own_scheme, search
 from solidsph.studies.sweep import StatusCallback, ignore_status, sweep
 from solidsph.studies.task import Task
 from solidsph.studies.variant import setting_of, with_settings
@@ -49,18 +53,20 @@ class SweepSetup:
 
 
 def frontier(
-    case: Case | str, axes: Axes | None = None, setup: SweepSetup | None = None
+    case: Case | Scene | str, axes: Axes | None = None, setup: SweepSetup | None = None
 ) -> Frontier:
     """Run `case` at every combination of the values of `axes`, and at its own parameters.
 
     Args:
-        case: a case or its registered name.
+        case: a case or its registered name, or a scene, whose probes are measured. Where there is
+            no reference, errors are estimated by refinement (`Frontier.limits`).
         axes: parameters of the case, or keys of any scene, with the values to try. The first one
             refines, from coarse to fine. By default those of the case.
         setup: by default one process at a time and one repeat, and nothing is kept.
 
     Raises:
-        SceneError: there is no such axis, or nothing to sweep.
+        SceneError: there is no such axis, or nothing to sweep; or an error is to be estimated and
+            fewer than three spacings have finished.
     """
     priced, axes = _priced(case, axes)
     grid: list[Settings] = [
@@ -70,18 +76,29 @@ def frontier(
     if own is not None and own not in grid:
         grid.append(own)
     points = (setup or SweepSetup()).points(priced, grid)
-    return Frontier(points, next(iter(axes)))
+    refining = next(iter(axes))
+    if not needs_estimate(points):
+        return Frontier(points, refining)
+    known = limits(points, refining)
+    return Frontier([judged(point, known) for point in points], refining, known)
 
 
 def find_best(
-    case: Case | str,
+    case: Case | Scene | str,
     goal: Goal,
     axes: Axes | None = None,
     setup: SweepSetup | None = None,
     *,
     longest: float = 600.0,
 ) -> SearchResult:
-    """The best configuration for `goal`, by few runs; see `search`."""
+    """The best configuration for `goal`, by few runs; see `search`.
+
+    Where there is no reference, the case's own scheme is refined first, until its error bar is
+    small enough to tell; what it tends to then stands for the reference.
+
+    Raises:
+        SceneError: there is no such axis, or fewer than three spacings have finished.
+    """
     priced, axes = _priced(case, axes)
     how = setup or SweepSetup()
 
@@ -89,7 +106,43 @@ def find_best(
         (point,) = how.points(priced, [settings])
         return point
 
-    return search(priced, axes, goal, run, longest=longest)
+    if not isinstance(priced, SceneCase) or priced.references:
+        return search(priced, axes, goal, run, longest=longest)
+    return _find_without_reference(priced, axes, goal, run, longest)
+
+
+def _find_without_reference(
+    case: SceneCase, axes: Axes, goal: Goal, run: Callable[[Settings], Point], longest: float
+) -> SearchResult:
+    """Refine the scene's own scheme, then search with errors against what it tends to."""
+    refining, *others = axes
+    schemes = [
+        dict(zip(others, values, strict=True)) for values in product(*(axes[o] for o in others))
+    ]
+    scheme = {**schemes[0], **own_scheme(case, others, schemes)}
+    kept: dict[str, Point] = {}
+
+    def run_once(settings: Settings) -> Point:
+        key = repr(sorted(settings.items()))
+        if key not in kept:
+            kept[key] = run(settings)
+        return kept[key]
+
+    refined = refine(axes[refining], scheme, goal, run_once, longest=longest)
+    levels = refined.spacings if axes[refining] == case.sweep[refining] else axes[refining]
+    found = search(
+        case,
+        {**axes, refining: levels},
+        goal,
+        lambda settings: judged(run_once(settings), refined.limits),
+        longest=longest,
+        known=refined.points,
+    )
+    return attrs.evolve(
+        found,
+        tried=[judged(point, refined.limits) for point in kept.values()],
+        limits=refined.limits,
+    )
 
 
 def sweep_of(case: Case) -> Axes:
@@ -114,9 +167,9 @@ def default_settings(case: Case, axes: Axes) -> Settings | None:
         return None
 
 
-def _priced(case: Case | str, axes: Axes | None) -> tuple[Case, Axes]:
+def _priced(case: Case | Scene | str, axes: Axes | None) -> tuple[Case, Axes]:
     """The case to run, and its axes, whose values have been tried one by one."""
-    whole: Case = construct("cases", case)
+    whole: Case = SceneCase.of(case) if isinstance(case, Scene) else construct("cases", case)
     priced = whole.priced()
     axes = axes or sweep_of(priced)
     for axis, values in axes.items():

@@ -11,6 +11,7 @@ from typing import Any, final
 import attrs
 import numpy as np
 
+from solidsph.studies.limit import Limit
 from solidsph.studies.point import Point, label
 
 Cost = Callable[[Point], float]
@@ -41,6 +42,7 @@ class Frontier:
 
     points: Sequence[Point]
     refining: str  # the setting that refines
+    limits: Sequence[Limit] = ()  # what errors are of where there is no reference
 
     @cached_property
     def _trusted(self) -> Mapping[int, float]:
@@ -183,6 +185,9 @@ class Frontier:
             failed = self.points[0].outcome if self.points else "there is no point"
             return f"no configuration finished: {failed}"
         parts = []
+        worst = max(self.limits, key=lambda limit: limit.bar, default=None)
+        if worst is not None and worst.warning:
+            parts.append(f"errors are estimates to be used with care: {worst.warning}")
         for accuracy in (0.1, 0.01, 0.001):
             point = self.cheapest(accuracy)
             if point is not None:

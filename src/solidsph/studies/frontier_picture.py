@@ -51,7 +51,8 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
     by_time.set_yscale("log")
     by_time.margins(x=0.12)
     by_time.set_xlabel("wall time [s]")
-    by_time.set_ylabel(f"error [%] of: {frontier.quantity or 'result'}")
+    kind = "estimated error" if frontier.limits else "error"
+    by_time.set_ylabel(f"{kind} [%] of: {frontier.quantity or 'result'}")
     by_time.legend(
         frameon=False,
         fontsize=8,

@@ -16,7 +16,7 @@ from solidsph.studies.point import Point
 from solidsph.studies.task import Task
 from solidsph.studies.task_lines import decode_point, encode_point
 
-VERSION = 1
+VERSION = 2
 """Version of the format. Lines of other versions are kept and ignored."""
 
 Append = Callable[[Task, Point], None]

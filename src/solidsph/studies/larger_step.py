@@ -11,6 +11,7 @@ from solidsph.studies.case import Case
 from solidsph.studies.cost import SweepSetup
 from solidsph.studies.frontier import Frontier
 from solidsph.studies.point import Point
+from solidsph.studies.refinement import judged
 from solidsph.studies.variant import with_settings
 
 LARGEST = 0.8
@@ -56,7 +57,7 @@ def at_largest_step(case: Case, made: Frontier, setup: SweepSetup) -> Sequence[L
     factors = {id(point): _factor(priced, point.settings) for point in made.front()}
     usual = [point for point in made.front() if factors[id(point)] < LARGEST]
     grid = [{**point.settings, _FACTOR: LARGEST} for point in usual]
-    points = setup.points(priced, grid) if grid else ()
+    points = [judged(p, made.limits) for p in setup.points(priced, grid)] if grid else []
     return [
         LargerStep(before, factors[id(before)], after)
         for before, after in zip(usual, points, strict=True)

@@ -25,6 +25,14 @@ def _floats(values: Iterable[float]) -> tuple[float, ...]:
     return tuple(map(float, values))
 
 
+def _pairs(values: Mapping[str, Iterable[float]]) -> dict[str, tuple[float, float]]:
+    pairs = {}
+    for name, pair in values.items():
+        value, scale = _floats(pair)
+        pairs[name] = (value, scale)
+    return pairs
+
+
 @attrs.frozen
 class Point:
     """Error and cost of one configuration. All but time and memory are machine-independent."""
@@ -42,6 +50,8 @@ class Point:
     bytes_touched: int = attrs.field(default=0, converter=int)  # in all evaluations, at least
     seconds: Sequence[float] = attrs.field(default=(inf,), converter=_floats)  # of repeats [s]
     peak_memory: int = attrs.field(default=0, converter=int)  # of the largest process [bytes]
+    values: Mapping[str, tuple[float, float]] = attrs.field(factory=dict, converter=_pairs)
+    """Value and scale of every quantity without a reference, by name."""
 
     @property
     def time(self) -> float:
@@ -49,9 +59,14 @@ class Point:
         return median(self.seconds)
 
     @property
+    def ran(self) -> bool:
+        """Whether the run finished, with a known error or not."""
+        return self.outcome == FINISHED
+
+    @property
     def finished(self) -> bool:
         """Whether the run finished with a finite error."""
-        return self.outcome == FINISHED and isfinite(self.error)
+        return self.ran and isfinite(self.error)
 
     def label(self) -> str:
         """Settings in one line."""
@@ -74,7 +89,8 @@ def run_point(case: Case, settings: Mapping[str, Any]) -> Point:
             runs = run_scenes(variant, Path(folder))
             seconds = clock.perf_counter() - begun
             with open_records(runs) as records:
-                headline = variant.accuracy(variant.measure(records))
+                measured = variant.measure(records)
+                headline = variant.accuracy(measured)
             if not runs:  # the measurement is all the work
                 seconds = clock.perf_counter() - begun
         failed = [run.outcome for run in runs if run.outcome != FINISHED]
@@ -85,13 +101,14 @@ def run_point(case: Case, settings: Mapping[str, Any]) -> Point:
             quantity=headline.quantity,
             value=headline.value,
             reference=headline.reference,
-            spacing=variant.resolution,
+            spacing=min((run.spacing for run in runs), default=variant.resolution),
             particles=sum(run.particles for run in runs),
             steps=sum(run.steps for run in runs),
             pair_evaluations=sum(run.pairs_visited * run.evaluations for run in runs),
             bytes_touched=sum(run.bytes_touched * run.evaluations for run in runs),
             seconds=(seconds,),
             peak_memory=peak_memory(),
+            values={m.quantity: (m.value, m.scale) for m in measured if m.scale is not None},
         )
     except SolidsphError as cause:
         return Point(dict(settings), inf, outcome=str(cause))

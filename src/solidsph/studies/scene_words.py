@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from math import inf
 from typing import Any, final
 
 import attrs
@@ -11,6 +12,7 @@ import attrs
 from solidsph.errors import SceneError
 from solidsph.registry.construct import construct, describe
 from solidsph.scene.default_cover import cover_of
+from solidsph.scene.keys import is_key, with_key
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import DEFAULT_FACTOR, RECOMMENDED, ImposedScene, PartLike
 from solidsph.scene.scheme import completed, scheme_of
@@ -28,9 +30,15 @@ class SceneWord:
 
 
 def changed(scene: Scene, name: str, value: Any) -> Scene:
-    """`scene` with another value of a word, or of a parameter of an effect, "effect.parameter"."""
-    word = WORDS.get(name)
-    return word.change(scene, value) if word else _with_effect(scene, name, value)
+    """`scene` with another value of a word, at a key of its file, or of "effect.parameter"."""
+    if name in WORDS:
+        return WORDS[name].change(scene, value)
+    return with_key(scene, name, value) if is_key(name) else _with_effect(scene, name, value)
+
+
+def is_word(name: str) -> bool:
+    """Whether `changed` may know the name: what has a dot is looked up in a scene."""
+    return name in WORDS or "." in name
 
 
 def named(scene: Scene) -> frozenset[str]:
@@ -53,6 +61,24 @@ def named(scene: Scene) -> frozenset[str]:
         },
     }
     return frozenset(word for word, is_stated in stated.items() if is_stated)
+
+
+def smallest_spacing(scene: Scene) -> float:
+    """Smallest particle spacing of its bodies [m]."""
+    return min(body.spacing for body in scene.bodies.values())
+
+
+def _with_spacing(scene: Scene, value: Any) -> Scene:
+    """`scene` with this as its smallest spacing; those of other bodies keep their ratio to it."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < inf:
+        raise SceneError(f"spacing must be a length in metres, got {value!r}")
+    least = smallest_spacing(scene)
+    factor = value / least
+    bodies = {
+        name: attrs.evolve(body, spacing=factor * body.spacing if body.spacing > least else value)
+        for name, body in scene.bodies.items()
+    }
+    return attrs.evolve(scene, bodies=bodies)
 
 
 def _field(name: str) -> SceneWord:
@@ -150,6 +176,7 @@ _FIELDS = (
 )
 
 WORDS: Mapping[str, SceneWord] = {
+    "spacing": SceneWord(smallest_spacing, _with_spacing),
     "discretisation": SceneWord(_discretisation, _with_discretisation),
     "cover": SceneWord(cover_of, _field("cover").change),
     "formulation": _operator("type"),

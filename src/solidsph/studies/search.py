@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from itertools import product
 from math import inf, isfinite, log
@@ -13,8 +14,9 @@ import attrs
 
 from solidsph.errors import SceneError
 from solidsph.studies.case import Case
+from solidsph.studies.limit import Limit
 from solidsph.studies.point import Point
-from solidsph.studies.variant import with_settings
+from solidsph.studies.variant import setting_of, with_settings
 
 Settings = Mapping[str, Any]
 Axes = Mapping[str, Sequence[Any]]
@@ -86,6 +88,7 @@ class SearchResult:
     point: Point | None  # the best that meets the goal; None if none does
     tried: Sequence[Point]
     sure: str  # its reliability, in words
+    limits: Sequence[Limit] = ()  # what errors are of where there is no reference
 
     @property
     def spent(self) -> float:
@@ -100,6 +103,7 @@ def search(
     run: Callable[[Settings], Point],
     *,
     longest: float = 600.0,
+    known: Sequence[Point] = (),
 ) -> SearchResult:
     """Search for `goal` among the values of `axes`, and beyond the finest if necessary.
 
@@ -116,6 +120,7 @@ def search(
         goal: what is searched for.
         run: measures a configuration.
         longest: predicted wall time above which nothing is run [s].
+        known: points that have been run before.
 
     Raises:
         SceneError: there is no axis.
@@ -127,11 +132,24 @@ def search(
         dict(zip(others, values, strict=True)) for values in product(*(axes[o] for o in others))
     ]
     state = _Search(case, refining, list(axes[refining]), schemes, goal, longest)
+    for earlier in known:
+        for at in product(range(len(schemes)), range(len(axes[refining]))):
+            if state.settings(at) == earlier.settings:
+                state.points[at] = earlier
     while (place := state.next()) is not None:
         state.points[place] = run(state.settings(place))
     best = state.best()
     point = None if best is None else state.points[best]
     return SearchResult(point, list(state.points.values()), state.reliability(best))
+
+
+def own_scheme(case: Case, names: Iterable[str], schemes: Sequence[Settings]) -> Settings:
+    """The case's own values of these settings, those that one of the schemes has."""
+    own = {}
+    for name in names:
+        with suppress(SceneError):
+            own[name] = setting_of(case, name)
+    return {k: v for k, v in own.items() if any(scheme[k] == v for scheme in schemes)}
 
 
 @attrs.define(eq=False, slots=False)
@@ -257,14 +275,9 @@ class _Search:
 
     @cached_property
     def _star(self) -> Sequence[int]:
-        """The scheme of the case's own parameters, as far as the axes have them, then those that
-        differ from it in one choice."""
-        own = {
-            axis: value
-            for axis in self.schemes[0]
-            for value in [getattr(self.case, axis, None)]
-            if any(scheme[axis] == value for scheme in self.schemes)
-        }
+        """The case's own scheme, as far as the axes have it, then those that differ from it in one
+        choice."""
+        own = own_scheme(self.case, self.schemes[0], self.schemes)
         centre = self.schemes.index({**self.schemes[0], **own})
         near = [i for i in range(len(self.schemes)) if len(self._differing(i, centre)) == 1]
         return [centre, *near]

@@ -73,7 +73,14 @@ def encode_point(point: Point) -> dict[str, Any]:
     table = attrs.asdict(point, recurse=False)
     numbers = {name: _number(value) for name, value in table.items() if isinstance(value, float)}
     seconds = [_number(value) for value in point.seconds]
-    return {**table, **numbers, "settings": plain(point.settings), "seconds": seconds}
+    pairs = {name: [_number(value) for value in pair] for name, pair in point.values.items()}
+    return {
+        **table,
+        **numbers,
+        "settings": plain(point.settings),
+        "seconds": seconds,
+        "values": pairs,
+    }
 
 
 def decode_point(table: Mapping[str, Any], settings: Mapping[str, Any]) -> Point:

@@ -11,9 +11,10 @@ import attrs
 
 from solidsph.errors import SceneError
 from solidsph.results.record import Record
+from solidsph.scene.keys import is_key, value_at
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case, Curves, Measurement, Picture
-from solidsph.studies.scene_words import WORDS, changed
+from solidsph.studies.scene_words import WORDS, changed, is_word
 
 
 def with_settings(case: Case, settings: Mapping[str, Any]) -> Case:
@@ -22,8 +23,8 @@ def with_settings(case: Case, settings: Mapping[str, Any]) -> Case:
     Args:
         case: to be changed.
         settings: values by name: a parameter of the case, a word such as "gradient" or
-            "precision" (`solidsph.studies.scene_words`), or a parameter of an effect such as
-            "body-force.acceleration".
+            "precision" (`solidsph.studies.scene_words`), a parameter of an effect such as
+            "body-force.acceleration", or a key of a scene file such as "material.density".
 
     Raises:
         SceneError: a name is unknown, or a value is wrong.
@@ -33,13 +34,14 @@ def with_settings(case: Case, settings: Mapping[str, Any]) -> Case:
     own = [field.name for field in attrs.fields(cls)]
     changes = {**changes, **{name: v for name, v in settings.items() if name not in own}}
     for name in changes:
-        if name not in WORDS and "." not in name:
+        if not is_word(name):
             known = sorted({*own, *WORDS})
             near = difflib.get_close_matches(name, known, 1)
             hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(known)}"
             raise SceneError(
                 f"{case.title!r} has no parameter {name!r}, nor has its scene; {hint}; a parameter "
-                "of an effect is written effect.parameter"
+                "of an effect is written effect.parameter, any other key of a scene file as there, "
+                "such as body.NAME.spacing"
             )
     try:
         parameters = {name: getattr(of, name) for name in own}
@@ -59,9 +61,11 @@ def setting_of(case: Case, name: str) -> Any:
     if name in [field.name for field in attrs.fields(type(of))]:
         return getattr(of, name)
     scene = next(iter(case.scenes().values()), None)
-    if scene is None or name not in WORDS:
-        raise SceneError(f"{case.title!r} has no parameter {name!r}, nor has its scene")
-    return WORDS[name].read(scene)
+    if scene is not None and name in WORDS:
+        return WORDS[name].read(scene)
+    if scene is not None and is_key(name):
+        return value_at(scene, name)
+    raise SceneError(f"{case.title!r} has no parameter {name!r}, nor has its scene")
 
 
 @final
@@ -97,7 +101,8 @@ class Variant(Case):
 
     @property
     def resolution(self) -> float:
-        return self.of.resolution  # no change concerns a spacing
+        changes = any(name == "spacing" or name.startswith("body.") for name in self.changes)
+        return super().resolution if changes else self.of.resolution
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         return self.of.measure(records)
