@@ -22,7 +22,7 @@ MAY_IMPORT = {
     "engines": "errors system maths model interfaces",
     "probes": "errors maths model interfaces",
     "scene": "errors system maths model interfaces registry probes",
-    "run": "errors maths model interfaces registry probes scene",
+    "run": "errors system maths model interfaces registry probes scene",
     "statics": "errors maths model interfaces engines scene run",
     "results": "errors system maths model interfaces registry probes scene run",
     "watch": "errors maths model interfaces scene run statics",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
@@ -16,28 +16,33 @@ from numpy.typing import ArrayLike, NDArray
 
 from solidsph.errors import RecordError
 from solidsph.maths.arrays import Array
-from solidsph.model.particles import Face, Particles
 from solidsph.results.contents import Output, Reference
 from solidsph.results.error_bars import read_error_bars
+from solidsph.results.hdf5_reading import check_rows, first_rows, lines, read_particles, word
 from solidsph.results.hdf5_source import SIGNATURE, HDF5Source, is_unclosed
 from solidsph.results.layout import (
     FORMAT,
     HDF5_ERRORS,
-    PARTICLE_ARRAYS,
     Field,
     PluginUsed,
     reason,
-    static_fields,
-    tag_name,
     unpadded,
 )
 from solidsph.results.layout_checks import Tree, check_first, check_rest, check_values
 from solidsph.results.time_series import TimeSeries
+from solidsph.system import html
 
 if TYPE_CHECKING:
+    import pandas
+    import xarray
+
     from solidsph.probes.values import Values
 
 T = TypeVar("T")
+
+DISPLACEMENT = "displacement"
+
+ALL = slice(None)
 
 # While the run goes on, a block of the file may be read half written, or the file be replaced.
 _ATTEMPTS = 4
@@ -118,31 +123,31 @@ class Record:
         self.plugins = tuple(
             PluginUsed(*(text.decode() for text in row)) for row in run["plugins"][()]
         )
-        self.versions = dict(line.rsplit(" ", 1) for line in _lines(run, "versions"))
+        self.versions = dict(line.rsplit(" ", 1) for line in lines(run, "versions"))
         self.notes = tuple(line.decode() for line in run.attrs.get("notes", ()))
         self.outcome = bytes(run["outcome"][()]).decode(errors="ignore")
-        self.folder = _word(run, "folder")
-        self.field_names = _lines(run, "fields")
-        check_rest(tree, announced, self.field_names, _lines(run, "tags"))
-        self.particles = self._particles(run, grid["PointData"])
+        self.folder = word(run, "folder")
+        self.field_names = lines(run, "fields")
+        check_rest(tree, announced, self.field_names, lines(run, "tags"))
+        self.particles = read_particles(run, grid["PointData"], self.dimension)
         sets = {name: grid["PointData"][name] for name in self.field_names}
-        self.units = {name: _word(dataset, "units") for name, dataset in sets.items()}
+        self.units = {name: word(dataset, "units") for name, dataset in sets.items()}
 
         count = self._readable(announced, [grid["Points"], *sets.values()])
-        self.times: Array = _first(grid["Steps/Values"], count)
-        self.steps: NDArray[np.int64] = _first(run["step"], count)
+        self.times: Array = first_rows(grid["Steps/Values"], count)
+        self.steps: NDArray[np.int64] = first_rows(run["step"], count)
         self.positions = self._series(grid["Points"], count)
         self._fields = {name: self._series(dataset, count) for name, dataset in sets.items()}
         table = run.get("history")
         names = table.dtype.names if table is not None else ()
         self.history: Mapping[str, Array] = MappingProxyType(
-            {name: np.ascontiguousarray(_first(table, count)[name]) for name in names}
+            {name: np.ascontiguousarray(first_rows(table, count)[name]) for name in names}
         )
         units = table.attrs["units"] if table is not None else ()
         self.history_units = {name: unit.decode() for name, unit in zip(names, units, strict=True)}
         self.error_bars = MappingProxyType(read_error_bars(self._file))
         check_values(self.particles, self.times, self.steps)
-        if self.reference.digest().hex() != _word(run, "digest"):
+        if self.reference.digest().hex() != word(run, "digest"):
             raise ValueError("the particles or the scene in it are not those that were written")
 
     @property
@@ -186,15 +191,84 @@ class Record:
     def field(self, name: str) -> TimeSeries:
         """The named field over time: (steps, n, *components), lazily.
 
+        `displacement` is one of every record: the positions less those of the reference [m].
+
         Raises:
             RecordError: the record has no such field.
         """
+        if name == DISPLACEMENT and name not in self._fields:
+            return self._displacement()
         if name not in self._fields:
             near = get_close_matches(name, self.field_names, n=1)
             hint = f"did you mean {near[0]!r}? " if near else ""
             known = ", ".join(self.field_names) or "none"
             raise RecordError(f"no field {name!r} in {self.path}; {hint}fields: {known}")
         return self._fields[name]
+
+    def _displacement(self) -> TimeSeries:
+        positions, X = self.positions, self.particles.positions
+        return TimeSeries(
+            positions.shape, "m", lambda first, stop: np.asarray(positions[first:stop] - X)
+        )
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The history as a table, one row an output, over the time [s].
+
+        Raises:
+            RecordError: pandas is not installed.
+        """
+        from solidsph.results.tables import history_table  # loaded only when asked for
+
+        return history_table(self.times, self.history)
+
+    def to_xarray(
+        self, fields: Sequence[str] | None = None, outputs: slice = ALL
+    ) -> xarray.Dataset:
+        """Fields over outputs and particles, and the history over outputs, with units.
+
+        Args:
+            fields: their names, also `displacement`; by default all that the record holds.
+            outputs: which outputs, all by default. What is asked for is read at once.
+
+        Raises:
+            RecordError: xarray is not installed, or there is no such field.
+        """
+        from solidsph.results.tables import dataset  # loaded only when asked for
+
+        names = self.field_names if fields is None else fields
+        return dataset(
+            self.particles,
+            self.times,
+            {"position": self.positions, **{name: self.field(name) for name in names}},
+            self.history,
+            outputs,
+            {
+                "title": self.path.stem,
+                "source": f"solidsph {self.versions.get('solidsph', '')}".strip(),
+                "outcome": self.outcome,
+            },
+        )
+
+    def _repr_html_(self) -> str:
+        """Table for notebooks."""
+        times = self.times
+        until = f"{times[0]:.5g} to {times[-1]:.5g}" if len(times) else ""
+        known = {
+            "outcome": self.outcome,
+            "outputs": self.count,
+            "t [s]": until,
+            "particles": self.particles.count,
+            "fields": ", ".join([DISPLACEMENT, *self.field_names]),
+            "notes": "; ".join(self.notes) or None,
+        }
+        final = {name: float(values[-1]) for name, values in self.history.items() if len(values)}
+        bars = {name: str(bar) for name, bar in self.error_bars.items()}
+        return (
+            html.heading(f"Record {self.path}")
+            + html.of_values({name: value for name, value in known.items() if value is not None})
+            + (html.heading("at the end") + html.of_values(final) if final else "")
+            + (html.heading("with error bars") + html.of_values(bars) if bars else "")
+        )
 
     def at(self, points: ArrayLike, output: int = -1, *, body: str | None = None) -> Values:
         """Displacement, velocity, F and stress at any points of the undeformed bodies.
@@ -245,32 +319,11 @@ class Record:
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def _particles(self, run: Any, data: Any) -> Particles:
-        arrays: dict[str, Any] = {
-            PARTICLE_ARRAYS[field.name]: unpadded(data[field.name][()], field.components)
-            for field in static_fields(self.dimension)
-            if field.name in PARTICLE_ARRAYS
-        }
-        arrays["ghosts"] = arrays["ghosts"].astype(np.bool_)
-        return Particles(
-            **arrays,
-            tags={tag: data[tag_name(tag)][()].astype(np.bool_) for tag in _lines(run, "tags")},
-            bodies={
-                name: slice(int(start), int(stop))
-                for name, (start, stop) in zip(
-                    _lines(run, "bodies"), run["body_ranges"][()], strict=True
-                )
-            },
-            faces=dict(
-                _face(run[f"faces/{number}"]) for number in range(len(run.get("faces", ())))
-            ),
-        )
-
     def _readable(self, count: int, datasets: list[Any]) -> int:
         """Number of the `count` steps that can be read; a file may have lost its end."""
         n = self.particles.count
         for dataset in datasets:
-            _check_rows(dataset, count * n)
+            check_rows(dataset, count * n)
         if self.is_closed_by_writer:
             return count
         while count and n:
@@ -290,7 +343,7 @@ class Record:
             rows: Array = self._with_retries(lambda: dataset[first * n : stop * n])
             return unpadded(rows, components).reshape(stop - first, n, *components)
 
-        return TimeSeries((count, n, *components), _word(dataset, "units"), read)
+        return TimeSeries((count, n, *components), word(dataset, "units"), read)
 
     def _with_retries(self, read: Callable[[], T]) -> T:
         """Call `read`, again if it fails while the run goes on."""
@@ -346,27 +399,3 @@ def _may_change(path: Path) -> bool:
         return is_unclosed(_head(path))
     except (OSError, RecordError):
         return False
-
-
-def _check_rows(dataset: Any, rows: int) -> None:
-    if dataset.shape[0] < rows:
-        # Damage, or the run went on since the last read: then a new attempt helps.
-        raise OSError(f"{dataset.name} has {dataset.shape[0]} rows instead of {rows}")
-
-
-def _first(dataset: Any, rows: int) -> Any:
-    _check_rows(dataset, rows)
-    return dataset[:rows]
-
-
-def _lines(group: Any, name: str) -> tuple[str, ...]:
-    return tuple(line.decode() for line in group[name][()])
-
-
-def _word(item: Any, name: str) -> str:
-    return bytes(item.attrs[name]).decode()
-
-
-def _face(group: Any) -> tuple[str, Face]:
-    indices = group["particles"][()].astype(np.intp)
-    return _word(group, "name"), Face(indices, group["area_vectors"][()], group["areas"][()])

@@ -27,6 +27,9 @@ from solidsph.run.outcome import Result
 from solidsph.run.restart_point import RestartPoint
 from solidsph.run.safe_step import SafeStep
 from solidsph.scene.scene import Scene
+from solidsph.scene.scene_data import PartLike
+from solidsph.scene.scheme import completed
+from solidsph.system import html
 
 if TYPE_CHECKING:
     from solidsph.probes.values import Values
@@ -154,6 +157,41 @@ class BuiltScene(ABC):
             stress=lambda chosen: cauchy_stress(self.dynamics.observe(state), chosen),
         )
 
+    def _repr_html_(self) -> str:
+        """Table for notebooks."""
+        scene, statics = completed(self.scene), self.scene.statics
+        acting = [entry.label or _name(entry.part) for entry in (*scene.boundaries, *scene.effects)]
+        own = [body.material or scene.material for body in scene.bodies.values()]
+        materials = dict.fromkeys(_name(material) for material in own)
+        known = {
+            "particles": self.particles.count,
+            "dimensions": self.particles.dimension,
+            "kernel": _name(scene.kernel),
+            "material": ", ".join(materials),
+            "formulation": _name(scene.formulation),
+            "boundaries and effects": ", ".join(acting) or "none",
+            "probes": ", ".join(probe.label for probe in self.probes) or "none",
+            "engine": _name(scene.engine),
+        }
+        if statics is None:
+            known |= {"duration [s]": scene.duration, "steps": self.steps}
+            known |= {"step size [s]": self.step_size, "outputs": len(self.output_steps())}
+        else:
+            known |= {"load steps": statics.load_steps}
+        bodies = [
+            {
+                "body": name,
+                "shape": _name(body.shape),
+                "spacing [m]": float(body.spacing),
+                "particles": place.stop - place.start,
+            }
+            for (name, body), place in zip(
+                scene.bodies.items(), self.particles.bodies.values(), strict=True
+            )
+        ]
+        title = scene.title or "Simulation"
+        return html.heading(title) + html.of_rows(bodies) + html.of_values(known)
+
     def diverged(self, state: State, cause: str) -> DivergedError:
         """The error of a motion that cannot continue from `state`, after the hook of failures."""
         try:
@@ -174,3 +212,10 @@ class BuiltScene(ABC):
         )
         self.manager.hook.solidsph_failure(simulation=self, state=state, error=error)
         return error
+
+
+def _name(part: PartLike | None) -> str:
+    """Name of a part, as a scene gives it."""
+    if isinstance(part, Mapping):
+        return str(part.get("type", ""))
+    return part if isinstance(part, str) else type(part).__name__

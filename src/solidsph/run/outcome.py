@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from solidsph.errors import SceneError
 from solidsph.model.particles import State
+from solidsph.system import html
 
 if TYPE_CHECKING:
     from solidsph.probes.values import Values
@@ -57,6 +58,17 @@ class Result:
                 "record, with Record.at"
             )
         return self._values_at(self.state, points, body)
+
+    def _repr_html_(self) -> str:
+        """Table for notebooks."""
+        known = {"wall time [s]": self.seconds, **self.effort}
+        if self.record is not None:
+            known["record"] = str(self.record)
+        return (
+            html.heading("Result", "; ".join(self.notes))
+            + html.of_values(known)
+            + (html.heading("at the end") + html.of_values(self.final) if self.final else "")
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the simulation, which does not travel between processes."""

@@ -28,6 +28,7 @@ from solidsph.simulation import Simulation
 from solidsph.studies.dispersion import LatticeResponse, check_uniform, lattice_response
 from solidsph.studies.scheme import Scheme, deformation, stretched
 from solidsph.studies.spectrum import spectrum
+from solidsph.system import html
 
 GROWS = 5e-4
 """Growth rate above which a wave grows [e-foldings per wave transit of one spacing]. Rounding gives
@@ -129,6 +130,20 @@ class Certificate:
         """Critical step over the CFL step, on the endless lattice and in the free body [-]."""
         steps = [self.critical_step, *([] if self.free is None else [self.free.critical_step])]
         return min(steps) / self.rule_step
+
+    def _repr_html_(self) -> str:
+        """Table for notebooks."""
+        return html.heading("Certificate") + html.of_values(
+            {
+                "stretches": ", ".join(f"{stretch:g}" for stretch in self.stretches),
+                "material is elliptic": self.elliptic,
+                "zero-energy waves": len(self.zero_modes),
+                "growth rate [1/transit]": self.growth_rate,
+                "cause of growth": self.cause or "none",
+                "critical step [transits]": self.critical_step,
+                "critical step over the CFL step": self.of_cfl,
+            }
+        )
 
     @property
     def cause(self) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from solidsph.studies.limit import Limit
 from solidsph.studies.point import Point, label
+from solidsph.system import html
 
 Cost = Callable[[Point], float]
 
@@ -177,6 +178,20 @@ class Frontier:
             return None
         coarse, fine, least = max(spacings), min(spacings), 0.7 * min(errors)
         return (coarse, fine), (least * (coarse / fine) ** 2, least)
+
+    def _repr_html_(self) -> str:
+        """Table for notebooks."""
+        front = [
+            {
+                "configuration": point.label() or AS_IT_IS,
+                "error [%]": 100.0 * point.error,
+                "trusted [%]": 100.0 * self.trusted(point),
+                "time [s]": point.time,
+            }
+            for point in self.front()
+        ]
+        title = f"The front, of {len(self)} configurations"
+        return html.heading(title, self.sentence()) + html.of_rows(front)
 
     def sentence(self) -> str:
         """Summary in words."""

@@ -17,6 +17,7 @@ from solidsph.studies.case import Case
 from solidsph.studies.limit import Limit
 from solidsph.studies.point import Point
 from solidsph.studies.variant import setting_of, with_settings
+from solidsph.system import html
 
 Settings = Mapping[str, Any]
 Axes = Mapping[str, Sequence[Any]]
@@ -94,6 +95,20 @@ class SearchResult:
     def spent(self) -> float:
         """Wall time of all runs [s]."""
         return sum(sum(point.seconds) for point in self.tried if isfinite(point.time))
+
+    def _repr_html_(self) -> str:
+        """Table for notebooks."""
+        rows = [
+            {
+                "configuration": point.label(),
+                "error [%]": 100.0 * point.error,
+                "time [s]": point.time,
+                "found": point == self.point,
+            }
+            for point in self.tried
+        ]
+        title = "nothing found" if self.point is None else f"found: {self.point.brief()}"
+        return html.heading(title, self.sure) + html.of_rows(rows)
 
 
 def search(

@@ -1,0 +1,59 @@
+"""What a record's reader takes from the open file: texts, rows and particles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from solidsph.model.particles import Face, Particles
+from solidsph.results.layout import PARTICLE_ARRAYS, static_fields, tag_name, unpadded
+
+
+def lines(group: Any, name: str) -> tuple[str, ...]:
+    """Texts of a dataset."""
+    return tuple(line.decode() for line in group[name][()])
+
+
+def word(item: Any, name: str) -> str:
+    """Text of an attribute."""
+    return bytes(item.attrs[name]).decode()
+
+
+def first_rows(dataset: Any, rows: int) -> Any:
+    """The first rows of a dataset; OSError if it has fewer."""
+    check_rows(dataset, rows)
+    return dataset[:rows]
+
+
+def check_rows(dataset: Any, rows: int) -> None:
+    """Raise OSError if a dataset has fewer rows."""
+    if dataset.shape[0] < rows:
+        # Damage, or the run went on since the last read: then a new attempt helps.
+        raise OSError(f"{dataset.name} has {dataset.shape[0]} rows instead of {rows}")
+
+
+def read_particles(run: Any, data: Any, dimension: int) -> Particles:
+    """Reference data of all particles, from the group of the run and that of point data."""
+    arrays: dict[str, Any] = {
+        PARTICLE_ARRAYS[field.name]: unpadded(data[field.name][()], field.components)
+        for field in static_fields(dimension)
+        if field.name in PARTICLE_ARRAYS
+    }
+    arrays["ghosts"] = arrays["ghosts"].astype(np.bool_)
+    return Particles(
+        **arrays,
+        tags={tag: data[tag_name(tag)][()].astype(np.bool_) for tag in lines(run, "tags")},
+        bodies={
+            name: slice(int(start), int(stop))
+            for name, (start, stop) in zip(
+                lines(run, "bodies"), run["body_ranges"][()], strict=True
+            )
+        },
+        faces=dict(_face(run[f"faces/{number}"]) for number in range(len(run.get("faces", ())))),
+    )
+
+
+def _face(group: Any) -> tuple[str, Face]:
+    indices = group["particles"][()].astype(np.intp)
+    return word(group, "name"), Face(indices, group["area_vectors"][()], group["areas"][()])
