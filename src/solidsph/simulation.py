@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import final
 
@@ -97,13 +98,17 @@ class Simulation(BuiltScene):
             stack.enter_context(exclusive(self))
             if record is None:
                 return run(observers)
-            from solidsph.results.recording import recording  # imports the file library
+            # They import the file library.
+            from solidsph.results.record import plotted
+            from solidsph.results.recording import recording
 
             path = Path(record)
             checkpointer, recorder = stack.enter_context(recording(path, since))
 
             def recorded(result: Result) -> Result:
-                return attrs.evolve(result, record=path, final=recorder.final)
+                return attrs.evolve(
+                    result, record=path, final=recorder.final, plot=partial(plotted, path)
+                )
 
             try:
                 return recorded(run([*observers, checkpointer, recorder]))

@@ -9,53 +9,84 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from solidsph.errors import RecordError
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import largest_principal
-from solidsph.results.probe_picture import draw_probes
-from solidsph.results.record import Record
+from solidsph.results.probe_picture import draw_probes, probe_columns
+from solidsph.results.recorded import Recorded
 
-_STRESS = "cauchy_stress"
+STRESS = "cauchy_stress"
+
+MOTION, ENERGY, PROBES = "motion", "energy", "probes"
 
 
-def draw(record: Record, folder: Path, stem: str, field: str = _STRESS) -> Sequence[Path]:
+def draw(record: Recorded, folder: Path, stem: str, field: str = STRESS) -> Sequence[Path]:
     """Draw a record, coloured by a field, into files in `folder` that begin with `stem`.
 
     Returns their paths; RecordError if the record has no such field.
     """
-    record.field(field)
+    motion = "motion" if field == STRESS else re.sub(r"[^\w.-]+", "-", field)
+    names = {MOTION: motion, ENERGY: ENERGY, PROBES: PROBES}
+    drawn = {what: figure(record, what, field) for what in (MOTION, ENERGY)}
+    if probe_columns(record):
+        drawn[PROBES] = figure(record, PROBES)
     folder.mkdir(parents=True, exist_ok=True)
-    what = "motion" if field == _STRESS else re.sub(r"[^\w.-]+", "-", field)
-    motion = folder / f"{stem}-{what}.png"
-    energy = folder / f"{stem}-energy.png"
-    if record.dimension == 1:
-        _draw_histories(record, field, motion)
-    else:
-        _draw_bodies(record, field, motion)
-    _draw_energies(record.times, record.history, energy)
-    probes = draw_probes(record, folder / f"{stem}-probes.png")
-    return [motion, energy] if probes is None else [motion, energy, probes]
+    paths = []
+    for what, made in drawn.items():
+        paths.append(folder / f"{stem}-{names[what]}.png")
+        made.savefig(paths[-1], dpi=150)
+    return paths
 
 
-def _magnitudes(values: Array) -> Array:
+def figure(record: Recorded, what: str = "motion", field: str = STRESS) -> Figure:
+    """One picture of a record.
+
+    Args:
+        record: to be drawn.
+        what: "motion", the body at the first and the last output, coloured by a field; "energy",
+            the energies over time; "probes", what the probes measured, with error bars.
+        field: that colours the motion.
+
+    Raises:
+        RecordError: there is no such picture or field, or no probe.
+    """
+    if what == MOTION:
+        record.field(field)
+        one = record.dimension == 1
+        return _draw_histories(record, field) if one else _draw_bodies(record, field)
+    if what == ENERGY:
+        return _draw_energies(record.times, record.history)
+    if what == PROBES:
+        return draw_probes(record)
+    known = ", ".join((MOTION, ENERGY, PROBES))
+    raise RecordError(f"there is no picture of {what!r}; take one of {known}")
+
+
+def magnitudes(values: Array) -> Array:
     """Scalars, lengths of vectors, or largest principal values of tensors, (n,)."""
     if values.ndim == 3:
         return largest_principal(values)
     return values if values.ndim == 1 else np.asarray(np.linalg.norm(values, axis=1))
 
 
-def _label(record: Record, field: str) -> str:
-    """Label of the colours."""
+def colour_label(record: Recorded, field: str) -> str:
+    """Label of colours that show the magnitudes of a field."""
+    kind = ("", "length of ", "largest principal ")[len(record.field(field).shape) - 2]
+    return kind + _label(record, field)
+
+
+def _label(record: Recorded, field: str) -> str:
     words = field.replace("_", " ").replace("cauchy", "Cauchy")
-    return f"{words} [{record.units[field]}]"
+    return f"{words} [{record.field(field).unit}]"
 
 
-def _draw_histories(record: Record, field: str, path: Path) -> None:
+def _draw_histories(record: Recorded, field: str) -> Figure:
     particles = record.particles
     real = np.flatnonzero(~particles.ghosts)
     order = real[np.argsort(particles.positions[real, 0])]
     X = particles.positions[order, 0]
-    figure = Figure(figsize=(10.0, 4.5), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    drawn = Figure(figsize=(10.0, 4.5), layout="constrained")
+    left, right = drawn.subplots(1, 2)
     left.plot(record.times, record.positions[:][:, order, 0] - X, color="0.4", linewidth=0.6)
     left.set(xlabel="time [s]", ylabel="displacement [m]")
     left.set_title(f"{len(order)} particles", fontsize=10)
@@ -63,20 +94,20 @@ def _draw_histories(record: Record, field: str, path: Path) -> None:
     values = record.field(field)[:].reshape(record.count, -1)[:, order]
     mesh = right.pcolormesh(X, record.times, values, cmap="cividis", shading="nearest")
     right.set(xlabel="X [m]", ylabel="time [s]")
-    figure.colorbar(mesh, ax=right, label=_label(record, field))
-    figure.savefig(path, dpi=150)
+    drawn.colorbar(mesh, ax=right, label=_label(record, field))
+    return drawn
 
 
-def _draw_bodies(record: Record, field: str, path: Path) -> None:
+def _draw_bodies(record: Recorded, field: str) -> Figure:
     particles = record.particles
     real = ~particles.ghosts
     spans = [np.ptp(record.positions[k][real], axis=0) for k in (0, -1)]
     extent = float(np.max(spans)) or 1.0
     height = 1.5 + 4.0 * min(1.2, max(0.4, float(max(span[1] for span in spans)) / extent))
-    figure = Figure(figsize=(11.0, height), layout="constrained")
+    drawn = Figure(figsize=(11.0, height), layout="constrained")
     solid = {"projection": "3d"} if record.dimension == 3 else {}
-    axes = figure.subplots(1, 2, subplot_kw=solid)
-    values = [_magnitudes(record.field(field)[k][real]) for k in (0, -1)]
+    axes = drawn.subplots(1, 2, subplot_kw=solid)
+    values = [magnitudes(record.field(field)[k][real]) for k in (0, -1)]
     low, high = min(v.min() for v in values), max(v.max() for v in values)
     # Size of a marker that about fills a spacing, on an axis some 300 points wide.
     size = max(1.0, (280.0 * float(particles.spacings[0]) / extent) ** 2)
@@ -85,14 +116,13 @@ def _draw_bodies(record: Record, field: str, path: Path) -> None:
         dots = axis.scatter(*x.T, c=colours, s=size, cmap="cividis", vmin=low, vmax=high)
         axis.set_title(f"t = {record.times[k]:.4g} s", fontsize=10)
         axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
-    kind = ("", "length of ", "largest principal ")[len(record.field(field).shape) - 2]
-    figure.colorbar(dots, ax=axes, shrink=0.8, label=kind + _label(record, field))
-    figure.savefig(path, dpi=150)
+    drawn.colorbar(dots, ax=axes, shrink=0.8, label=colour_label(record, field))
+    return drawn
 
 
-def _draw_energies(times: Array, history: Mapping[str, Array], path: Path) -> None:
-    figure = Figure(figsize=(9.0, 4.5), layout="constrained")
-    axis = figure.subplots()
+def _draw_energies(times: Array, history: Mapping[str, Array]) -> Figure:
+    drawn = Figure(figsize=(9.0, 4.5), layout="constrained")
+    axis = drawn.subplots()
     styles = ("-", "--", "-.", ":")
     energies = {name: values for name, values in history.items() if name.endswith("[J]")}
     for index, (name, values) in enumerate(energies.items()):
@@ -105,4 +135,4 @@ def _draw_energies(times: Array, history: Mapping[str, Array], path: Path) -> No
         )
     axis.set(xlabel="time [s]", ylabel="energy [J]")
     axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
-    figure.savefig(path, dpi=150)
+    return drawn

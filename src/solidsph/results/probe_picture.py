@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from solidsph.results.record import Record
+from solidsph.errors import RecordError
+from solidsph.results.recorded import Recorded
 
 _STYLES = ("-", "--", "-.", ":")
 _AT_PLACE = " maximum at "
 
 
-def draw_probes(record: Record, path: Path) -> Path | None:
-    """Draw columns of all probes over time, one panel a unit; None if the record has none."""
+def draw_probes(record: Recorded) -> Figure:
+    """Columns of all probes over time, one panel a unit; RecordError if the record has none."""
     columns = probe_columns(record)
     if not columns:
-        return None
+        raise RecordError("the scene of this record has no probe; add [[probe]], and run it again")
     figure = Figure(figsize=(9.0, 1.0 + 3.2 * len(columns)), layout="constrained")
     panels = figure.subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (unit, names) in zip(panels, columns.items(), strict=True):
@@ -36,11 +36,10 @@ def draw_probes(record: Record, path: Path) -> Path | None:
         axis.set_ylabel(f"[{unit}]")
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
     panels[-1].set_xlabel("time [s]")
-    figure.savefig(path, dpi=150)
-    return path
+    return figure
 
 
-def probe_columns(record: Record) -> Mapping[str, Sequence[str]]:
+def probe_columns(record: Recorded) -> Mapping[str, Sequence[str]]:
     """Columns of the probes of a record by unit, but for the places of extremes."""
     try:
         probes = tomllib.loads(record.scene).get("probe", [])
@@ -56,7 +55,7 @@ def probe_columns(record: Record) -> Mapping[str, Sequence[str]]:
     return columns
 
 
-def _draw_bars(axis: Axes, record: Record, column: str, colour: str) -> None:
+def _draw_bars(axis: Axes, record: Recorded, column: str, colour: str) -> None:
     """Error bars of the final value and of the peak."""
     for place, reduction in ((-1, "final"), (_peak(record, column), "peak")):
         bar = record.error_bars.get(f"{reduction} {column}")
@@ -66,6 +65,6 @@ def _draw_bars(axis: Axes, record: Record, column: str, colour: str) -> None:
             )
 
 
-def _peak(record: Record, column: str) -> int:
+def _peak(record: Recorded, column: str) -> int:
     values = np.abs(record.history[column])
     return 0 if np.isnan(values).all() else int(np.nanargmax(values))

@@ -35,6 +35,7 @@ from solidsph.system import html
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.figure import Figure
 
     from solidsph.probes.values import Values
 
@@ -249,6 +250,33 @@ class Record:
             },
         )
 
+    def plot(self, what: str = "motion", field: str = "cauchy_stress") -> Figure:
+        """A picture: "motion", "energy" or "probes"; see `solidsph.results.pictures.figure`.
+
+        Raises:
+            RecordError: there is no such picture or field, or no probe.
+        """
+        from solidsph.results.pictures import figure  # imports the plotting library
+
+        return figure(self, what, field)
+
+    def view(
+        self,
+        field: str = "cauchy_stress",
+        *,
+        time: float | None = None,
+        factor: float = 1.0,
+        picture: Path | None = None,
+    ) -> None:
+        """Show the run in 3D, or draw a picture of it; see `solidsph.results.view.view`.
+
+        Raises:
+            RecordError: PyVista is not installed, or the record has no output or no such field.
+        """
+        from solidsph.results.view import view  # imports the graphics library
+
+        view(self, field=field, time=time, factor=factor, picture=picture)
+
     def _repr_html_(self) -> str:
         """Table for notebooks."""
         times = self.times
@@ -385,6 +413,12 @@ def _run(file: Any, path: Path) -> Any:
     if run is None or "format" not in run.attrs:
         raise NotARecordError(f"{path} is an HDF5 file, but not a record of solidsph")
     return run
+
+
+def plotted(path: Path, what: str, field: str) -> Figure:
+    """A picture of the record in a file; see `Record.plot`."""
+    with Record(path) as record:
+        return record.plot(what, field)
 
 
 def check_is_record(path: Path) -> None:

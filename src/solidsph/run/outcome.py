@@ -39,6 +39,7 @@ class Result:
     final: Mapping[str, float] = attrs.field(factory=dict)  # last row of the record's history
     notes: Sequence[str] = ()  # events of the run, as in the record
     _values_at: Callable[[State, ArrayLike, str | None], Values] | None = None
+    _plot: Callable[[str, str], Any] | None = None  # of its record
 
     def at(self, points: ArrayLike, *, body: str | None = None) -> Values:
         """Displacement, velocity, F and stress at any points of the undeformed bodies, at the end.
@@ -59,6 +60,17 @@ class Result:
             )
         return self._values_at(self.state, points, body)
 
+    def plot(self, what: str = "motion", field: str = "cauchy_stress") -> Any:
+        """A picture of the record, a figure of Matplotlib: as `Record.plot`.
+
+        Raises:
+            SceneError: the run was not recorded.
+            RecordError: there is no such picture or field, or no probe.
+        """
+        if self._plot is None:
+            raise SceneError("this run has no record to plot; run it with record = ...")
+        return self._plot(what, field)
+
     def _repr_html_(self) -> str:
         """Table for notebooks."""
         known = {"wall time [s]": self.seconds, **self.effort}
@@ -73,7 +85,7 @@ class Result:
     def __getstate__(self) -> dict[str, Any]:
         """All but the simulation, which does not travel between processes."""
         kept = {field.name: getattr(self, field.name) for field in attrs.fields(type(self))}
-        return {**kept, "_values_at": None}
+        return {**kept, "_values_at": None, "_plot": None}
 
     def __setstate__(self, kept: Mapping[str, Any]) -> None:
         for name, value in kept.items():

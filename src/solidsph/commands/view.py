@@ -1,0 +1,62 @@
+"""solidsph view: a record in three dimensions."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import attrs
+import click
+
+from solidsph.commands.console import present
+from solidsph.commands.options import FILE, Output, option, options
+from solidsph.errors import RecordError
+from solidsph.results.record import Record
+
+
+@attrs.frozen
+class _Options(Output):
+    field: str = option(
+        "Field that colours the particles.",
+        default="cauchy_stress",
+        show_default=True,
+        metavar="NAME",
+    )
+    time: float | None = option(
+        "Time that is shown first, the nearest output.  [default: the last]",
+        type=float,
+        metavar="SECONDS",
+    )
+    factor: float = option(
+        "Magnify the displacements.", type=float, default=1.0, show_default=True, metavar="FACTOR"
+    )
+    picture: Path | None = option("Draw this file instead of opening a window.", type=FILE)
+
+
+@click.command()
+@click.argument("result", metavar="RECORD", type=click.Path(path_type=Path))
+@options(_Options)
+def view(result: Path, options: _Options) -> None:
+    """Show a record in 3D, with sliders for time and deformation."""
+    from solidsph.results.view import view as show
+
+    if options.picture is None and not _has_display():
+        raise RecordError("there is no display to open a window on; draw a file, with --picture")
+    with Record(result) as record:
+        show(
+            record,
+            field=options.field,
+            time=options.time,
+            factor=options.factor,
+            picture=options.picture,
+        )
+    facts = {"record": str(result), "picture": options.picture and str(options.picture)}
+    text = [] if options.picture is None else [f"picture: {options.picture}"]
+    present(facts, text, as_json=options.as_json)
+
+
+def _has_display() -> bool:
+    if sys.platform in ("win32", "darwin"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
