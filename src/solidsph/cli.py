@@ -46,6 +46,13 @@ _OUTCOMES: Mapping[type[SolidsphError], str] = {
 }
 
 
+_RECORDED = "; the outputs so far are readable, and solidsph resume continues the run"
+_KEPT = "; finished points are kept, and the same command goes on from there"
+
+_WHEN_INTERRUPTED: Mapping[str, str] = {"run": _RECORDED, "resume": _RECORDED, "cost": _KEPT}
+"""What is left when a verb is interrupted."""
+
+
 class _Verbs(click.Group):
     """Group that imports a verb's module only when that verb is needed."""
 
@@ -91,7 +98,7 @@ def main() -> None:
             sys.exit(WRONG_INPUT)
         _end(WRONG_INPUT, "invalid input", f"error: {cause.format_message()}", facts)
     except (click.Abort, KeyboardInterrupt):
-        text = "interrupted; the outputs so far are readable, and solidsph resume continues the run"
+        text = f"interrupted{_WHEN_INTERRUPTED.get(_verb(), '')}"
         _end(INTERRUPTED, "interrupted", text, facts)
     except SolidsphError as cause:
         outcome = _OUTCOMES.get(type(cause))
@@ -143,6 +150,11 @@ def _show_warning(
 
 def _as_json() -> bool:
     return "--json" in sys.argv[1:]
+
+
+def _verb() -> str:
+    """The verb of this command, empty if there is none."""
+    return next((word for word in sys.argv[1:] if word in VERBS), "")
 
 
 def _end(

@@ -257,3 +257,17 @@ def test_an_output_folder_that_cannot_be_made(scene: Path) -> None:
     assert done.returncode == 2
     assert "blocked" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_large_scene_is_explained_without_building_it(tmp_path: Path) -> None:
+    text = SCENE_TOML.replace("spacing = 0.125", "spacing = 2.2e-4")
+    (tmp_path / "large.toml").write_text(text)
+    done = solidsph("explain", "large.toml", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)["scenes"]["large.toml"]
+    assert told["on paper"]
+    numbers = {row["quantity"]: row["value"] for row in told["numbers"]}
+    assert numbers["particles"] == pytest.approx(0.5 / 2.2e-4**2, rel=0.01)  # 1e7
+    (tmp_path / "small.toml").write_text(SCENE_TOML)
+    done = solidsph("explain", "small.toml", "--json", cwd=tmp_path)
+    assert not json.loads(done.stdout)["scenes"]["small.toml"]["on paper"]

@@ -10,7 +10,7 @@ import click
 
 from solidsph.advice import advise
 from solidsph.commands.console import Table, present
-from solidsph.commands.options import Output, option, options, set_option, verbose_option
+from solidsph.commands.options import Output, flag, option, options, set_option, verbose_option
 from solidsph.commands.prediction import (
     INTERNALS,
     Row,
@@ -56,6 +56,10 @@ class _Options(Output):
         multiple=True,
         metavar="NAME=VALUE",
     )
+    build: bool = flag(
+        "Build the scene, however long that takes, to count its work and find its warnings.  "
+        "[default: build what takes seconds, and price what is larger on paper]"
+    )
     verbose: bool = verbose_option()
 
 
@@ -65,8 +69,8 @@ class _Options(Output):
 def explain(target: str, options: _Options) -> None:
     """Show what a run would simulate and cost.
 
-    Nothing is run or written. Scenes are built in order to count their work. One that needs more
-    memory than this machine has is priced on paper.
+    Nothing is run or written. Scenes are built in order to count their work. A large one is priced
+    on paper.
     """
     wanted = resolve(target, options.settings)
     cluster = _cluster(options.cluster)
@@ -76,7 +80,9 @@ def explain(target: str, options: _Options) -> None:
     compiled: frozenset[Compilation] = frozenset()
     predictions = []
     for name, scene in scenes.items():
-        prediction, explanations[name] = _explained(scene, machine, cluster, compiled)
+        prediction, explanations[name] = _explained(
+            scene, machine, cluster, compiled, build=options.build
+        )
         compiled |= prediction.work.compilations
         predictions.append(prediction)
     facts = {
@@ -106,6 +112,8 @@ def _text(facts: Facts, titles: Mapping[str, str], *, verbose: bool) -> Iterator
             keys = ("name", "found", "expected", "remedy")
             yield Table.of("warnings", scene["warnings"], keys, {"name": "warning"})
             yield 'To silence a warning: silence = ["its-name"] at the top of the scene.'
+        if scene["on paper"]:
+            yield "Priced on paper, without its warnings; --build builds it, to count and to warn."
         if scene["silenced"]:
             yield f"silenced by the scene: {', '.join(scene['silenced'])}"
     if len(titles) > 1:
@@ -136,24 +144,36 @@ def _cluster(assumed: tuple[str, ...]) -> Cluster:
     return Cluster(**values)
 
 
+# Pairs beyond which a scene is not built to be explained: that would take ten seconds and more.
+_MOST_PAIRS = 5_000_000
+
+
 def _explained(
-    scene: Scene, machine: Calibration, cluster: Cluster, compiled: frozenset[Compilation]
+    scene: Scene,
+    machine: Calibration,
+    cluster: Cluster,
+    compiled: frozenset[Compilation],
+    *,
+    build: bool,
 ) -> tuple[Prediction, Facts]:
     try:
         prediction = predict(estimate_work(scene), machine, compiled=compiled)
     except Exception:  # a wrong part, which the build reports, or one that cannot be estimated
         prediction = None
     if prediction is not None and prediction.memory > machine_memory():
-        facts = _too_large(scene, prediction)
+        facts = _on_paper(scene, prediction)
         facts["on a cluster"] = cluster_rows(prediction, machine, cluster)
+    elif prediction is not None and prediction.work.pairs > _MOST_PAIRS and not build:
+        facts = _on_paper(scene, prediction)
     else:
-        simulation, build = build_timed(scene)
-        prediction = predict_run(simulation, machine, built=build, compiled=compiled)
+        simulation, timed = build_timed(scene)
+        prediction = predict_run(simulation, machine, built=timed, compiled=compiled)
         facts = _built(simulation, effect_shares(simulation, machine))
     return prediction, {
         **facts,
         "work": work_rows(prediction.work),
         "cost": prediction_rows(prediction),
+        "on paper": not prediction.work.counted,
         "silenced": list(scene.silence),
         "probes": [
             {"probe": probe.label, "measures": probe.quantity, "at": probe.place}
@@ -191,8 +211,8 @@ def _built(simulation: Simulation, effect_shares: Mapping[str, Share]) -> Facts:
     }
 
 
-def _too_large(scene: Scene, prediction: Prediction) -> Facts:
-    """Facts of a scene that is too large to be built."""
+def _on_paper(scene: Scene, prediction: Prediction) -> Facts:
+    """Facts of a scene that is not built."""
     work = prediction.work
     effects = [construct("effects", effect.part) for effect in scene.effects]
     named = [registry.entry_of("effects", part).name for part in effects]
