@@ -211,7 +211,7 @@ def test_write_a_cases_scenes_and_run_one(tmp_path: Path) -> None:
         (("run", "tensile-instability", "--set", "stretch"), "not of the form name=value"),
         (("run", "tensile-instability", "--set", "stretch=wide"), "stretch must be a number"),
         (("run", "tensile-instability", "--set", "stretch=1"), "must be positive and not 1"),
-        (("run", "pull.toml", "--set", "a=1"), "edit it"),
+        (("run", "pull.toml", "--set", "a=1"), "no such word of a scene"),
         (("run",), "Missing argument"),
         (("fly",), "No such command"),
         (("check", "wendland"), "did you mean 'wendland-c2'"),

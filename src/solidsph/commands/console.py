@@ -50,6 +50,10 @@ out = _Console(highlight=False, width=None if sys.stdout.isatty() else 170)
 err = _Console(stderr=True, highlight=False)
 
 
+# Width that columns of words keep where a table is wider than the terminal.
+_LEAST = 16
+
+
 @attrs.frozen
 class Table:
     """A table for people."""
@@ -77,16 +81,24 @@ class Table:
 
     def show(self) -> None:
         """Print it; numbers are right-aligned and rounded for reading."""
+        cells = [[_text(cell) for cell in row] for row in self.rows]
+        columns = [[row[index] for row in cells] for index in range(len(self.columns))]
+        wide = sum(_longest([name, *columns[i]]) + 3 for i, name in enumerate(self.columns))
         table = RichTable(title=escape(self.title), title_justify="left", header_style="bold")
-        for index, column in enumerate(self.columns):
-            cells = [row[index] for row in self.rows]
-            numeric = bool(cells) and all(_is_number(cell) or cell == "" for cell in cells)
-            # Numbers are never cut to fit; words may wrap.
+        for index, name in enumerate(self.columns):
+            values = [row[index] for row in self.rows]
+            numeric = bool(values) and all(_is_number(cell) or cell == "" for cell in values)
+            # Numbers are never cut to fit, their headings break between words; words wrap.
+            heading = name.replace(" ", "\n") if numeric and wide >= out.width else name
             table.add_column(
-                escape(column), justify="right" if numeric else "left", no_wrap=numeric
+                escape(heading),
+                justify="right" if numeric else "left",
+                no_wrap=numeric,
+                overflow="fold",
+                min_width=None if numeric else min(_LEAST, _longest([name, *columns[index]])),
             )
-        for row in self.rows:
-            table.add_row(*(escape(_text(cell)) for cell in row))
+        for row in cells:
+            table.add_row(*map(escape, row))
         out.print(table)
 
 
@@ -112,8 +124,11 @@ def present(
 
 
 def say(text: str) -> None:
-    """Print plain text, brackets included, on the standard output."""
-    out.print(escape(text), soft_wrap=True)
+    """Print plain text, brackets included, on the standard output.
+
+    On a terminal lines break between words; in files and pipes they are whole.
+    """
+    out.print(escape(text), soft_wrap=not out.is_terminal)
 
 
 def remark(text: str) -> None:
@@ -215,6 +230,10 @@ def time_left(seconds: float | None) -> str:
     if seconds < 5400.0:
         return f"about {seconds / 60.0:.0f} min left"
     return f"about {seconds / 3600.0:.1f} h left"
+
+
+def _longest(texts: Iterable[str]) -> int:
+    return max(map(len, texts))
 
 
 def _is_number(cell: Any) -> bool:

@@ -105,7 +105,7 @@ def _text(facts: Facts, titles: Mapping[str, str], *, verbose: bool) -> Iterator
             if scene.get(title):
                 shown = [r for r in scene[title] if verbose or r["quantity"] not in INTERNALS]
                 yield Table.of(title, shown, ("quantity", "value", "why"), {"quantity": ""})
-        yield _effects_table(scene["effects"], verbose=verbose)
+        yield from _effects_text(scene["effects"], verbose=verbose)
         if scene["probes"]:
             yield Table.of("probes", scene["probes"], ("probe", "measures", "at"))
         if scene["warnings"]:
@@ -120,7 +120,8 @@ def _text(facts: Facts, titles: Mapping[str, str], *, verbose: bool) -> Iterator
         yield Table.of_values("all scenes, one after the other", facts["predicted"])
 
 
-def _effects_table(effects: Sequence[Facts], *, verbose: bool) -> Table:
+def _effects_text(effects: Sequence[Facts], *, verbose: bool) -> Iterator[Table | str]:
+    """The effects that are simulated as a table, the others in a line."""
     share, step = "share of the steps", "stable step"
     shown = [
         {
@@ -129,10 +130,13 @@ def _effects_table(effects: Sequence[Facts], *, verbose: bool) -> Table:
             step: "" if row[step] is None else f"times {row[step]:.3g}",
         }
         for row in effects
+        if row["simulated"]
     ]
-    arrays = ["arrays"] if verbose else []
-    keys = ["effect", "simulated", "why", *arrays, "bytes", share, step]
-    return Table.of("effects", shown, keys, {"bytes": "memory [bytes]", share: "of the steps"})
+    if shown:
+        keys = ["effect", "why", *(["arrays"] if verbose else []), "bytes", share, step]
+        yield Table.of("effects", shown, keys, {share: "of the steps"})
+    others = [row["effect"] for row in effects if not row["simulated"]]
+    yield f"effects that the scene does not name, and does not pay for: {', '.join(others)}"
 
 
 def _cluster(assumed: tuple[str, ...]) -> Cluster:

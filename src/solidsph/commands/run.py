@@ -246,6 +246,7 @@ def _run_scene(
         yield from with_warnings("with error bars", bars)
         if compared:
             yield Table.of("beside the references", compared, list(compared[0]))
+            yield "verdict: " + ("as expected" if passed else "NOT as expected")
         if found is not None:
             yield found.sentence
         yield from (f"note: {note}" for note in result.notes)
