@@ -32,7 +32,7 @@ def test_nothing_is_cut_off(width: int, monkeypatch: pytest.MonkeyPatch) -> None
     for number in ("0.0020123", "0.31", "12.5", "63000000000", "97.195"):
         assert number in text
     cells = " ".join(line.split("│")[1].strip() for line in shown if "│" in line)
-    assert cells.split() == "spacing 0.02, gradient consistent, cover 2.6".split()
+    assert cells.split() == ["spacing", "0.02,", "gradient", "consistent,", "cover", "2.6"]
     assert "…" not in text
 
 
