@@ -271,3 +271,18 @@ def test_a_large_scene_is_explained_without_building_it(tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(SCENE_TOML)
     done = solidsph("explain", "small.toml", "--json", cwd=tmp_path)
     assert not json.loads(done.stdout)["scenes"]["small.toml"]["on paper"]
+
+
+def test_the_shell_completes_verbs_options_and_cases(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def completed(*words: str) -> list[str]:
+        monkeypatch.setenv("COMP_WORDS", " ".join(["solidsph", *words]))
+        monkeypatch.setenv("COMP_CWORD", str(len(words)))
+        done = in_a_process(cwd=tmp_path)
+        return [line.partition(",")[2] for line in done.stdout.splitlines()]
+
+    monkeypatch.setenv("_SOLIDSPH_COMPLETE", "bash_complete")
+    assert completed("co") == ["cost"]
+    assert completed("run", "--acc") == ["--accuracy"]
+    assert completed("cost", "csm") == ["csm1", "csm3", "csm"]  # the last: files of that name

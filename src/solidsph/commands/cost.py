@@ -23,7 +23,7 @@ from solidsph.commands.options import (
     set_option,
     verbose_option,
 )
-from solidsph.commands.target import name_of, resolve
+from solidsph.commands.target import name_of, resolve, target_argument
 from solidsph.errors import SceneError
 from solidsph.studies.case import Case
 from solidsph.studies.cluster import Cluster
@@ -103,7 +103,7 @@ class _Options(ProgressOutput):
 
 
 @click.command()
-@click.argument("target", metavar="SCENE|-|CASE")
+@target_argument()
 @options(_Options)
 def cost(target: str, options: _Options) -> None:
     """Show the time that accuracy costs for a scene or a case.

@@ -21,7 +21,7 @@ from solidsph.commands.prediction import (
     this_machine,
     work_rows,
 )
-from solidsph.commands.target import parameters, resolve
+from solidsph.commands.target import parameters, resolve, target_argument
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.cluster import Cluster
 from solidsph.costs.effect_shares import Share, effect_shares
@@ -64,7 +64,7 @@ class _Options(Output):
 
 
 @click.command()
-@click.argument("target", metavar="SCENE|-|CASE")
+@target_argument()
 @options(_Options)
 def explain(target: str, options: _Options) -> None:
     """Show what a run would simulate and cost.

@@ -33,7 +33,7 @@ from solidsph.commands.options import (
     verbose_option,
 )
 from solidsph.commands.receipt_tables import case_receipts, case_receipts_text, receipts_text
-from solidsph.commands.target import name_of, resolve
+from solidsph.commands.target import name_of, resolve, target_argument
 from solidsph.costs.memory_check import check_memory
 from solidsph.costs.model import Prediction
 from solidsph.costs.process import peak_memory
@@ -115,7 +115,7 @@ class _Options(ProgressOutput):
 
 
 @click.command()
-@click.argument("target", metavar="SCENE|-|CASE")
+@target_argument()
 @options(_Options)
 def run(target: str, options: _Options) -> None:
     """Run a scene or a case, and record it. A scene is a file, or - for the standard input."""

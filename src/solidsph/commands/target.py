@@ -5,11 +5,13 @@ from __future__ import annotations
 import difflib
 import sys
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import attrs
+import click
+from click.shell_completion import CompletionItem
 
 from solidsph.errors import SceneError
 from solidsph.registry import registry
@@ -59,6 +61,19 @@ def resolve(target: str, settings: Sequence[str]) -> Scene | Case:
     rest = {name: value for name, value in table.items() if name not in words}
     case: Case = construct("cases", {"type": target, **rest})
     return with_settings(case, words)
+
+
+def target_argument() -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Decorator of a verb whose argument is a scene or a case, with completion in the shell."""
+    return click.argument("target", metavar="SCENE|-|CASE", shell_complete=_complete)
+
+
+def _complete(
+    context: click.Context, parameter: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Cases by name, then files, which the shell completes by itself."""
+    cases = [name for name in registry.names("cases") if name.startswith(incomplete)]
+    return [*map(CompletionItem, cases), CompletionItem(incomplete, type="file")]
 
 
 def name_of(target: str) -> str:
