@@ -150,3 +150,17 @@ def test_files_that_a_page_names_are_there(page: str) -> None:
     # A word in capitals stands for any name.
     files = [one for one in named if not re.search(r"/[A-Z]+", one)]
     assert [one for one in files if not (ROOT / one).exists()] == []
+
+
+def test_the_scene_and_the_calls_of_the_page_on_accuracy(tmp_path, monkeypatch, capsys) -> None:
+    scene, reference = blocks("docs/accuracy.md", "toml")
+    assert Scene.from_toml(scene + reference).references
+    (code,) = blocks("docs/accuracy.md", "python")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cantilever.toml").write_text(scene)
+    names: dict[str, Any] = {}
+    exec(compile(code, "docs/accuracy.md", "exec"), names)
+    assert "1 % takes" in capsys.readouterr().out
+    # What the page says of the tip, to its three digits.
+    assert names["made"].limits[0].value == pytest.approx(-4.67e-4, rel=2e-3)
+    assert names["found"].point.error <= 0.01
