@@ -227,9 +227,7 @@ class _Iterated(Linearised):
             return False
         # Bodies buckle smoothly: random smooth forces meet every such motion.
         space, free = self.solver.space, self.solver.freedoms.free
-        random = np.random.default_rng(0).standard_normal(
-            (space.interpolation.shape[1], free.shape[1])
-        )
+        random = np.random.default_rng(0).standard_normal(space.kept.shape)
         smooth = (space.interpolation @ random)[free]
         return not self._iterated(self.own_diagonal * smooth, _LOOK).falls
 
