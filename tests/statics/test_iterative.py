@@ -144,6 +144,19 @@ def test_a_finer_body_takes_hardly_more_iterations(d: int, across: int) -> None:
     assert products(d, fine, grids=False) > 3.0 * products(d, fine)
 
 
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+def test_rubber_takes_hardly_more_newton_steps(solver: str) -> None:
+    """With the volume that a step reaches, in place of the predicted one, it takes 8."""
+    pulled = {"y": -2e3}
+
+    def steps(nu: float) -> int:
+        scene = beam(3, 5, poissons_ratio=nu)
+        scene = scene.boundary("traction", where="right", traction=pulled)
+        return equilibrium(scene.build(), solver=solver).iterations
+
+    assert steps(0.49) <= steps(0.3) + 1
+
+
 # --- What it is made of --------------------------------------------------------------------------
 
 

@@ -10,6 +10,7 @@ from scipy.sparse import csr_array
 from solidsph.maths.arrays import Array
 from solidsph.statics.factors import Factors, factorise
 from solidsph.statics.freedoms import Freedoms
+from solidsph.statics.lead import Lead
 from solidsph.statics.linearised import Linearised, LinearSolver
 from solidsph.statics.tangent import Tangent
 
@@ -27,8 +28,8 @@ class DirectSolver(LinearSolver):
     freedoms: Freedoms
     symmetric: bool
 
-    def linearised(self, displacements: Array, ahead: Array | None, time: float) -> Linearised:
-        matrix = self.tangent.matrix(displacements, ahead, time)
+    def linearised(self, displacements: Array, lead: Lead | None, time: float) -> Linearised:
+        matrix = self.tangent.matrix(displacements, lead, time)
         reduced = self.freedoms.reduced(matrix)
         factors = factorise(reduced, symmetric=self.symmetric)
         return _Factorised(matrix, self.freedoms, reduced.diagonal(), factors)

@@ -17,6 +17,7 @@ from solidsph.statics.alternation import alternating_signs
 from solidsph.statics.coarse_space import CoarseSpace
 from solidsph.statics.factors import Factors, SingularError, factorise
 from solidsph.statics.freedoms import Freedoms
+from solidsph.statics.lead import Lead
 from solidsph.statics.linearised import Linearised, LinearSolver, UnsolvedError
 from solidsph.statics.tangent import Tangent
 
@@ -87,8 +88,8 @@ class IterativeSolver(LinearSolver):
         solver.diagonal_at_rest = _diagonal(product, free.shape)
         return solver
 
-    def linearised(self, displacements: Array, ahead: Array | None, time: float) -> Linearised:
-        moduli = self.tangent.moduli(displacements, ahead)
+    def linearised(self, displacements: Array, lead: Lead | None, time: float) -> Linearised:
+        moduli = self.tangent.moduli(displacements, lead)
         of_loads = _symmetric(self.tangent.of_loads(displacements, time))
         stiffer = _resistance(moduli) / self.stiffness_at_rest
         diagonal = self.diagonal_at_rest * np.maximum(stiffer, _LEAST)
