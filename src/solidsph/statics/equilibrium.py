@@ -112,7 +112,8 @@ def equilibrium(
     modulus, and let motions fall that are stiff.
 
     Newton steps are halved while they invert a volume or fail Deuflhard's natural monotonicity
-    test: with the same tangent, the next correction must be smaller.
+    test: with the same tangent, the next correction must be smaller, that of the actual stresses or
+    that of the predicted ones.
 
     Args:
         simulation: a built scene in the total Lagrangian form.
@@ -178,6 +179,11 @@ class _Correction:
     pull: Array  # (k,) force on free displacements by the missing part of the imposed ones
     values: Array  # (k,) change of free displacements [m]
     size: float  # norm of about this change [m]
+
+    def next_size(self, left: Array) -> float:
+        """Norm of about the correction of forces (k,) with the same tangent [m]."""
+        finite = bool(np.all(np.isfinite(left)))
+        return float(np.linalg.norm(self.tangent.roughly(left))) if finite else float("inf")
 
 
 @attrs.define(eq=False)
@@ -288,13 +294,13 @@ class _Newton:
                 lead = self.tangent.lead(u, length * direction, trial)
                 forces = self.path.forces(trial, factor)
                 predicted = self.tangent.forces_ahead(trial, lead).ravel()
-                left = self._imbalance(forces) + self.freedoms.reduction @ predicted
-                left -= (1.0 - length) * newton.pull
-                if np.all(np.isfinite(left)):
-                    next_size = float(np.linalg.norm(newton.tangent.roughly(left)))
-                    # Deuflhard (2004), section 3.3: the restricted natural monotonicity test.
-                    if next_size <= (1.0 - 0.25 * length) * newton.size or self._converged(forces):
-                        return trial, lead
+                missed = self._imbalance(forces) - (1.0 - length) * newton.pull
+                # With the stress that is there, and with the one that the step predicted.
+                both = missed, missed + self.freedoms.reduction @ predicted
+                # Deuflhard (2004), section 3.3: the restricted natural monotonicity test.
+                allowed = (1.0 - 0.25 * length) * newton.size
+                if self._converged(forces) or min(map(newton.next_size, both)) <= allowed:
+                    return trial, lead
             length *= 0.5
         cause = "no fraction of the Newton step reduces the imbalance"
         raise _LoadStepError(cause, self._remedy(self.path.forces(u, factor)), u)
