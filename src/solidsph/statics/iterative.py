@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, minres
 
-from solidsph.maths.arrays import Array
+from solidsph.maths.arrays import Array, Mask
 from solidsph.maths.conjugate_gradients import Solution, conjugate_gradients
 from solidsph.run.built_scene import BuiltScene
 from solidsph.statics.alternation import alternating_signs
@@ -21,10 +21,7 @@ from solidsph.statics.lead import Lead
 from solidsph.statics.linearised import Linearised, LinearSolver, UnsolvedError
 from solidsph.statics.tangent import Tangent
 
-# Random vectors that estimate the diagonal, each to about 0.8 / sqrt(count) of itself.
-_PROBES = 32
-
-# The estimate of a particle is at least this part of the median.
+# Stiffnesses of a particle alone count as at least this part of the median, if one is not positive.
 _LEAST = 0.1
 
 # Share of the correction by alternating functions. Their stiffness on the grid is somewhat too
@@ -41,21 +38,19 @@ _LOOK = 1e-3
 @final
 @attrs.define(eq=False)
 class IterativeSolver(LinearSolver):
-    """Conjugate gradients with a preconditioner of coarse grids and the diagonal.
+    """Conjugate gradients with a preconditioner of coarse grids and of every particle alone.
 
     A product with the tangent is two passes over the neighbours, as one evaluation of the forces.
     What changes over several spacings is solved on a coarse grid; so is what alternates along the
-    rows of a lattice, which the gradients do not see. The diagonal is left with the rest.
-    (Nocedal & Wright 2006, algorithm 5.3; two levels, added up: Smith, Bjorstad & Gropp 1996,
-    chapter 2; the diagonal: Bekas, Kokiopoulou & Saad 2007.)
+    rows of a lattice, which the gradients do not see. The blocks of the diagonal are left with the
+    rest. (Nocedal & Wright 2006, algorithm 5.3; two levels, added up: Smith, Bjorstad & Gropp 1996,
+    chapter 2.)
     """
 
     tangent: Tangent
     freedoms: Freedoms
     volumes: Array  # (n,)
     space: CoarseSpace  # its first pattern is smooth, the others alternate
-    diagonal_at_rest: Array  # (n, d) [N/m]
-    stiffness_at_rest: Array  # (n, d) sums of the moduli that the diagonal grows with [Pa]
     smooth_at_rest: Factors | None = None  # once it is needed
     alternating: Sequence[Factors] | None = None  # likewise
     shares: Sequence[float] = ()  # of the corrections by these
@@ -73,31 +68,20 @@ class IterativeSolver(LinearSolver):
         patterns = [np.concatenate(signs) for signs in zip(*of_bodies, strict=True)]
         signs = np.stack([np.ones(len(free)), *(own for own in patterns if own.any())])
         space = CoarseSpace.of(bodies, free, signs, gradients)
-        rest = np.zeros(free.shape)
-        moduli = tangent.moduli(rest)
-        solver = cls(
-            tangent=tangent,
-            freedoms=freedoms,
-            volumes=simulation.particles.volumes,
-            space=space,
-            diagonal_at_rest=rest,
-            stiffness_at_rest=_resistance(moduli),
-        )
-        of_loads = _symmetric(tangent.of_loads(rest, 0.0))
-        product = solver.product(moduli, of_loads)
-        solver.diagonal_at_rest = _diagonal(product, free.shape)
-        return solver
+        return cls(tangent, freedoms, simulation.particles.volumes, space)
 
     def linearised(self, displacements: Array, lead: Lead | None, time: float) -> Linearised:
         moduli = self.tangent.moduli(displacements, lead)
         of_loads = _symmetric(self.tangent.of_loads(displacements, time))
-        stiffer = _resistance(moduli) / self.stiffness_at_rest
-        diagonal = self.diagonal_at_rest * np.maximum(stiffer, _LEAST)
+        blocks = self.tangent.own_stiffness(moduli)
+        if of_loads is not None:
+            blocks += _blocks(of_loads, blocks.shape[1])
         smooth, rises = self._smooth_factors(moduli, of_loads)
         return _Iterated(
             solver=self,
             whole_product=self.product(moduli, of_loads),
-            own_diagonal=diagonal[self.freedoms.free],
+            own_diagonal=np.einsum("pii->pi", blocks)[self.freedoms.free],
+            alone=_inverted(blocks, self.freedoms.free),
             factors=[*smooth, *self._alternating_factors()],
             rises=rises,
         )
@@ -198,6 +182,7 @@ class _Iterated(Linearised):
     solver: IterativeSolver
     whole_product: Callable[[Array], Array]  # with motions (n, d) of all particles
     own_diagonal: Array  # (k,)
+    alone: Array  # (n, d, d) inverse stiffness of every particle alone [m/N]
     factors: Sequence[Factors]  # of the stiffness of each pattern's functions
     rises: bool  # False if their own stiffness is not positive
 
@@ -259,37 +244,48 @@ class _Iterated(Linearised):
         return product
 
     def _preconditioned(self, forces: Array) -> Array:
-        values = forces / self.own_diagonal
-        if not self.factors:
-            return values
         space, free = self.solver.space, self.solver.freedoms.free
         whole = np.zeros(free.shape)
         whole[free] = forces
-        corrections = [
-            share * factors.solve(own)
-            for share, factors, own in zip(
-                (1.0, *self.solver.shares), self.factors, space.restricted(whole), strict=True
+        motion = np.einsum("pij,pj->pi", self.alone, whole)
+        if self.factors:
+            motion += space.extended(
+                [
+                    share * factors.solve(own)
+                    for share, factors, own in zip(
+                        (1.0, *self.solver.shares),
+                        self.factors,
+                        space.restricted(whole),
+                        strict=True,
+                    )
+                ]
             )
-        ]
-        values += space.extended(corrections)[free]
+        values: Array = motion[free]
         return values
 
 
-def _resistance(moduli: Array) -> Array:
-    """Sums over k of dT_ik / dF_ik, (n, d) [Pa]."""
-    resistance: Array = np.einsum("pikik->pi", moduli)
-    return resistance
+def _blocks(matrix: csr_array, d: int) -> Array:
+    """Blocks (n, d, d) on the diagonal of a matrix (d n, d n)."""
+    entries = matrix.tocoo()
+    p, q = entries.row // d, entries.col // d
+    own = p == q
+    blocks = np.zeros((matrix.shape[0] // d, d, d))
+    np.add.at(blocks, (p[own], entries.row[own] % d, entries.col[own] % d), entries.data[own])
+    return blocks
 
 
-def _diagonal(product: Callable[[Array], Array], shape: tuple[int, ...]) -> Array:
-    """Estimate of the diagonal of a positive matrix, in the shape of motions (n, d)."""
-    random = np.random.default_rng(0)
-    total = np.zeros(shape)
-    for _ in range(_PROBES):
-        signs = random.choice([-1.0, 1.0], shape)
-        total += signs * product(signs)
-    diagonal = total / _PROBES
-    return np.maximum(diagonal, _LEAST * np.median(diagonal))
+def _inverted(blocks: Array, free: Mask) -> Array:
+    """Inverse (n, d, d) of the free part of symmetric blocks, made positive where they are not."""
+    fixed = ~free
+    kept = np.where(fixed[:, :, None] | fixed[:, None, :], 0.0, blocks)
+    kept += np.eye(free.shape[1]) * fixed[:, None, :]
+    try:
+        np.linalg.cholesky(kept)
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(kept)
+        values = np.maximum(values, _LEAST * np.median(values[:, -1]))
+        return np.asarray((vectors / values[:, None, :]) @ vectors.transpose(0, 2, 1))
+    return np.linalg.inv(kept)
 
 
 def _symmetric(matrix: csr_array | None) -> csr_array | None:

@@ -170,6 +170,13 @@ class Tangent:
         H = self.internal.gradients(motion).reshape(n, d * d, 1)
         return -self._forces(motion, (moduli.reshape(n, d * d, d * d) @ H).reshape(n, d, d))
 
+    def own_stiffness(self, moduli: Array) -> Array:
+        """Blocks of K at each particle without the part of the loads, (n, d, d) [N/m]."""
+        n, d = moduli.shape[:2]
+        blocks = self.internal.own_stiffness(moduli.reshape(n, d * d, d * d))
+        assert blocks is not None, "sums are chosen that can tell"
+        return blocks
+
     def lead(self, displacements: Array, change: Array, placed: Array) -> Lead:
         """Stress and volume predicted by a step, beside the actual ones.
 
