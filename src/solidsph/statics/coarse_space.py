@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 
 import attrs
@@ -13,10 +13,14 @@ from solidsph.interfaces.body import Body
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.statics.coarse_loops import Cells, CoarseLoops, coarse_loops
 
-# Sides of a cell, in spacings, unless the grid would have more nodes than can be factorised at
-# once. Sides of 2 to 4 take about the same number of iterations.
-_SIDE = 2.5
-_MOST_NODES = {1: 10_000, 2: 10_000, 3: 1_500}
+
+@attrs.frozen
+class Fineness:
+    """How fine a grid is to be."""
+
+    side: float  # of a cell, in spacings, unless there would be more nodes than the most
+    most_nodes: Mapping[int, int]  # that can be factorised at once, by dimension
+
 
 # Smaller diagonals of the stiffness, relative to the largest: no particle sees the function.
 _UNSEEN = 1e-9
@@ -45,6 +49,7 @@ class CoarseSpace:
         free: Mask,
         signs: Array,
         gradients_of: Callable[[Array], Array],
+        fineness: Fineness,
     ) -> CoarseSpace:
         """The space of a scene, with a grid for each body.
 
@@ -56,9 +61,10 @@ class CoarseSpace:
             free: the free displacements, (n, d).
             signs: of the particles in each pattern, (s, n).
             gradients_of: `InternalForces.gradients`, (n, d) to (n, d, d).
+            fineness: of the grids.
         """
         n = len(free)
-        grids = [_Grid.over(body, n) for body in bodies]
+        grids = [_Grid.over(body, n, fineness) for body in bodies]
         cells = _one_after_the_other([grid.cells for grid in grids])
         nodes = _one_after_the_other([grid.nodes for grid in grids])
         values = np.concatenate([grid.values for grid in grids])
@@ -181,11 +187,12 @@ class _Grid:
     places: Array  # (n, d) positions in the grid [m]
 
     @classmethod
-    def over(cls, body: Body, total: int) -> _Grid:
+    def over(cls, body: Body, total: int, fineness: Fineness) -> _Grid:
         """The grid of a body, in a scene of `total` particles."""
         positions, spacing = body.particles.positions, float(body.particles.spacings.mean())
         d = positions.shape[1]
-        side = spacing * max(_SIDE, (total / _MOST_NODES[d]) ** (1.0 / d))
+        least = (total / fineness.most_nodes[d]) ** (1.0 / d)
+        side = spacing * max(fineness.side, least)
         lowest = positions.min(axis=0)
         extent = np.maximum(positions.max(axis=0) - lowest, spacing)
         count = np.maximum(1, np.floor(extent / side)).astype(np.intp)

@@ -61,6 +61,23 @@ class LinearSolver(ABC):
         return 0
 
     @abstractmethod
+    def lowest_modes(
+        self, displacements: Array, masses: Array, shift: float, count: int
+    ) -> tuple[Array, Array]:
+        """The lowest modes (k, count) with the squares of their frequencies (count,) [1/s^2].
+
+        Args:
+            displacements: about which the body vibrates, (n, d) [m].
+            masses: of the free displacements, (k,) [kg].
+            shift: square of a low frequency, below which rigid motions may be [1/s^2].
+            count: number of modes.
+
+        Raises:
+            SingularError: some motion falls faster than the shift.
+            UnsolvedError: an iteration does not converge.
+        """
+
+    @abstractmethod
     def linearised(self, displacements: Array, lead: Lead | None, time: float) -> Linearised:
         """The tangent at displacements (n, d) [m].
 
