@@ -1,9 +1,10 @@
 """Equilibria of a cantilever in space by size: time, products with the tangent, memory.
 
-    python benchmarks/statics.py [--most PARTICLES] [--direct PARTICLES] [--nu NU]
+    python benchmarks/statics.py [--most PARTICLES] [--direct PARTICLES] [--nu NU] [--frequencies]
 
 Each runs in a process of its own, so that the peak of memory is its own. Bodies of up to `--direct`
-particles are also solved by a factorisation.
+particles are also solved by a factorisation. With `--frequencies` it finds the six lowest natural
+frequencies instead. The engine is the compiled one; the first run of all compiles.
 """
 
 from __future__ import annotations
@@ -12,31 +13,52 @@ import argparse
 import resource
 import subprocess
 import sys
+import time
 
 from solidsph import Simulation
-from solidsph.statics import equilibrium
+from solidsph.statics import equilibrium, frequencies
 
 ACROSS = (5, 9, 12, 19, 28, 40)
 
 
-def measured(across: int, nu: float, solver: str) -> str:
-    """One row of the table, of a beam with so many spacings across."""
-    simulation = (
+def cantilever(across: int, nu: float) -> Simulation:
+    """A beam with so many spacings across."""
+    return (
         Simulation.builder()
         .body("beam", shape={"type": "box", "lengths": [4.0, 1.0, 1.0]}, spacing=1.0 / across)
         .material("neo-hookean", youngs_modulus=1e6, poissons_ratio=nu, density=1e3)
         .boundary("clamp", where="left")
         .boundary("traction", where="right", traction={"y": -2e3})
         .duration(1.0)
-        .statics(solver=solver)
+        .engine("compiled")
+        .statics()
         .build()
     )
+
+
+def vibrations(across: int, nu: float, solver: str) -> str:
+    """One row of the table of frequencies."""
+    simulation = cantilever(across, nu)
+    start = time.perf_counter()
+    lowest = frequencies(simulation, 6, solver=solver).angular_frequencies[0]
+    seconds = time.perf_counter() - start
+    return (
+        f"{simulation.particles.count:9d}  {solver:9}  {seconds:8.2f}  {_peak():7.2f}  {lowest:.9f}"
+    )
+
+
+def _peak() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+
+
+def equilibria(across: int, nu: float, solver: str) -> str:
+    """One row of the table of equilibria."""
+    simulation = cantilever(across, nu)
     result = equilibrium(simulation, solver=solver)
     tip = float(result.state.positions[:, 1].min())
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     return (
         f"{simulation.particles.count:9d}  {solver:9}  {result.seconds:8.2f}  "
-        f"{result.iterations:6d}  {result.products:8d}  {peak:7.2f}  {tip:.9f}"
+        f"{result.iterations:6d}  {result.products:8d}  {_peak():7.2f}  {tip:.9f}"
     )
 
 
@@ -45,12 +67,17 @@ def main() -> None:
     parser.add_argument("--most", type=int, default=40_000, help="particles of the largest")
     parser.add_argument("--direct", type=int, default=1_000, help="particles solved directly")
     parser.add_argument("--nu", type=float, default=0.3, help="Poisson's ratio")
+    parser.add_argument("--frequencies", action="store_true", help="instead of equilibria")
     parser.add_argument("--one", nargs=2, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
+        measured = vibrations if options.frequencies else equilibria
         print(measured(int(options.one[0]), options.nu, options.one[1]))
         return
-    print("particles  solver      time [s]  Newton  products  [GiB]    lowest point [m]")
+    if options.frequencies:
+        print("particles  solver      time [s]  [GiB]    lowest [rad/s]")
+    else:
+        print("particles  solver      time [s]  Newton  products  [GiB]    lowest point [m]")
     for across in ACROSS:
         particles = (4 * across + 1) * (across + 1) ** 2
         if particles > options.most:
@@ -59,6 +86,8 @@ def main() -> None:
             if solver == "direct" and particles > options.direct:
                 continue
             command = [sys.executable, __file__, "--nu", str(options.nu)]
+            if options.frequencies:
+                command.append("--frequencies")
             subprocess.run([*command, "--one", str(across), solver], check=True)
 
 

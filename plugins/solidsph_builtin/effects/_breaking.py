@@ -273,6 +273,9 @@ class BreakingForces(InternalForces):
     def spread(self, displacements: Array, stress: Array) -> Array:
         return self.whole.spread(displacements, stress)
 
+    def own_stiffness(self, moduli: Array) -> Array | None:
+        return self.whole.own_stiffness(moduli)
+
     def _remembered(self, memory: Memory) -> tuple[Array, ...]:
         return tuple(
             memory[bonds.name] if bonds.name in memory else bonds.intact() for bonds in self.bonds

@@ -127,6 +127,9 @@ class HistoryForces(InternalForces):
     def spread(self, displacements: Array, stress: Array) -> Array:
         return self.sums.spread(displacements, stress)
 
+    def own_stiffness(self, moduli: Array) -> Array | None:
+        return self.sums.own_stiffness(moduli)
+
     def observed(self, displacements: Array, memory: Memory) -> StressFields:
         virgin = self.sums.fields(displacements)
         dissipated = np.zeros(len(displacements))

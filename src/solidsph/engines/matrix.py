@@ -40,6 +40,17 @@ class Operators:
         # Components along axis k stand in block k, as the columns of the force matrix do.
         return np.asarray(self.force @ stress.transpose(1, 2, 0).reshape(-1, len(stress)))
 
+    def own_stiffness(self, moduli: Array) -> Array:
+        """Blocks (n, d, d) [N/m] of the stiffness with moduli (n, d, d, d, d) [Pa]."""
+        n, d = moduli.shape[:2]
+        blocks = np.zeros((n, d, d))
+        for k in range(d):
+            force = self.force[:, k * n : (k + 1) * n]
+            for other in range(d):
+                both = force.multiply(self.gradient[other * n : (other + 1) * n].T)
+                blocks -= (both @ moduli[:, :, k, :, other].reshape(n, -1)).reshape(n, d, d)
+        return blocks
+
     def part(self, chosen: Indices) -> Operators:
         """The matrices of the chosen particles; rows that reach beyond these are left out."""
         n = self.force.shape[0]
@@ -188,6 +199,16 @@ class MatrixForces(InternalForces):
     def spread(self, displacements: Array, stress: Array) -> Array:
         matrices = [part.operators(displacements[part.body.extent]) for part in self.parts]
         return self._spread(matrices, stress)
+
+    def own_stiffness(self, moduli: Array) -> Array | None:
+        if not all(isinstance(part, _ReferenceBody) for part in self.parts):
+            return None
+        n, d = len(moduli), self.parts[0].body.particles.dimension
+        each = [
+            own.own_stiffness(moduli[part.body.extent].reshape(-1, d, d, d, d))
+            for part, own in zip(self.parts, self.constant_operators(), strict=True)
+        ]
+        return np.concatenate(each).reshape(n, d, d)
 
     def _spread(self, matrices: Sequence[Operators], stress: Array) -> Array:
         d, _, n = stress.shape

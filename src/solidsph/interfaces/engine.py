@@ -71,6 +71,16 @@ class InternalForces(ABC):
         `stress` is the formulation's flux; it may be overwritten.
         """
 
+    def own_stiffness(self, moduli: Array) -> Array | None:
+        """Force on every particle against its own displacement alone, (n, d, d) [N/m].
+
+        None, the default, if the engine cannot tell.
+
+        Args:
+            moduli: dT_ik / dF_jl of all particles, (n, d d, d d) [Pa].
+        """
+        return None
+
     def law(self, body: Body) -> Law | None:
         """The engine's own form of a body's law, to be used between the two passes.
 

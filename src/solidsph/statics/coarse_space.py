@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 
 import attrs
 import numpy as np
-from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron
+from scipy.sparse import csr_array, diags_array, eye_array, kron
 
 from solidsph.interfaces.body import Body
 from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.statics.coarse_loops import Cells, CoarseLoops, coarse_loops
 
-# Sides of a cell, in spacings, unless the grid would have more nodes than can be factorised at
-# once. Sides of 2 to 4 take about the same number of iterations.
-_SIDE = 2.5
-_MOST_NODES = {1: 10_000, 2: 10_000, 3: 1_500}
+
+@attrs.frozen
+class Fineness:
+    """How fine a grid is to be."""
+
+    side: float  # of a cell, in spacings, unless there would be more nodes than the most
+    most_nodes: Mapping[int, int]  # that can be factorised at once, by dimension
+
 
 # Smaller diagonals of the stiffness, relative to the largest: no particle sees the function.
 _UNSEEN = 1e-9
-
-# Particles whose stiffness is formed at a time.
-_CHUNK = 4096
 
 
 @attrs.frozen(eq=False)
@@ -34,11 +36,11 @@ class CoarseSpace:
 
     signs: Array  # (s, n) of each pattern
     interpolation: csr_array  # (n, m) from values at the nodes
-    kept: Mask  # (m d,) values at nodes that move free displacements only
-    unknowns: Indices  # (c, 2^d d) values at the nodes of each cell
-    order: Indices  # (n,) particles, cell by cell
-    starts: Indices  # (c,) where each cell begins in it
-    gradients: Sequence[Array]  # (n, 2^d, d) of each pattern's functions, in that order [1/m]
+    kept: Mask  # (m, d) values at nodes that move free displacements only
+    cells: Cells
+    gradients: Sequence[Array]  # (n, 2^d, d) of each pattern's functions, cell by cell [1/m]
+    entries: csr_array  # (k, k) whose data are the places of the stiffness' entries
+    places: Indices  # (c, 2^d d, 2^d d) of the entries of each cell; those not kept are the last
 
     @classmethod
     def of(
@@ -47,6 +49,7 @@ class CoarseSpace:
         free: Mask,
         signs: Array,
         gradients_of: Callable[[Array], Array],
+        fineness: Fineness,
     ) -> CoarseSpace:
         """The space of a scene, with a grid for each body.
 
@@ -58,9 +61,10 @@ class CoarseSpace:
             free: the free displacements, (n, d).
             signs: of the particles in each pattern, (s, n).
             gradients_of: `InternalForces.gradients`, (n, d) to (n, d, d).
+            fineness: of the grids.
         """
-        n, d = free.shape
-        grids = [_Grid.over(body, n) for body in bodies]
+        n = len(free)
+        grids = [_Grid.over(body, n, fineness) for body in bodies]
         cells = _one_after_the_other([grid.cells for grid in grids])
         nodes = _one_after_the_other([grid.nodes for grid in grids])
         values = np.concatenate([grid.values for grid in grids])
@@ -71,40 +75,45 @@ class CoarseSpace:
         interpolation = csr_array((values.ravel(), (rows, nodes.ravel())), shape=(n, size))
         order = np.argsort(cells, kind="stable")
         _, starts = np.unique(cells[order], return_index=True)
-        unknowns = (nodes[:, :, None] * d + np.arange(d)).reshape(n, -1)
+        kept = interpolation.T @ (~free).astype(np.float64) == 0.0
+        of_cells = np.ascontiguousarray(nodes[order[starts]])
+        entries, at = _entries(of_cells, kept)
         return cls(
             signs=signs,
             interpolation=interpolation,
-            kept=(interpolation.T @ (~free).astype(np.float64)).ravel() == 0.0,
-            unknowns=unknowns[order[starts]],
-            order=order,
-            starts=starts,
+            kept=kept,
+            cells=Cells(
+                ends=np.append(starts, n),
+                nodes=of_cells,
+                order=order,
+                values=values[order],
+                signs=np.ascontiguousarray(signs.T),
+            ),
             gradients=[_seen(own, values, slopes, places, gradients_of)[order] for own in signs],
+            entries=entries,
+            places=at,
         )
 
     def restricted(self, forces: Array) -> Sequence[Array]:
         """Forces (n, d) [N] on the functions kept of each pattern."""
-        n, d = forces.shape
-        all_patterns = (self.signs.T[:, :, None] * forces[:, None, :]).reshape(n, -1)
-        on_nodes = (self.interpolation.T @ all_patterns).reshape(-1, len(self.signs), d)
-        return [on_nodes[:, k].ravel()[self.kept] for k in range(len(self.signs))]
+        m, d = self.kept.shape
+        on_nodes = np.zeros((m, len(self.signs), d))
+        self._loops.restrict(self.cells, forces, on_nodes)
+        return [on_nodes[:, k][self.kept] for k in range(len(self.signs))]
 
     def extended(self, values: Sequence[Array]) -> Array:
         """Displacements (n, d) by the functions kept of each pattern."""
-        n, m = self.interpolation.shape
-        d = len(self.kept) // m
+        m, d = self.kept.shape
         at_nodes = np.zeros((m, len(self.signs), d))
         for k, own in enumerate(values):
-            whole = np.zeros(m * d)
-            whole[self.kept] = own
-            at_nodes[:, k] = whole.reshape(m, d)
-        all_patterns = (self.interpolation @ at_nodes.reshape(m, -1)).reshape(n, -1, d)
-        extended: Array = np.einsum("kn,nki->ni", self.signs, all_patterns)
+            at_nodes[:, k][self.kept] = own
+        extended = np.zeros((len(self.cells.order), d))
+        self._loops.extend(self.cells, at_nodes, extended)
         return extended
 
     def matrix(self, pattern: int) -> csr_array:
         """Interpolation of one pattern, from the functions kept to displacements, (d n, k)."""
-        d = len(self.kept) // self.interpolation.shape[1]
+        d = self.kept.shape[1]
         signed = diags_array(self.signs[pattern]) @ self.interpolation
         whole = csr_array(kron(signed, eye_array(d), format="csr"))
         return csr_array(whole[:, np.flatnonzero(self.kept)])
@@ -116,35 +125,38 @@ class CoarseSpace:
             pattern: which.
             moduli: dT_ik / dF_jl times the volume of each particle, (n, d d, d d) [N m].
         """
-        gradients = self.gradients[pattern]
-        n, corners, d = gradients.shape
-        own = corners * d
-        blocks = np.empty((len(self.starts), corners, d, d, corners))
-        ends = np.append(self.starts, n)
-        first = 0
-        while first < len(self.starts):
-            last = int(np.searchsorted(ends, ends[first] + _CHUNK, side="right")) - 1
-            last = max(last, first + 1)
-            B = gradients[ends[first] : ends[last]]
-            A = moduli[self.order[ends[first] : ends[last]]].reshape(-1, d, d, d, d)
-            # By k, i, j: sums over l of A_ikjl B_l, then over k with B_k.
-            right = A.transpose(0, 2, 1, 3, 4).reshape(-1, d**3, d) @ B.transpose(0, 2, 1)
-            each = B @ right.reshape(-1, d, d * d * corners)
-            sums = np.add.reduceat(each, ends[first:last] - ends[first])
-            blocks[first:last] = sums.reshape(-1, corners, d, d, corners)
-            first = last
-        blocks = blocks.transpose(0, 1, 2, 4, 3)
-        rows = np.repeat(self.unknowns, own, axis=1)
-        columns = np.tile(self.unknowns, (1, own))
-        size = len(self.kept)
-        whole = coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size))
-        kept = np.flatnonzero(self.kept)
-        matrix = csr_array(csr_array(whole)[kept][:, kept])
+        sums = np.zeros(self.entries.nnz + 1)
+        self._loops.stiffness(self.cells, moduli, self.gradients[pattern], self.places, sums)
+        matrix = self.entries.copy()
+        matrix.data = sums[:-1]
         diagonal = np.abs(matrix.diagonal())
         largest = diagonal.max(initial=0.0)
         return csr_array(
             matrix + diags_array(np.where(diagonal <= _UNSEEN * largest, largest, 0.0))
         )
+
+    @property
+    def _loops(self) -> CoarseLoops:
+        return coarse_loops(self.kept.shape[1], len(self.signs))
+
+
+def _entries(nodes: Indices, kept: Mask) -> tuple[csr_array, Indices]:
+    """`CoarseSpace.entries` and `places` for cells with these nodes (c, 2^d)."""
+    size, count = kept.size, int(kept.sum())
+    numbers = np.full(size, count)
+    numbers[kept.ravel()] = np.arange(count)
+    # Of the values at the nodes of each cell, (c, 2^d d).
+    own = numbers.reshape(kept.shape)[nodes].reshape(len(nodes), -1)
+    rows, columns = np.broadcast_arrays(own[:, :, None], own[:, None, :])
+    inside = (rows < count) & (columns < count)
+    found, which = np.unique(rows[inside] * count + columns[inside], return_inverse=True)
+    places = np.full(inside.shape, len(found))
+    places[inside] = which
+    entries = csr_array(
+        (np.arange(len(found), dtype=np.float64), (found // count, found % count)),
+        shape=(count, count),
+    )
+    return entries, places
 
 
 def _seen(
@@ -175,11 +187,12 @@ class _Grid:
     places: Array  # (n, d) positions in the grid [m]
 
     @classmethod
-    def over(cls, body: Body, total: int) -> _Grid:
+    def over(cls, body: Body, total: int, fineness: Fineness) -> _Grid:
         """The grid of a body, in a scene of `total` particles."""
         positions, spacing = body.particles.positions, float(body.particles.spacings.mean())
         d = positions.shape[1]
-        side = spacing * max(_SIDE, (total / _MOST_NODES[d]) ** (1.0 / d))
+        least = (total / fineness.most_nodes[d]) ** (1.0 / d)
+        side = spacing * max(fineness.side, least)
         lowest = positions.min(axis=0)
         extent = np.maximum(positions.max(axis=0) - lowest, spacing)
         count = np.maximum(1, np.floor(extent / side)).astype(np.intp)

@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import final
 
 import attrs
-from scipy.sparse import csr_array
+import numpy as np
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from solidsph.maths.arrays import Array
-from solidsph.statics.factors import Factors, factorise
+from solidsph.statics.factors import Factors, SingularError, factorise
 from solidsph.statics.freedoms import Freedoms
+from solidsph.statics.lead import Lead
 from solidsph.statics.linearised import Linearised, LinearSolver
 from solidsph.statics.tangent import Tangent
 
@@ -27,11 +30,31 @@ class DirectSolver(LinearSolver):
     freedoms: Freedoms
     symmetric: bool
 
-    def linearised(self, displacements: Array, ahead: Array | None, time: float) -> Linearised:
-        matrix = self.tangent.matrix(displacements, ahead, time)
+    def linearised(self, displacements: Array, lead: Lead | None, time: float) -> Linearised:
+        matrix = self.tangent.matrix(displacements, lead, time)
         reduced = self.freedoms.reduced(matrix)
         factors = factorise(reduced, symmetric=self.symmetric)
         return _Factorised(matrix, self.freedoms, reduced.diagonal(), factors)
+
+    def lowest_modes(
+        self, displacements: Array, masses: Array, shift: float, count: int
+    ) -> tuple[Array, Array]:
+        whole = self.freedoms.reduced(self.tangent.matrix(displacements))
+        # A load that follows its surface may have no energy: its symmetric part alone has modes.
+        K, M = csr_array(0.5 * (whole + whole.T)), diags_array(masses)
+        factors = factorise(csr_array(K + shift * M), symmetric=True)
+        if not factors.positive:
+            raise SingularError(None)
+        squares, vectors = eigsh(
+            K,
+            k=count,
+            M=M,
+            sigma=-shift,
+            OPinv=LinearOperator(K.shape, matvec=factors.solve, dtype=np.float64),
+            # A reproducible start vector without the symmetries of the body.
+            v0=np.random.default_rng(0).standard_normal(len(masses)),
+        )
+        return squares, vectors
 
 
 @final

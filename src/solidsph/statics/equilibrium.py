@@ -15,6 +15,7 @@ from solidsph.run.built_scene import BuiltScene
 from solidsph.scene.static_solver import AUTOMATIC, SOLVERS
 from solidsph.statics.factors import SingularError
 from solidsph.statics.freedoms import Freedoms
+from solidsph.statics.lead import Lead
 from solidsph.statics.linearised import Linearised, LinearSolver, UnsolvedError
 from solidsph.statics.load_path import Forces, LoadPath
 from solidsph.statics.solvers import linear_system
@@ -106,10 +107,13 @@ def equilibrium(
     Newton steps stretch a slender body that rotates, and plain iteration spends many steps on
     spurious membrane forces. Stresses are therefore treated like unknowns: the geometric stiffness
     uses the stress that the last step predicted (Magisano, Leonetti & Garcea 2017). Convergence
-    stays quadratic, in a quarter of the iterations for a beam bent by a fifth of its length.
+    stays quadratic, in a quarter of the iterations for a beam bent by a fifth of its length. So is
+    the volume: in a nearly incompressible body a false one of a step would outweigh the shear
+    modulus, and let motions fall that are stiff.
 
     Newton steps are halved while they invert a volume or fail Deuflhard's natural monotonicity
-    test: with the same tangent, the next correction must be smaller.
+    test: with the same tangent, the next correction must be smaller, that of the actual stresses or
+    that of the predicted ones.
 
     Args:
         simulation: a built scene in the total Lagrangian form.
@@ -176,6 +180,11 @@ class _Correction:
     values: Array  # (k,) change of free displacements [m]
     size: float  # norm of about this change [m]
 
+    def next_size(self, left: Array) -> float:
+        """Norm of about the correction of forces (k,) with the same tangent [m]."""
+        finite = bool(np.all(np.isfinite(left)))
+        return float(np.linalg.norm(self.tangent.roughly(left))) if finite else float("inf")
+
 
 @attrs.define(eq=False)
 class _Newton:
@@ -215,16 +224,16 @@ class _Newton:
         Each step applies the same fraction of the missing imposed motion and of the change of the
         free displacements, so that a large imposed motion does not crush the particles beside it.
         """
-        u, ahead = start, None
+        u, lead = start, None
         missing = self.path.placed(u, factor) - u
         forces = self.path.forces(u, factor)
         residuals = [self._relative(forces)]
         if not (missing.any() or self._imbalance(forces).any()):
             return u, tuple(residuals)
         for _ in range(self.max_iterations):
-            correction = self._correction(u, ahead, missing, forces, self.path.time(factor))
+            correction = self._correction(u, lead, missing, forces, self.path.time(factor))
             try:
-                u, ahead = self._advanced(u, missing, factor, correction)
+                u, lead = self._advanced(u, missing, factor, correction)
             except _LoadStepError:
                 if missing.any() or not self._rounded(forces):
                     raise
@@ -244,12 +253,12 @@ class _Newton:
         )
 
     def _correction(
-        self, u: Array, ahead: Array | None, missing: Array, forces: Forces, time: float
+        self, u: Array, lead: Lead | None, missing: Array, forces: Forces, time: float
     ) -> _Correction:
         """Change of the free displacements if all of `missing` (n, d) is imposed."""
         self.iterations += 1
         try:
-            tangent = self.solver.linearised(u, ahead, time)
+            tangent = self.solver.linearised(u, lead, time)
             pull = tangent.pull(missing)
             left = self._imbalance(forces) - pull
             values = tangent.solve(left, self._accuracy(left, forces))
@@ -273,8 +282,8 @@ class _Newton:
 
     def _advanced(
         self, u: Array, missing: Array, factor: float, newton: _Correction
-    ) -> tuple[Array, Array]:
-        """Displacements after the largest acceptable fraction of a step, and stress ahead."""
+    ) -> tuple[Array, Lead]:
+        """Displacements after the largest acceptable fraction of a step, and its lead."""
         direction = self.freedoms.expanded(newton.values) + missing
         length = 1.0
         while length >= _SHORTEST_STEP:
@@ -282,16 +291,16 @@ class _Newton:
             if length == 1.0:
                 trial = self.path.placed(trial, factor)  # removes rounding
             if np.all(self.path.volume_ratios(trial) > 0.0):
-                ahead = self.tangent.ahead(u, length * direction, trial)
+                lead = self.tangent.lead(u, length * direction, trial)
                 forces = self.path.forces(trial, factor)
-                predicted = self.tangent.forces_ahead(trial, ahead).ravel()
-                left = self._imbalance(forces) + self.freedoms.reduction @ predicted
-                left -= (1.0 - length) * newton.pull
-                if np.all(np.isfinite(left)):
-                    next_size = float(np.linalg.norm(newton.tangent.roughly(left)))
-                    # Deuflhard (2004), section 3.3: the restricted natural monotonicity test.
-                    if next_size <= (1.0 - 0.25 * length) * newton.size or self._converged(forces):
-                        return trial, ahead
+                predicted = self.tangent.forces_ahead(trial, lead).ravel()
+                missed = self._imbalance(forces) - (1.0 - length) * newton.pull
+                # With the stress that is there, and with the one that the step predicted.
+                both = missed, missed + self.freedoms.reduction @ predicted
+                # Deuflhard (2004), section 3.3: the restricted natural monotonicity test.
+                allowed = (1.0 - 0.25 * length) * newton.size
+                if self._converged(forces) or min(map(newton.next_size, both)) <= allowed:
+                    return trial, lead
             length *= 0.5
         cause = "no fraction of the Newton step reduces the imbalance"
         raise _LoadStepError(cause, self._remedy(self.path.forces(u, factor)), u)

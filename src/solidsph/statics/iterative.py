@@ -7,24 +7,27 @@ from typing import final
 
 import attrs
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import LinearOperator, minres
 
-from solidsph.maths.arrays import Array
+from solidsph.maths.arrays import Array, Mask
 from solidsph.maths.conjugate_gradients import Solution, conjugate_gradients
 from solidsph.run.built_scene import BuiltScene
 from solidsph.statics.alternation import alternating_signs
-from solidsph.statics.coarse_space import CoarseSpace
+from solidsph.statics.coarse_space import CoarseSpace, Fineness
 from solidsph.statics.factors import Factors, SingularError, factorise
 from solidsph.statics.freedoms import Freedoms
+from solidsph.statics.lead import Lead
 from solidsph.statics.linearised import Linearised, LinearSolver, UnsolvedError
+from solidsph.statics.lowest import lowest_modes
 from solidsph.statics.tangent import Tangent
 
-# Random vectors that estimate the diagonal, each to about 0.8 / sqrt(count) of itself.
-_PROBES = 32
-
-# The estimate of a particle is at least this part of the median.
+# Stiffnesses of a particle alone count as at least this part of the median, if one is not positive.
 _LEAST = 0.1
+
+# Grids. What alternates gains less by a fine one, and has seven patterns in space.
+_SMOOTH = Fineness(2.0, {1: 10_000, 2: 10_000, 3: 3_000})
+_ALTERNATING = Fineness(3.0, {1: 10_000, 2: 10_000, 3: 1_500})
 
 # Share of the correction by alternating functions. Their stiffness on the grid is somewhat too
 # small, because it leaves out how the functions bend.
@@ -37,27 +40,39 @@ _MOST = 5000
 _LOOK = 1e-3
 
 
+@attrs.frozen(eq=False)
+class _Correction:
+    """A correction by the functions of a coarse space."""
+
+    space: CoarseSpace
+    factors: Sequence[Factors]  # of the stiffness of each pattern's functions
+    shares: Sequence[float]  # of the correction by each
+
+    def motion(self, forces: Array) -> Array:
+        """Displacements (n, d) [m] by forces (n, d) [N]."""
+        each = zip(self.shares, self.factors, self.space.restricted(forces), strict=True)
+        return self.space.extended([share * factors.solve(own) for share, factors, own in each])
+
+
 @final
 @attrs.define(eq=False)
 class IterativeSolver(LinearSolver):
-    """Conjugate gradients with a preconditioner of coarse grids and the diagonal.
+    """Conjugate gradients with a preconditioner of coarse grids and of every particle alone.
 
     A product with the tangent is two passes over the neighbours, as one evaluation of the forces.
     What changes over several spacings is solved on a coarse grid; so is what alternates along the
-    rows of a lattice, which the gradients do not see. The diagonal is left with the rest.
-    (Nocedal & Wright 2006, algorithm 5.3; two levels, added up: Smith, Bjorstad & Gropp 1996,
-    chapter 2; the diagonal: Bekas, Kokiopoulou & Saad 2007.)
+    rows of a lattice, which the gradients do not see. The blocks of the diagonal are left with the
+    rest. (Nocedal & Wright 2006, algorithm 5.3; two levels, added up: Smith, Bjorstad & Gropp 1996,
+    chapter 2.)
     """
 
     tangent: Tangent
     freedoms: Freedoms
     volumes: Array  # (n,)
-    space: CoarseSpace  # its first pattern is smooth, the others alternate
-    diagonal_at_rest: Array  # (n, d) [N/m]
-    stiffness_at_rest: Array  # (n, d) sums of the moduli that the diagonal grows with [Pa]
-    smooth_at_rest: Factors | None = None  # once it is needed
-    alternating: Sequence[Factors] | None = None  # likewise
-    shares: Sequence[float] = ()  # of the corrections by these
+    smooth_space: CoarseSpace | None  # of one pattern; None where all nodes are held
+    alternating_space: CoarseSpace | None  # None where no functions alternate
+    smooth_at_rest: _Correction | None = None  # once it is needed
+    alternating: _Correction | None = None  # likewise
     products: int = 0
 
     @classmethod
@@ -70,34 +85,52 @@ class IterativeSolver(LinearSolver):
             for b in bodies
         ]
         patterns = [np.concatenate(signs) for signs in zip(*of_bodies, strict=True)]
-        signs = np.stack([np.ones(len(free)), *(own for own in patterns if own.any())])
-        space = CoarseSpace.of(bodies, free, signs, gradients)
-        rest = np.zeros(free.shape)
-        moduli = tangent.moduli(rest)
-        solver = cls(
-            tangent=tangent,
-            freedoms=freedoms,
-            volumes=simulation.particles.volumes,
-            space=space,
-            diagonal_at_rest=rest,
-            stiffness_at_rest=_resistance(moduli),
-        )
-        of_loads = _symmetric(tangent.of_loads(rest, 0.0))
-        product = solver.product(moduli, of_loads)
-        solver.diagonal_at_rest = _diagonal(product, free.shape)
-        return solver
+        signs = [own for own in patterns if own.any()]
 
-    def linearised(self, displacements: Array, ahead: Array | None, time: float) -> Linearised:
-        moduli = self.tangent.moduli(displacements, ahead)
-        of_loads = _symmetric(self.tangent.of_loads(displacements, time))
-        stiffer = _resistance(moduli) / self.stiffness_at_rest
-        diagonal = self.diagonal_at_rest * np.maximum(stiffer, _LEAST)
-        smooth, rises = self._smooth_factors(moduli, of_loads)
+        def space(signs: Sequence[Array], fineness: Fineness) -> CoarseSpace | None:
+            made = CoarseSpace.of(bodies, free, np.stack(signs), gradients, fineness)
+            return made if made.kept.any() else None
+
+        return cls(
+            tangent,
+            freedoms,
+            simulation.particles.volumes,
+            space([np.ones(len(free))], _SMOOTH),
+            space(signs, _ALTERNATING) if signs else None,
+        )
+
+    def linearised(self, displacements: Array, lead: Lead | None, time: float) -> Linearised:
+        moduli = self.tangent.moduli(displacements, lead)
+        return self._linearised(moduli, _symmetric(self.tangent.of_loads(displacements, time)))
+
+    def lowest_modes(
+        self, displacements: Array, masses: Array, shift: float, count: int
+    ) -> tuple[Array, Array]:
+        free = self.freedoms.free.ravel()
+        shifts = np.zeros(free.size)
+        shifts[free] = shift * masses
+        added = csr_array(diags_array(shifts, format="csr"))
+        of_loads = _symmetric(self.tangent.of_loads(displacements, 0.0))
+        if of_loads is not None:
+            added = csr_array(added + of_loads)
+        shifted = self._linearised(self.tangent.moduli(displacements), added)
+        if not shifted.positive():
+            raise SingularError(None)
+        squares, modes = lowest_modes(shifted.product, shifted.roughly, masses, count)
+        return squares - shift, modes
+
+    def _linearised(self, moduli: Array, of_loads: csr_array | None) -> _Iterated:
+        blocks = self.tangent.own_stiffness(moduli)
+        if of_loads is not None:
+            blocks += _blocks(of_loads, blocks.shape[1])
+        smooth, rises = self._smooth_correction(moduli, of_loads)
+        alternating = self._alternating_correction()
         return _Iterated(
             solver=self,
             whole_product=self.product(moduli, of_loads),
-            own_diagonal=diagonal[self.freedoms.free],
-            factors=[*smooth, *self._alternating_factors()],
+            own_diagonal=np.einsum("pii->pi", blocks)[self.freedoms.free],
+            alone=_inverted(blocks, self.freedoms.free),
+            corrections=[own for own in (smooth, alternating) if own is not None],
             rises=rises,
         )
 
@@ -113,48 +146,52 @@ class IterativeSolver(LinearSolver):
 
         return product
 
-    def _smooth_factors(
+    def _smooth_correction(
         self, moduli: Array, of_loads: csr_array | None
-    ) -> tuple[Sequence[Factors], bool]:
-        """Factors of a positive stiffness of the smooth functions, and whether it is the present.
-
-        None where there are no such functions.
+    ) -> tuple[_Correction | None, bool]:
+        """The correction by smooth functions, of a positive stiffness, and whether it is that here.
 
         Raises:
             SingularError: nothing holds the body at rest.
         """
-        if not self.space.kept.any():
-            return [], True
+        space = self.smooth_space
+        if space is None:
+            return None, True
         try:
-            factors = self._factorised(0, moduli, of_loads)
+            factors = self._factorised(space, 0, moduli, of_loads)
             if factors.positive:
-                return [factors], True
+                return _Correction(space, [factors], [1.0]), True
         except SingularError:
             pass
         if self.smooth_at_rest is None:
-            self.smooth_at_rest = self._factorised(0, *self._at_rest())
-        return [self.smooth_at_rest], False
+            factors = self._factorised(space, 0, *self._at_rest())
+            self.smooth_at_rest = _Correction(space, [factors], [1.0])
+        return self.smooth_at_rest, False
 
-    def _alternating_factors(self) -> Sequence[Factors]:
-        """Factors of the stiffness of the alternating functions, at rest: it hardly changes."""
-        if self.alternating is None:
-            count = len(self.space.signs) if self.space.kept.any() else 0
+    def _alternating_correction(self) -> _Correction | None:
+        """That by alternating functions, of their stiffness at rest: it hardly changes."""
+        space = self.alternating_space
+        if self.alternating is None and space is not None:
             at_rest = self._at_rest()
-            self.alternating = [self._factorised(k, *at_rest) for k in range(1, count)]
-            self.shares = [
-                self._share(k, own, *at_rest) for k, own in enumerate(self.alternating, start=1)
-            ]
+            factors = [self._factorised(space, k, *at_rest) for k in range(len(space.signs))]
+            shares = [self._share(space, k, own, *at_rest) for k, own in enumerate(factors)]
+            self.alternating = _Correction(space, factors, shares)
         return self.alternating
 
     def _share(
-        self, pattern: int, factors: Factors, moduli: Array, of_loads: csr_array | None
+        self,
+        space: CoarseSpace,
+        pattern: int,
+        factors: Factors,
+        moduli: Array,
+        of_loads: csr_array | None,
     ) -> float:
         """Share of the correction by alternating functions, from the energy of a soft one.
 
         Of some wide kernels the sums see how such a function bends, but not its slope.
         """
         free = self.freedoms.free
-        P = self.space.matrix(pattern)
+        P = space.matrix(pattern)
         forces = np.random.default_rng(0).standard_normal(P.shape[1])
         values = factors.solve(forces)
         motion = np.where(free, (P @ values).reshape(free.shape), 0.0)
@@ -167,7 +204,9 @@ class IterativeSolver(LinearSolver):
         rest = np.zeros(self.freedoms.free.shape)
         return self.tangent.moduli(rest), _symmetric(self.tangent.of_loads(rest, 0.0))
 
-    def _factorised(self, pattern: int, moduli: Array, of_loads: csr_array | None) -> Factors:
+    def _factorised(
+        self, space: CoarseSpace, pattern: int, moduli: Array, of_loads: csr_array | None
+    ) -> Factors:
         """Factors of the stiffness of one pattern's functions.
 
         Raises:
@@ -175,16 +214,16 @@ class IterativeSolver(LinearSolver):
         """
         n, d = self.freedoms.free.shape
         each = (self.volumes[:, None, None, None, None] * moduli).reshape(n, d * d, d * d)
-        matrix = self.space.stiffness(pattern, each)
+        matrix = space.stiffness(pattern, each)
         if of_loads is not None:
-            P = self.space.matrix(pattern)
+            P = space.matrix(pattern)
             matrix = csr_array(matrix + P.T @ of_loads @ P)
         try:
             return factorise(matrix, symmetric=True)
         except SingularError as error:
             if error.freedom is None:
                 raise
-            moved = np.abs(self.space.matrix(pattern)[:, [error.freedom]].toarray()).ravel()
+            moved = np.abs(space.matrix(pattern)[:, [error.freedom]].toarray()).ravel()
             free = np.flatnonzero(self.freedoms.free.ravel())
             raise SingularError(int(np.argmax(moved[free]))) from None
 
@@ -197,7 +236,8 @@ class _Iterated(Linearised):
     solver: IterativeSolver
     whole_product: Callable[[Array], Array]  # with motions (n, d) of all particles
     own_diagonal: Array  # (k,)
-    factors: Sequence[Factors]  # of the stiffness of each pattern's functions
+    alone: Array  # (n, d, d) inverse stiffness of every particle alone [m/N]
+    corrections: Sequence[_Correction]
     rises: bool  # False if their own stiffness is not positive
 
     @property
@@ -226,33 +266,35 @@ class _Iterated(Linearised):
         if not self.rises:
             return False
         # Bodies buckle smoothly: random smooth forces meet every such motion.
-        space, free = self.solver.space, self.solver.freedoms.free
-        random = np.random.default_rng(0).standard_normal(
-            (space.interpolation.shape[1], free.shape[1])
-        )
-        smooth = (space.interpolation @ random)[free]
+        space, free = self.solver.smooth_space, self.solver.freedoms.free
+        random = np.random.default_rng(0)
+        if space is None:
+            smooth = random.standard_normal(len(self.own_diagonal))
+        else:
+            smooth = (space.interpolation @ random.standard_normal(space.kept.shape))[free]
         return not self._iterated(self.own_diagonal * smooth, _LOOK).falls
 
     def _iterated(self, forces: Array, tolerance: float) -> Solution:
-        return conjugate_gradients(self._product, self._preconditioned, forces, tolerance, _MOST)
+        return conjugate_gradients(self.product, self._preconditioned, forces, tolerance, _MOST)
 
     def _by_minimal_residuals(self, forces: Array, tolerance: float) -> Array:
         """Solution with a tangent that lets some motions fall."""
         shape = (len(forces), len(forces))
         values, code = minres(
-            LinearOperator(shape, matvec=self._product, dtype=np.float64),
+            LinearOperator(shape, matvec=self.product, dtype=np.float64),
             forces,
             rtol=tolerance,
             maxiter=_MOST,
             M=LinearOperator(shape, matvec=self._preconditioned, dtype=np.float64),
         )
         if code != 0:
-            left = np.linalg.norm(forces - self._product(values)) / np.linalg.norm(forces)
+            left = np.linalg.norm(forces - self.product(values)) / np.linalg.norm(forces)
             raise UnsolvedError(float(left), _MOST)
         solution: Array = values
         return solution
 
-    def _product(self, values: Array) -> Array:
+    def product(self, values: Array) -> Array:
+        """Forces (k,) [N] that resist a motion (k,) [m]."""
         free = self.solver.freedoms.free
         motion = np.zeros(free.shape)
         motion[free] = values
@@ -260,37 +302,38 @@ class _Iterated(Linearised):
         return product
 
     def _preconditioned(self, forces: Array) -> Array:
-        values = forces / self.own_diagonal
-        if not self.factors:
-            return values
-        space, free = self.solver.space, self.solver.freedoms.free
+        free = self.solver.freedoms.free
         whole = np.zeros(free.shape)
         whole[free] = forces
-        corrections = [
-            share * factors.solve(own)
-            for share, factors, own in zip(
-                (1.0, *self.solver.shares), self.factors, space.restricted(whole), strict=True
-            )
-        ]
-        values += space.extended(corrections)[free]
+        motion = np.einsum("pij,pj->pi", self.alone, whole)
+        for correction in self.corrections:
+            motion += correction.motion(whole)
+        values: Array = motion[free]
         return values
 
 
-def _resistance(moduli: Array) -> Array:
-    """Sums over k of dT_ik / dF_ik, (n, d) [Pa]."""
-    resistance: Array = np.einsum("pikik->pi", moduli)
-    return resistance
+def _blocks(matrix: csr_array, d: int) -> Array:
+    """Blocks (n, d, d) on the diagonal of a matrix (d n, d n)."""
+    entries = matrix.tocoo()
+    p, q = entries.row // d, entries.col // d
+    own = p == q
+    blocks = np.zeros((matrix.shape[0] // d, d, d))
+    np.add.at(blocks, (p[own], entries.row[own] % d, entries.col[own] % d), entries.data[own])
+    return blocks
 
 
-def _diagonal(product: Callable[[Array], Array], shape: tuple[int, ...]) -> Array:
-    """Estimate of the diagonal of a positive matrix, in the shape of motions (n, d)."""
-    random = np.random.default_rng(0)
-    total = np.zeros(shape)
-    for _ in range(_PROBES):
-        signs = random.choice([-1.0, 1.0], shape)
-        total += signs * product(signs)
-    diagonal = total / _PROBES
-    return np.maximum(diagonal, _LEAST * np.median(diagonal))
+def _inverted(blocks: Array, free: Mask) -> Array:
+    """Inverse (n, d, d) of the free part of symmetric blocks, made positive where they are not."""
+    fixed = ~free
+    kept = np.where(fixed[:, :, None] | fixed[:, None, :], 0.0, blocks)
+    kept += np.eye(free.shape[1]) * fixed[:, None, :]
+    try:
+        np.linalg.cholesky(kept)
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(kept)
+        values = np.maximum(values, _LEAST * np.median(values[:, -1]))
+        return np.asarray((vectors / values[:, None, :]) @ vectors.transpose(0, 2, 1))
+    return np.linalg.inv(kept)
 
 
 def _symmetric(matrix: csr_array | None) -> csr_array | None:

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 
 from solidsph.errors import PortableError
 from solidsph.maths.arrays import Array
+from solidsph.statics.lead import Lead
 
 
 class UnsolvedError(PortableError):
@@ -60,13 +61,29 @@ class LinearSolver(ABC):
         return 0
 
     @abstractmethod
-    def linearised(self, displacements: Array, ahead: Array | None, time: float) -> Linearised:
+    def lowest_modes(
+        self, displacements: Array, masses: Array, shift: float, count: int
+    ) -> tuple[Array, Array]:
+        """The lowest modes (k, count) with the squares of their frequencies (count,) [1/s^2].
+
+        Args:
+            displacements: about which the body vibrates, (n, d) [m].
+            masses: of the free displacements, (k,) [kg].
+            shift: square of a low frequency, below which rigid motions may be [1/s^2].
+            count: number of modes.
+
+        Raises:
+            SingularError: some motion falls faster than the shift.
+            UnsolvedError: an iteration does not converge.
+        """
+
+    @abstractmethod
+    def linearised(self, displacements: Array, lead: Lead | None, time: float) -> Linearised:
         """The tangent at displacements (n, d) [m].
 
         Args:
             displacements: u = x - X of all particles.
-            ahead: added to the second Piola-Kirchhoff stress of the geometric stiffness,
-                (n, d, d) [Pa].
+            lead: of the step that led there, whose prediction the moduli are taken at.
             time: time of the loads [s].
 
         Raises:

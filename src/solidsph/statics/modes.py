@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import attrs
 import numpy as np
-from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import LinearOperator, eigsh
 
 from solidsph.errors import SceneError, SolidsphError
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 from solidsph.run.built_scene import BuiltScene
-from solidsph.statics.factors import SingularError, factorise
-from solidsph.statics.freedoms import freedoms
-from solidsph.statics.tangent import is_symmetric, tangent
+from solidsph.scene.static_solver import AUTOMATIC
+from solidsph.statics.factors import SingularError
+from solidsph.statics.linearised import UnsolvedError
+from solidsph.statics.solvers import linear_system
 
 # Frequency of the shift over wave speed / size of the body: low beside elastic modes of compact
 # bodies, yet high enough for a well-conditioned matrix if rigid motions are free.
@@ -34,8 +33,10 @@ class Modes:
     move against each other and whose frequency is meaningless."""
 
 
-def frequencies(simulation: BuiltScene, count: int, state: State | None = None) -> Modes:
-    """The `count` lowest natural frequencies about `state`, by shift-and-invert.
+def frequencies(
+    simulation: BuiltScene, count: int, state: State | None = None, solver: str = AUTOMATIC
+) -> Modes:
+    """The `count` lowest natural frequencies about `state`.
 
     Loads contribute the symmetric part of their stiffness; damping is neglected.
 
@@ -43,14 +44,18 @@ def frequencies(simulation: BuiltScene, count: int, state: State | None = None) 
         simulation: a built scene in the total Lagrangian form with an adjoint divergence.
         count: number of modes.
         state: equilibrium; the reference configuration by default.
+        solver: "direct" factorises the tangent, and inverts it; "iterative" takes products with it;
+            "automatic" what is faster.
 
     Raises:
-        SceneError: there are fewer modes.
-        SolidsphError: the forces have no energy, or the state is unstable.
+        SceneError: there are fewer modes, or the scene does not allow iteration.
+        SolidsphError: the forces have no energy, the state is unstable, or an iteration does not
+            converge.
     """
     particles, model = simulation.particles, simulation.model
-    free = freedoms(simulation.dynamics)
-    if not (free.adjoint and is_symmetric(simulation)):
+    system = linear_system(simulation, solver)
+    free = system.freedoms
+    if not system.symmetric:
         raise SolidsphError(
             "natural frequencies need forces that derive from an energy; use divergence = "
             "'variational' and constraints that return forces, or studies.spectrum"
@@ -63,29 +68,21 @@ def frequencies(simulation: BuiltScene, count: int, state: State | None = None) 
     u = np.zeros_like(particles.positions)
     if state is not None:
         u = state.positions - particles.positions
-    whole = free.reduced(tangent(simulation, u))
-    # A load that follows its surface may have no energy: its symmetric part alone has modes.
-    K = csr_array(0.5 * (whole + whole.T))
     mass = np.repeat(model.masses, particles.dimension)[free.free.ravel()]
     extent = float(np.ptp(particles.positions, axis=0).max())
     speed = min(body.material.wave_speed for body in model.bodies)
     shift = (_SHIFT * speed / extent) ** 2
     try:
-        factors = factorise(csr_array(K + shift * diags_array(mass)), symmetric=True)
+        squares, vectors = system.solver.lowest_modes(u, mass, shift, count)
     except SingularError:
         raise _unstable() from None
-    # A reproducible start vector without the symmetries of the body.
-    start = np.random.default_rng(0).standard_normal(free.count)
-    squares, vectors = eigsh(
-        K,
-        k=count,
-        M=diags_array(mass),
-        sigma=-shift,
-        OPinv=LinearOperator(K.shape, matvec=factors.solve, dtype=np.float64),
-        v0=start,
-    )
+    except UnsolvedError as error:
+        raise SolidsphError(
+            f"natural frequencies: {error.iterations} iterations leave an error of "
+            f"{error.left:.3g}; use solver = 'direct' if the body is small"
+        ) from None
     order = np.argsort(squares)
-    if not factors.positive or squares[order[0]] < -_ROUNDING * shift:
+    if squares[order[0]] < -_ROUNDING * shift:
         raise _unstable()
     shapes = np.stack([free.expanded(vectors[:, k]) for k in order])
     flat = shapes.reshape(count, -1)

@@ -11,7 +11,6 @@ from solidsph.run.built_scene import BuiltScene
 from solidsph.scene.static_solver import ITERATIVE, iterates
 from solidsph.statics.direct import DirectSolver
 from solidsph.statics.freedoms import Freedoms, freedoms
-from solidsph.statics.iterative import IterativeSolver
 from solidsph.statics.linearised import LinearSolver
 from solidsph.statics.sums import sums_by_matrices, sums_of_engine
 from solidsph.statics.tangent import Tangent, is_symmetric
@@ -47,6 +46,8 @@ def linear_system(simulation: BuiltScene, solver: str) -> LinearSystem:
         tangent = Tangent.of(simulation, internal)
         direct = DirectSolver(tangent, free, symmetric)
         return LinearSystem(internal, tangent, free, symmetric, direct)
+    from solidsph.statics.iterative import IterativeSolver  # brings the compiler with it
+
     internal = sums_of_engine(simulation)
     tangent = Tangent.of(simulation, internal)
     iterative = IterativeSolver.of(simulation, tangent, free)

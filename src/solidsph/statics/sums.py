@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 
+import numpy as np
+
 from solidsph.engines.matrix import MatrixEngine, MatrixForces
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.terms import StressTerm
@@ -22,7 +24,13 @@ def sums_by_matrices(simulation: BuiltScene) -> MatrixForces:
 
 
 def sums_of_engine(simulation: BuiltScene) -> InternalForces:
-    """The internal forces by the scene's own engine, if it counts in double precision."""
+    """The internal forces by the scene's own engine, if it counts in double precision.
+
+    It must also tell the stiffness of every particle alone.
+    """
     internal = simulation.dynamics.internal
-    exact = internal.precision <= sys.float_info.epsilon
-    return internal if exact else sums_by_matrices(simulation)
+    if internal.precision > sys.float_info.epsilon:
+        return sums_by_matrices(simulation)
+    n, d = simulation.particles.positions.shape
+    tells = internal.own_stiffness(np.zeros((n, d * d, d * d))) is not None
+    return internal if tells else sums_by_matrices(simulation)

@@ -18,9 +18,13 @@ from solidsph.interfaces.terms import Load, StressTerm
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import components_first, particles_first
 from solidsph.run.built_scene import BuiltScene
+from solidsph.statics.lead import Lead
 from solidsph.statics.linear_part import linear_part
 from solidsph.statics.stiff import is_stiff
 from solidsph.statics.sums import sums_by_matrices
+
+# A linear prediction of a volume is trusted up to this ratio to the actual one.
+_MOST_GROWTH = 2.0
 
 
 @attrs.frozen(eq=False)
@@ -30,10 +34,15 @@ class _BodyTangent:
     body: Body
     stresses: csr_array | None  # (d d n, d d n) extends stresses of real particles to ghosts
 
-    def moduli(self, F: Array, ahead: Array) -> Array:
+    def moduli(self, F: Array, lead: Lead | None) -> Array:
         """dT_ik / dF_jl of all particles, (n, d, d, d, d) [Pa], at F (n, d, d)."""
-        A = _moduli(self.body, F)
-        A += np.einsum("ij,pkl->pikjl", np.eye(F.shape[1]), ahead)
+        if lead is None or not self.body.material.objective:
+            return _moduli(self.body, F)
+        F = self._real(F)
+        stretched = F * lead.stretch[:, None, None]
+        A = _moduli(self.body, stretched)
+        S = lead.stress + _second_piola(self.body, F) - _second_piola(self.body, stretched)
+        A += np.einsum("ij,pkl->pikjl", np.eye(F.shape[1]), S)
         return A
 
     def matrix(self, constant: Operators, A: Array) -> csr_array:
@@ -55,23 +64,29 @@ class _BodyTangent:
         extended: Array = self._extended(real.ravel()).reshape(stresses.shape)
         return extended
 
-    def ahead(self, before: Array, dF: Array, after: Array) -> Array:
-        """`Tangent.ahead` from F before (n, d, d), its linear change and F after the step."""
+    def lead(self, before: Array, dF: Array, after: Array) -> Lead:
+        """`Tangent.lead` from F before (n, d, d), its linear change and F after the step."""
         n, d = before.shape[:2]
-        ghosts = self.body.particles.ghosts
-        if not self.body.material.objective:  # linear forces have no geometric stiffness
-            return np.zeros((n, d, d))
-        material, identity = self.body.material, np.eye(d)
-        before = np.where(ghosts[:, None, None], identity, before)
-        after = np.where(ghosts[:, None, None], identity, after)
+        ghosts, material = self.body.particles.ghosts, self.body.material
+        if not material.objective:  # linear forces have no geometric stiffness
+            return Lead(np.zeros((n, d, d)), np.ones(n))
+        before, after = self._real(before), self._real(after)
         dP = particles_first(
             material.tangent(components_first(before), components_first(dF), material.params), n
         )
         S = _second_piola(self.body, before)
         predicted = S + np.linalg.solve(before, dP - dF @ S)
-        lead: Array = predicted - _second_piola(self.body, after)
-        lead[ghosts] = 0.0
-        return lead
+        stress = predicted - _second_piola(self.body, after)
+        growth = 1.0 + np.trace(np.linalg.solve(before, dF), axis1=1, axis2=2)
+        volumes = growth * np.linalg.det(before) / np.linalg.det(after)
+        stretch = np.clip(volumes, 1.0 / _MOST_GROWTH, _MOST_GROWTH) ** (1.0 / d)
+        stress[ghosts], stretch[ghosts] = 0.0, 1.0
+        return Lead(stress, stretch)
+
+    def _real(self, F: Array) -> Array:
+        """F (n, d, d) with that of ghosts replaced by the identity."""
+        real: Array = np.where(self.body.particles.ghosts[:, None, None], np.eye(F.shape[1]), F)
+        return real
 
     def _extended(self, stresses: Any) -> Any:
         """Stresses of real particles, or their derivative, extended to ghosts."""
@@ -115,26 +130,26 @@ class Tangent:
             simulation.dynamics.loads,
         )
 
-    def moduli(self, displacements: Array, ahead: Array | None = None) -> Array:
+    def moduli(self, displacements: Array, lead: Lead | None = None) -> Array:
         """dT_ik / dF_jl of all particles, (n, d, d, d, d) [Pa], at displacements (n, d).
 
-        `ahead` (n, d, d) is added to the second Piola-Kirchhoff stress of the geometric stiffness.
+        With a lead the volume and the stress are those that the last step predicted.
         """
         F = self._deformation_gradients(displacements)
-        if ahead is None:
-            ahead = np.zeros_like(F)
-        return np.concatenate(
-            [part.moduli(F[part.body.extent], ahead[part.body.extent]) for part in self.bodies]
-        )
+        parts = []
+        for part in self.bodies:
+            extent = part.body.extent
+            parts.append(part.moduli(F[extent], None if lead is None else lead.of(extent)))
+        return np.concatenate(parts)
 
     def matrix(
-        self, displacements: Array, ahead: Array | None = None, time: float = 0.0
+        self, displacements: Array, lead: Lead | None = None, time: float = 0.0
     ) -> csr_array:
         """K, (d n, d n) [N/m], at displacements u = x - X (n, d) of all particles.
 
         Rows and columns include ghosts. Loads are those of `time` [s].
         """
-        A = self.moduli(displacements, ahead)
+        A = self.moduli(displacements, lead)
         parts = [
             part.matrix(constant, A[part.body.extent])
             for part, constant in zip(self.bodies, self._constant(), strict=True)
@@ -155,24 +170,34 @@ class Tangent:
         H = self.internal.gradients(motion).reshape(n, d * d, 1)
         return -self._forces(motion, (moduli.reshape(n, d * d, d * d) @ H).reshape(n, d, d))
 
-    def ahead(self, displacements: Array, change: Array, placed: Array) -> Array:
-        """Second Piola-Kirchhoff stress predicted by a step minus the actual one, (n, d, d) [Pa].
+    def own_stiffness(self, moduli: Array) -> Array:
+        """Blocks of K at each particle without the part of the loads, (n, d, d) [N/m]."""
+        n, d = moduli.shape[:2]
+        blocks = self.internal.own_stiffness(moduli.reshape(n, d * d, d * d))
+        assert blocks is not None, "sums are chosen that can tell"
+        return blocks
 
-        Predicted is S + dS, linear in `change` (n, d) from `displacements` (n, d); actual is S at
-        `placed` (n, d). The difference is of second order in the change.
+    def lead(self, displacements: Array, change: Array, placed: Array) -> Lead:
+        """Stress and volume predicted by a step, beside the actual ones.
+
+        Predicted are S + dS and J + dJ, linear in `change` (n, d) from `displacements` (n, d);
+        actual are those at `placed` (n, d). The difference is of second order in the change.
         """
         fields = (
             self._deformation_gradients(displacements),
             self.internal.gradients(change),
             self._deformation_gradients(placed),
         )
-        return np.concatenate(
-            [part.ahead(*(field[part.body.extent] for field in fields)) for part in self.bodies]
+        leads = [part.lead(*(field[part.body.extent] for field in fields)) for part in self.bodies]
+        return Lead(
+            np.concatenate([lead.stress for lead in leads]),
+            np.concatenate([lead.stretch for lead in leads]),
         )
 
-    def forces_ahead(self, displacements: Array, ahead: Array) -> Array:
-        """Forces (n, d) [N] that a second Piola-Kirchhoff stress `ahead` (n, d, d) adds."""
-        return self._forces(displacements, self._deformation_gradients(displacements) @ ahead)
+    def forces_ahead(self, displacements: Array, lead: Lead) -> Array:
+        """Forces (n, d) [N] that the stress of a lead adds."""
+        F = self._deformation_gradients(displacements)
+        return self._forces(displacements, F @ lead.stress)
 
     def _forces(self, displacements: Array, stresses: Array) -> Array:
         """Forces (n, d) of stresses (n, d, d) at real particles."""

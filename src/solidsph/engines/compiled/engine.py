@@ -170,6 +170,16 @@ class CompiledForces(InternalForces):
             part.spread(stress[:, :, part.body.extent], forces[part.body.extent])
         return forces
 
+    def own_stiffness(self, moduli: Array) -> Array | None:
+        fixed = self._fixed
+        if len(fixed) < len(self.parts) or not all(part.fused for part in fixed):
+            return None
+        n, d = len(moduli), fixed[0].body.particles.dimension
+        blocks = np.zeros((n, d, d))
+        for part in fixed:
+            part.add_own_stiffness(moduli[part.body.extent], blocks[part.body.extent])
+        return blocks
+
     def part(self, chosen: Indices) -> InternalForces | None:
         only = self.parts[0]
         if self.conditions or len(self.parts) > 1 or not isinstance(only, ReferenceBody):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from solidsph.engines.compiled.fixed.blocks import group
 from solidsph.engines.compiled.fixed.chunks import in_chunks, weighted_chunks
+from solidsph.engines.compiled.fixed.own_stiffness import own_stiffness_pass
 from solidsph.engines.compiled.fixed.partition import (
     Partition,
     Passes,
@@ -176,6 +177,11 @@ class ReferenceBody:
         if ghosts_act:
             # Ghosts have acted through their stress; no force acts on them.
             out[ghosts] = 0.0
+
+    def add_own_stiffness(self, moduli: Array, blocks: Array) -> None:
+        """Add that of a fused body with moduli (n, d d, d d) to blocks (n, d, d)."""
+        run = own_stiffness_pass(self.body.particles.dimension)
+        run(self.gradient, self.factors, moduli, blocks)
 
 
 def reference_body(body: Body, law: Any, dtype: str) -> ReferenceBody:
