@@ -101,6 +101,26 @@ _define_one(np.abs, "fabs")
 
 
 @intrinsic
+def _one_or_other(typing: Any, condition: Any, a: Any, b: Any) -> Any:
+    lanes = Lanes(types.float64, condition.count)
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        which, *both = args
+        kinds = signature.args[1:]
+        values = (laid(context, builder, *one, lanes) for one in zip(kinds, both, strict=True))
+        return builder.select(which, *values)
+
+    return lanes(condition, a, b), code
+
+
+@overload(np.where, strict=False)
+def _where(condition: Any, x: Any, y: Any) -> Any:
+    if isinstance(condition, Lanes) and condition.element == types.boolean:
+        return lambda condition, x, y: _one_or_other(condition, x, y)
+    return None
+
+
+@intrinsic
 def _negative(typing: Any, a: Any) -> Any:
     return a(a), lambda context, builder, signature, args: builder.fneg(args[0])
 
