@@ -5,7 +5,7 @@
 
 A block on a lattice, clamped at one end and thrown to the side, by the compiled engine on one
 thread. Each scene runs some steps first, which compile, and then takes turns with the plain one;
-processor time. The last column is what a step may cost at most.
+processor time. The last column is what a step may cost at most, and what costs more is told below.
 """
 
 from __future__ import annotations
@@ -182,6 +182,8 @@ def main() -> None:
     print(
         Table(f"Effects and materials, {wanted.particles} particles", columns, tuple(found)).text()
     )
+    over = [name for name, _, times, most in found if times and float(times) > float(most)]
+    print(f"\nAbove what they may cost: {', '.join(over) or 'none'}")
 
 
 if __name__ == "__main__":
