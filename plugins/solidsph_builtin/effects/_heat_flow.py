@@ -59,6 +59,6 @@ def _pass(threaded: bool) -> Any:
 
 
 @njit(error_model="numpy")
-def _between(a: Any, b: Any, values: Any, bits: Any) -> Any:
+def _between(a, b, values, bits):
     flow = chosen(values[0] * (b[0] - a[0]), bits)
     return (flow,), (-1.0 * flow,)
