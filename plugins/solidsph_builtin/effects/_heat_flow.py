@@ -55,10 +55,9 @@ class HeatFlow:
 
 @cache
 def _pass(threaded: bool) -> Any:
-    return pair_pass(_between, 1, 1, 1, True, threaded)
+    return pair_pass(njit(error_model="numpy")(_between), 1, 1, 1, True, threaded)
 
 
-@njit(error_model="numpy")
-def _between(a, b, values, bits):
+def _between(a: Any, b: Any, values: Any, bits: Any) -> Any:
     flow = chosen(values[0] * (b[0] - a[0]), bits)
     return (flow,), (-1.0 * flow,)
