@@ -31,9 +31,10 @@ validate: $(STAMP)  ## the slow physics, every combination, and many more exampl
 bare: $(STAMP)  ## scenes that name nothing of the scheme: their errors as a table, and plots over spacing
 	$(BIN)/python -m tests.bare results/bare
 
-bench: $(STAMP)  ## against a plain C loop, whole steps, memory, throughput along every axis, the updated form
+bench: $(STAMP)  ## against a plain C loop, whole steps, memory, throughput along every axis, the updated form, every effect
 	$(BIN)/python benchmarks/bench.py
 	$(BIN)/python benchmarks/moving.py
+	$(BIN)/python benchmarks/effects.py
 
 bench-page: $(STAMP)  ## the same, written to the documentation
 	$(BIN)/python benchmarks/bench.py --write docs/benchmarks.md

@@ -14,6 +14,7 @@ from solidsph.interfaces.compilable_terms import (
     ScheduledConstraint,
     ScheduledLoad,
 )
+from solidsph.interfaces.deformation_load import DeformationLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.divergence import Divergence, PointwiseDivergence
@@ -108,6 +109,7 @@ __all__ = [
     "Configuration",
     "Constraint",
     "Curves",
+    "DeformationLoad",
     "DiscreteModel",
     "Discretisation",
     "Divergence",

@@ -182,14 +182,17 @@ def test_another_process_finds_the_same_content() -> None:
     """Whatever it seeds its hashes with."""
     program = """
 from solidsph.engines.compiled.content import content
-from solidsph.engines.compiled.fixed.block_sweeps import block_sweeps
+from solidsph.engines.compiled.fixed.block_law import block_law
+from solidsph.engines.compiled.fixed.block_sweeps import force_sweep
+from solidsph.engines.compiled.history_law import without_history
 from solidsph.engines.compiled.pointwise import compiled_flux
 from solidsph_builtin.formulations.total_lagrangian import TotalLagrangian
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 
 formulation = TotalLagrangian()
 law = compiled_flux(formulation, NeoHookean(1e6, 0.3, 1000.0), 2)
-print(content(block_sweeps(2, "float64", law).forces, frozenset("abc")))
+apply = block_law(2, "float64", without_history(law), 0, 2)
+print(content(force_sweep(2, "float64", apply), frozenset("abc")))
 """
     found = {
         subprocess.run(

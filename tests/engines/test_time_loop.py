@@ -118,6 +118,16 @@ def test_hourglass_control_of_a_bar() -> None:
     assert_agree(box(1, 24).boundary("clamp", where="left").effect("hourglass-control"))
 
 
+@pytest.mark.parametrize("pressure", ["1e3*(1 + 200*t)", "2e3"])
+def test_a_pressure_that_follows_the_surface(pressure: str) -> None:
+    """Varying and constant, of a face of several particles; by no call."""
+    builder = box(2, 12).boundary("clamp", where="left")
+    builder = builder.boundary("pressure", where="right", pressure=pressure)
+    _, loop, _ = loops(builder)
+    assert [one.called for one in loop.loads] == [None]
+    assert_agree(builder)
+
+
 # The others are under validation: each takes some seconds to compile.
 QUICK = {(2, "j2-plasticity")}
 

@@ -11,10 +11,11 @@ import numpy as np
 from scipy.sparse import block_diag, csr_array, diags_array, kron
 
 from solidsph.interfaces.boundary import BoundaryHandler
+from solidsph.interfaces.deformation_load import DeformationLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.terms import Observation, SurfaceLoad, Term
-from solidsph.maths.arrays import Array, Indices
-from solidsph.maths.tensors import cofactor, components_first, particles_first
+from solidsph.maths.arrays import Array, Indices, Scalar, Tensor, Vector
+from solidsph.maths.tensors import cofactor, dot, scaled
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.particles import Face
 from solidsph.model.regions import Where
@@ -70,7 +71,7 @@ def _gradients(model: DiscreteModel, chosen: Indices) -> Sequence[csr_array]:
 
 @final
 @attrs.frozen(eq=False)
-class FollowerLoad(SurfaceLoad):
+class FollowerLoad(SurfaceLoad, DeformationLoad):
     """Pressure times current area on each surface particle."""
 
     label: str
@@ -80,29 +81,22 @@ class FollowerLoad(SurfaceLoad):
     field: VectorField
     gradients: Sequence[csr_array]  # along each axis, (k, n) [1/m]
 
-    def forces(self, time: float, positions: Array, velocities: Array) -> Array:
-        p = self.field.values(0, self.reference[self.particles], time)
-        return -p[:, None] * self._areas(positions)
+    @property
+    def values(self) -> Array:
+        return self.face.area_vectors
 
-    def _areas(self, positions: Array) -> Array:
-        return self._areas_of(self._deformation(positions))
+    def schedule(self, times: Array) -> Array:
+        return self.field.schedule(0, self.reference[self.particles], times)
 
-    def _deformation(self, positions: Array) -> Array:
-        """F (d, d, k) of the surface particles."""
-        u = positions - self.reference
-        H = np.stack([gradient @ u for gradient in self.gradients], axis=-1)
-        return components_first(H + np.eye(u.shape[1]))
-
-    def _areas_of(self, F: Array) -> Array:
-        """cof(F) N A, (k, d) [m^(d-1)]."""
-        cof = particles_first(cofactor(F), len(self.particles))
-        return np.asarray(np.einsum("kij,kj->ki", cof, self.face.area_vectors))
+    @staticmethod
+    def force(F: Tensor, number: Scalar, values: Vector) -> Vector:
+        return scaled(-number, _area(F, values))
 
     def stiffness(self, displacements: Array, time: float) -> csr_array:
         """K (d n, d n) [N/m]; it is symmetric if the surface is closed, or its edge held."""
         n, d = displacements.shape
         p = self.field.values(0, self.reference[self.particles], time)
-        F = self._deformation(self.reference + displacements)
+        F, areas = self.deformation(displacements), self.face.area_vectors.T
         chosen = csr_array(
             (np.ones(len(p)), (self.particles, np.arange(len(p)))), shape=(n, len(p))
         )
@@ -111,9 +105,10 @@ class FollowerLoad(SurfaceLoad):
             # cof is a polynomial of the second degree: these differences are exact.
             step = np.zeros((d, d, 1))
             step[i, j] = 1.0
-            change = 0.5 * (self._areas_of(F + step) - self._areas_of(F - step))
+            ahead, behind = np.array(_area(F + step, areas)), np.array(_area(F - step, areas))
+            change = 0.5 * (ahead - behind)
             for k in range(d):
-                block = chosen @ (diags_array(p * change[:, k]) @ self.gradients[j])
+                block = chosen @ (diags_array(p * change[k]) @ self.gradients[j])
                 place = np.zeros((d, d))
                 place[k, i] = 1.0
                 total = total + kron(block, place, format="csr")
@@ -122,7 +117,8 @@ class FollowerLoad(SurfaceLoad):
     def report(self, observation: Observation) -> Mapping[str, float]:
         state = observation.state
         p = self.field.values(0, self.reference[self.particles], state.time)
-        areas = self._areas(state.positions)
+        F = self.deformation(state.positions - self.reference)
+        areas = np.column_stack(_area(F, self.face.area_vectors.T))
         size = np.linalg.norm(areas, axis=1)
         traction = np.einsum(
             "kij,kj->ki", observation.stresses[self.particles], self.face.area_vectors
@@ -132,3 +128,13 @@ class FollowerLoad(SurfaceLoad):
             f"{self.label} asked [Pa]": float(p @ size / size.sum()),
             f"{self.label} particle stress [Pa]": against / float(size.sum()),
         } | asked_resultant(self.label, state.positions[self.particles], -p[:, None] * areas)
+
+
+def _area(F: Tensor, area: Vector) -> Vector:
+    """cof(F) N A [m^(d-1)]."""
+    cof = cofactor(F)
+    if len(area) == 1:
+        return (dot(cof[0], area),)
+    if len(area) == 2:
+        return (dot(cof[0], area), dot(cof[1], area))
+    return (dot(cof[0], area), dot(cof[1], area), dot(cof[2], area))

@@ -17,6 +17,7 @@ from solidsph.interfaces.compilable_terms import (
     ScheduledConstraint,
     ScheduledLoad,
 )
+from solidsph.interfaces.deformation_load import DeformationLoad
 from solidsph.interfaces.integrator import PointwiseIntegrator
 from solidsph.interfaces.terms import Load
 
@@ -27,6 +28,7 @@ _DERIVED: Mapping[type, tuple[str, ...]] = {
     PointwiseLoad: ("forces", "advance"),
     RateStressLoad: ("particles", "forces", "advance"),
     PairLoad: ("particles", "forces", "advance"),
+    DeformationLoad: ("forces", "advance"),
     HourglassLoad: ("particles", "forces", "advance"),
     PointwiseIntegrator: ("start", "advance"),
 }

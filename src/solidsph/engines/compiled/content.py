@@ -143,7 +143,9 @@ def _(value: _Intrinsic, digest: Digest) -> Iterator[bytes]:
 @_parts.register
 def _(value: type, digest: Digest) -> Iterator[bytes]:
     yield _name(value)
-    if not _is_known_by_name(value):
+    # The source of the engine, with its types for the compiler, is part of the key of an entry.
+    of_engine = issubclass(value, types.Type) and value.__module__.startswith(__package__)
+    if not of_engine and not _is_known_by_name(value):
         # A named tuple, which compiled code sees as a tuple with names.
         if not (issubclass(value, tuple) and hasattr(value, "_fields")):
             raise UnknownContentError(f"class {value!r}")

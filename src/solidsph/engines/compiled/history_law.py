@@ -10,7 +10,6 @@ import numpy as np
 from numba import types
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from solidsph.engines.compiled.fixed.stress_at import of_history_law, of_law
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import (
     NotCompilableError,
@@ -78,15 +77,20 @@ def history_flux(body: Body) -> Any:
     )
 
 
-def particle_stress(body: Body, law: Any) -> Any:
-    """The stress at a particle, as in `fixed/stress_at.py`, for the body's `law` if it has no
-    history.
+def stepping_law(body: Body, law: Any) -> Any:
+    """Compiled (H, h, step, params) -> T and h at the end of a step, with the body's `law` if it
+    has no history.
 
     Raises:
         NotCompilableError: the law does not compile.
     """
-    count = history_count(body)
-    return of_history_law(history_flux(body), count) if count else of_law(law)
+    return history_flux(body) if history_count(body) else without_history(law)
+
+
+@cache
+def without_history(law: Any) -> Any:
+    """Compiled (H, h, step, params) -> (T, h) for a compiled law (H, params) -> T."""
+    return njit(error_model="numpy")(lambda H, h, step, params: (law(H, params), h))
 
 
 @cache

@@ -15,8 +15,8 @@ from solidsph.engines.compiled.fixed.chunks import weighted_chunks
 from solidsph.engines.compiled.fixed.partition import (
     flat_field,
     partitioned,
-    passes,
     spread_pass,
+    stress_pass,
     thread_count,
 )
 from solidsph.engines.compiled.fixed.rows import Rows, compressed
@@ -130,7 +130,7 @@ def compiled_sweeps(operators: Sequence[HourglassOperator]) -> Sequence[Hourglas
 def hourglass_sweep(dimension: int, threaded: bool) -> Any:
     """Compiled (arrays, displacements (n, d), forces (n, d)): the forces of one body."""
     d = dimension
-    gather = passes(d, _DTYPE, no_law, threaded).stress
+    gather = stress_pass(d, _DTYPE, no_law, threaded)
     scatter = spread_pass(d, _DTYPE, threaded)
     pull = near_pass(d, threaded)
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from numba import types
 from numba.core.errors import NumbaError
-from numba.extending import register_jitable
+from numba.extending import overload, register_jitable
 
 from solidsph.engines.compiled.jit import njit
 from solidsph.errors import PortableError
@@ -63,6 +63,15 @@ def compiled_rate_flux(formulation: Formulation, stress: Any, dimension: int, co
     return law
 
 
+def compiles(function: Any, *arguments: Any) -> bool:
+    """Whether a compiled function compiles for arguments of these types."""
+    try:
+        _try(function, *arguments)
+    except NotCompilableError:
+        return False
+    return True
+
+
 def numbers_type(count: int) -> Any:
     """The compiler's type of `params`, and of a vector."""
     return types.UniTuple(types.float64, count)
@@ -91,17 +100,27 @@ def no_law(H: Tensor, params: tuple[float, ...]) -> Tensor:
     return H
 
 
+def number(component: Any) -> float:
+    """A component of a tensor as a float: a constant one may be of another type."""
+    return float(component)
+
+
+@overload(number, strict=False)
+def _number(component: Any) -> Any:
+    return (lambda component: float(component)) if isinstance(component, types.Number) else None
+
+
 @njit
 def numbers(T: Tensor) -> Tensor:
-    """The tensor with all components as floats: a constant component may be of another type."""
+    """The tensor with all components as floats, or as what stands for several of them."""
     if len(T) == 1:
-        return ((float(T[0][0]),),)
+        return ((number(T[0][0]),),)
     if len(T) == 2:
-        return ((float(T[0][0]), float(T[0][1])), (float(T[1][0]), float(T[1][1])))
+        return ((number(T[0][0]), number(T[0][1])), (number(T[1][0]), number(T[1][1])))
     return (
-        (float(T[0][0]), float(T[0][1]), float(T[0][2])),
-        (float(T[1][0]), float(T[1][1]), float(T[1][2])),
-        (float(T[2][0]), float(T[2][1]), float(T[2][2])),
+        (number(T[0][0]), number(T[0][1]), number(T[0][2])),
+        (number(T[1][0]), number(T[1][1]), number(T[1][2])),
+        (number(T[2][0]), number(T[2][1]), number(T[2][2])),
     )
 
 

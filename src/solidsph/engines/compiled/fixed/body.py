@@ -9,22 +9,23 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from solidsph.engines.compiled.fixed.block_law import block_law
 from solidsph.engines.compiled.fixed.blocks import group
 from solidsph.engines.compiled.fixed.chunks import in_chunks, weighted_chunks
 from solidsph.engines.compiled.fixed.own_stiffness import own_stiffness_pass
 from solidsph.engines.compiled.fixed.partition import (
     Partition,
-    Passes,
     flat_field,
-    history_pass,
+    force_pass,
+    padded,
     partitioned,
-    passes,
     spread_pass,
+    stress_pass,
     thread_count,
 )
 from solidsph.engines.compiled.fixed.rows import Rows, compressed
 from solidsph.engines.compiled.fixed.subset_rows import part_of_rows
-from solidsph.engines.compiled.history_law import history_count, history_flux
+from solidsph.engines.compiled.history_law import history_count, stepping_law, without_history
 from solidsph.engines.compiled.pointwise import no_law
 from solidsph.interfaces.body import Body, part_of
 from solidsph.interfaces.plan import Operations, SumMethod, vectors
@@ -46,8 +47,8 @@ class ReferenceBody:
     gradient_partition: Partition
     force_partition: Partition
     u: NDArray[Any]  # flat
-    passes: Passes
-    gradients: Passes  # without a law
+    stress_pass: Any
+    gradient_pass: Any  # the same without a law
     spread_pass: Any
 
     @classmethod
@@ -64,13 +65,13 @@ class ReferenceBody:
             law=law,
             gradient=gradient,
             force=force,
-            factors=factors.astype(dtype),
+            factors=padded(factors, dtype),
             pair_count=pair_count,
             gradient_partition=own,
             force_partition=own if force is gradient else partitioned(force, d, dtype, threads),
             u=flat_field(n, d, dtype),
-            passes=passes(d, dtype, law, threads > 1),
-            gradients=passes(d, dtype, no_law, threads > 1),
+            stress_pass=stress_pass(d, dtype, law, threads > 1),
+            gradient_pass=stress_pass(d, dtype, no_law, threads > 1),
             spread_pass=spread_pass(d, dtype, threads > 1),
         )
 
@@ -127,15 +128,34 @@ class ReferenceBody:
         return history_count(self.body) > 0
 
     @property
-    def history_pass(self) -> Any:
+    def block_law(self) -> Any:
+        """The compiled law over a block (`fixed/block_law.py`), internal variables included.
+
+        Raises:
+            NotCompilableError: the law does not compile.
+        """
+        return self._block_law(stepping_law(self.body, self.law), history_count(self.body))
+
+    @property
+    def force_pass(self) -> Any:
         """The compiled pass of `forces` that advances the internal variables.
 
         Raises:
             NotCompilableError: the law does not compile.
         """
+        return self._force_pass(self.block_law)
+
+    def history(self) -> Array:
+        """New internal variables of all particles, (n, k); k is 0 for a material without."""
+        return padded(np.zeros((self.body.particles.count, history_count(self.body))), "float64")
+
+    def _block_law(self, law: Any, variables: int) -> Any:
         d, dtype = self.body.smoothing.dimension, self.u.dtype.name
-        law, count = history_flux(self.body), history_count(self.body)
-        return history_pass(d, dtype, law, count, self.gradient_partition.threaded)
+        return block_law(d, dtype, law, variables, len(self.body.material.params))
+
+    def _force_pass(self, law: Any) -> Any:
+        d, dtype = self.body.smoothing.dimension, self.u.dtype.name
+        return force_pass(d, dtype, law, self.gradient_partition.threaded)
 
     @property
     def _ghosts_act(self) -> bool:
@@ -146,25 +166,33 @@ class ReferenceBody:
         """Forces (n, d) of a fused body from displacements (n, d)."""
         own = self.gradient_partition
         own.check()
-        params = self.body.material.params
-        self.passes.forces(
-            own.table, self.gradient, displacements, self.u, params, self.factors, own.buffers, out
+        self._force_pass(self._block_law(without_history(self.law), 0))(
+            own.table,
+            self.gradient,
+            displacements,
+            self.u,
+            self.body.material.params,
+            self.factors,
+            own.buffers,
+            out,
+            padded(np.zeros((len(out), 0)), "float64"),
+            0.0,
         )
 
     def stress(self, displacements: Array, out: Array) -> None:
         """Stress (d, d, n) from displacements (n, d); ghosts have none."""
-        self._stress(self.passes, displacements, out)
+        self._stress(self.stress_pass, displacements, out)
         out[:, :, self.body.particles.ghosts] = 0.0
 
     def gradient_of(self, displacements: Array, out: Array) -> None:
         """Gradients H (n, d, d) of displacements (n, d); those of ghosts are not written."""
-        self._stress(self.gradients, displacements, out.transpose(1, 2, 0))
+        self._stress(self.gradient_pass, displacements, out.transpose(1, 2, 0))
 
-    def _stress(self, passes: Passes, displacements: Array, out: Array) -> None:
+    def _stress(self, pass_over: Any, displacements: Array, out: Array) -> None:
         own = self.gradient_partition
         own.check()
         params = self.body.material.params
-        passes.stress(own.table, self.gradient, displacements, self.u, params, out)
+        pass_over(own.table, self.gradient, displacements, self.u, params, out)
 
     def spread(self, stress: Array, out: Array) -> None:
         """Forces (n, d) from stress (d, d, n)."""

@@ -18,7 +18,8 @@ import numpy as np
 from llvmlite import binding, ir
 from numba import types
 from numba.core.datamodel import models
-from numba.extending import intrinsic, register_model
+from numba.core.typeconv import Conversion
+from numba.extending import intrinsic, lower_cast, register_model
 from numba.np.numpy_support import from_dtype
 
 
@@ -28,6 +29,17 @@ class Lanes(types.Type):
     def __init__(self, element: Any, count: int) -> None:
         self.element, self.count = element, count
         super().__init__(name=f"Lanes({element}, {count})")
+
+    def can_convert_from(self, typingctx: Any, other: Any) -> Any:
+        """A number becomes lanes where a formula has one or the other."""
+        return Conversion.promote if self._takes(other) else None
+
+    def unify(self, typingctx: Any, other: Any) -> Any:
+        """The type of what is lanes in one branch of a formula and a number in the other."""
+        return self if self._takes(other) else None
+
+    def _takes(self, other: Any) -> bool:
+        return isinstance(other, types.Number) and self.element == types.float64
 
 
 def lanes_type(dimension: int, count: int) -> Any:
@@ -70,6 +82,21 @@ def register_bytes() -> int:
     if features.get("avx512f"):
         return 64
     return 32 if features.get("avx") else 16
+
+
+@lower_cast(types.Number, Lanes)
+def _from_number(context: Any, builder: Any, number: Any, lanes: Any, value: Any) -> Any:
+    return spread(context, builder, context.cast(builder, value, number, lanes.element), lanes)
+
+
+def laid(context: Any, builder: Any, kind: Any, value: Any, lanes: Lanes) -> Any:
+    """A value of a type `kind` as lanes of doubles, the builder's way."""
+    if not isinstance(kind, Lanes):
+        number = context.cast(builder, value, kind, lanes.element)
+        return spread(context, builder, number, lanes)
+    if kind.element == types.boolean:
+        return builder.uitofp(value, context.get_value_type(lanes))
+    return value
 
 
 @cache

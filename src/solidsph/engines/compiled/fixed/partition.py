@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from functools import cache
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import attrs
 import numpy as np
@@ -18,16 +18,17 @@ from numpy.typing import NDArray
 
 from solidsph.engines.compiled.constants import STRIDE, WORTH_A_THREAD
 from solidsph.engines.compiled.fixed.block_sweeps import (
-    block_sweeps,
-    history_sweep,
+    force_sweep,
     rate_sweep,
     spread_sweep,
+    stress_sweep,
 )
 from solidsph.engines.compiled.fixed.blocks import group
+from solidsph.engines.compiled.fixed.lanes import register_bytes
 from solidsph.engines.compiled.fixed.rows import Rows
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.threads import check_alive, started
-from solidsph.maths.arrays import Indices
+from solidsph.maths.arrays import Array, Indices
 from solidsph.model.neighbours import ranges
 
 _ALIGNMENT = 64  # bytes of a cache line
@@ -90,6 +91,15 @@ def flat_field(particles: int, dimension: int, dtype: str) -> NDArray[Any]:
     return _aligned((particles + group(dimension, dtype)) * STRIDE[dimension], dtype)
 
 
+def padded(values: Array, dtype: str) -> NDArray[Any]:
+    """Numbers of particles (n,), or (n, k) in k planes, of which loops may read a register more."""
+    n, beyond = len(values), register_bytes() // np.dtype(dtype).itemsize
+    array = np.zeros((*values.shape[1:], n + beyond), dtype=dtype)
+    found = array[..., :n].T
+    found[...] = values
+    return found
+
+
 def _aligned(count: int, dtype: str) -> NDArray[Any]:
     """Zeros (count,) that begin on a cache line."""
     extra = _ALIGNMENT // np.dtype(dtype).itemsize
@@ -114,45 +124,12 @@ def _reach(rows: Rows) -> tuple[Indices, Indices]:
     return low, high
 
 
-class Passes(NamedTuple):
-    """Compiled passes over all particles of a body, by one thread or several."""
-
-    # (table, rows, displacements (n, d), u, params, factors, buffers, forces (n, d))
-    forces: Any
-    # (table, rows, displacements (n, d), u, params, stress (d, d, n))
-    stress: Any
-
-
 @cache
-def passes(dimension: int, dtype: str, law: Any, threaded: bool) -> Passes:
-    """The passes for one dimension, number type and compiled law (H, params) -> T."""
+def force_pass(dimension: int, dtype: str, apply: Any, threaded: bool) -> Any:
+    """Compiled pass (table, rows, displacements (n, d), u, params, factors, buffers, forces (n, d),
+    history (n, k), step), for the law over a block, of `fixed/block_law.py`."""
     place, cleared, total = buffered(dimension, dtype, threaded)
-    sweep_forces, sweep_stress = block_sweeps(dimension, dtype, law)
-
-    @njit(parallel=threaded)
-    def forces(table, rows, displacements, u, params, factors, buffers, out):
-        place(len(table), displacements, u)
-        for t in prange(len(table)):
-            cleared(table[t], buffers)
-            first, last, shift = table[t, 0], table[t, 1], table[t, 4]
-            sweep_forces(rows, first, last, u, params, factors, buffers, shift)
-        total(table, buffers, out)
-
-    @njit(parallel=threaded)
-    def stress(table, rows, displacements, u, params, out):
-        place(len(table), displacements, u)
-        for t in prange(len(table)):
-            sweep_stress(rows, table[t, 0], table[t, 1], u, params, out)
-
-    return Passes(forces, stress)
-
-
-@cache
-def history_pass(dimension: int, dtype: str, law: Any, count: int, threaded: bool) -> Any:
-    """Compiled pass (table, rows, displacements, u, params, factors, buffers, forces, history
-    (n, `count`), step) for a compiled law (H, h, step, params) -> (T, h)."""
-    place, cleared, total = buffered(dimension, dtype, threaded)
-    sweep = history_sweep(dimension, dtype, law, count)
+    sweep = force_sweep(dimension, dtype, apply)
 
     @njit(parallel=threaded)
     def forces(table, rows, displacements, u, params, factors, buffers, out, history, step):
@@ -164,6 +141,22 @@ def history_pass(dimension: int, dtype: str, law: Any, count: int, threaded: boo
         total(table, buffers, out)
 
     return forces
+
+
+@cache
+def stress_pass(dimension: int, dtype: str, law: Any, threaded: bool) -> Any:
+    """Compiled pass (table, rows, displacements (n, d), u, params, stress (d, d, n)), for a
+    compiled law (H, params) -> T."""
+    place, _, _ = buffered(dimension, dtype, threaded)
+    sweep = stress_sweep(dimension, dtype, law)
+
+    @njit(parallel=threaded)
+    def stress(table, rows, displacements, u, params, out):
+        place(len(table), displacements, u)
+        for t in prange(len(table)):
+            sweep(rows, table[t, 0], table[t, 1], u, params, out)
+
+    return stress
 
 
 @cache

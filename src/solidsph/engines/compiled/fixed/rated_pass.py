@@ -8,25 +8,25 @@ from typing import Any
 import numpy as np
 from numba import prange
 
+from solidsph.engines.compiled.constants import STRIDE
 from solidsph.engines.compiled.fixed.blocks import block_loops
 from solidsph.engines.compiled.fixed.partition import buffered
 from solidsph.engines.compiled.jit import njit
 
 
 @cache
-def rated_pass(dimension: int, dtype: str, stress_at: Any, rate_law: Any, threaded: bool) -> Any:
+def rated_pass(dimension: int, dtype: str, apply: Any, rate_law: Any, threaded: bool) -> Any:
     """Compiled (table, rows, displacements, velocities, u, v, params, history, step, rate_params,
     stress (d, d, n), H (d, d, n), factors, buffers, forces, works): forces of both stresses.
 
-    `stress_at` is one of `fixed/stress_at.py`, and `rate_law` compiled (H, dH/dt, params) -> T. The
-    stress by the rate and H are kept. With those of the step before they give the work done by this
-    stress, which is added to that of the thread: forces are the adjoint of H, so that work along a
-    path is that of the stress along the change of H.
+    `apply` is a law over a block, of `fixed/block_law.py`, and `rate_law` compiled (H, dH/dt,
+    params) -> T. The stress by the rate and H are kept. With those of the step before they give the
+    work done by this stress, which is added to that of the thread: forces are the adjoint of H, so
+    that work along a path is that of the stress along the change of H.
     """
-    d = dimension
+    d, D = dimension, STRIDE[dimension]
     place, cleared, total = buffered(d, dtype, threaded)
-    gather, scatter, tensor, put, _, plane = block_loops(d, dtype)
-    add = _ADD[d]
+    gather, scatter, tensor, put, margin, plane = block_loops(d, dtype)
 
     @njit
     def sweep(
@@ -47,7 +47,12 @@ def rated_pass(dimension: int, dtype: str, stress_at: Any, rate_law: Any, thread
                         power += (stress[i, k, p] + T[i][k]) * (H[i][k] - held[i, k, p])
                         stress[i, k, p], held[i, k, p] = T[i][k], H[i][k]
                 work += 0.5 * factors[p] * power
-                put(scratch, slot, add(stress_at(p, H, params, history, step), T), factors[p])
+                put(rates, slot, T, factors[p])
+            apply(scratch, start, count, params, factors, history, step)
+            for k in range(d):
+                begin = k * plane + margin * D
+                for at in range(begin, begin + count * D):
+                    scratch[at] += rates[at]
             scatter(rows, block, scratch, f, shift)
         return work
 
@@ -94,25 +99,3 @@ def rated_pass(dimension: int, dtype: str, stress_at: Any, rate_law: Any, thread
         total(table, buffers, out)
 
     return forces
-
-
-@njit
-def _add_1(A, B):
-    return ((A[0][0] + B[0][0],),)
-
-
-@njit
-def _add_2(A, B):
-    return (A[0][0] + B[0][0], A[0][1] + B[0][1]), (A[1][0] + B[1][0], A[1][1] + B[1][1])
-
-
-@njit
-def _add_3(A, B):
-    return (
-        (A[0][0] + B[0][0], A[0][1] + B[0][1], A[0][2] + B[0][2]),
-        (A[1][0] + B[1][0], A[1][1] + B[1][1], A[1][2] + B[1][2]),
-        (A[2][0] + B[2][0], A[2][1] + B[2][1], A[2][2] + B[2][2]),
-    )
-
-
-_ADD = {1: _add_1, 2: _add_2, 3: _add_3}

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solidsph.engines.compiled.fixed.rows import Rows
-from solidsph.engines.compiled.history_law import history_count
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.engines.compiled.time_loop.call_each import call_each
@@ -65,7 +64,7 @@ def internal_forces(
     """
     if all(part.fused for part in parts) and not conditions:
         if merged is None:
-            functions = tuple(map(_at_once, parts))
+            functions = tuple(_fused(part.force_pass) for part in parts)
             data: tuple[Any, ...] = tuple(_data(part, step, staged=False) for part in parts)
         else:
             functions, data = merged.functions, merged.data
@@ -84,31 +83,15 @@ def internal_forces(
     d = part.body.particles.dimension
     imposed = call_each(tuple(_stress_following(d) for _ in conditions))
     acts = part.body.formulation.divergence.uses_ghost_stress
-    forces = _staged(part.passes.stress, imposed, part.spread_pass, acts)
+    forces = _staged(part.stress_pass, imposed, part.spread_pass, acts)
     extensions = [c for c in conditions if isinstance(c, LinearExtension)]
     return Internal(
         forces, (_data(part, step, staged=True), tuple(following(c, c.stress) for c in extensions))
     )
 
 
-def _at_once(part: ReferenceBody) -> Any:
-    if part.remembers:
-        return _fused(part.history_pass, _history_and_step)
-    return _fused(part.passes.forces, _nothing)
-
-
-@njit
-def _nothing(body):
-    return ()
-
-
-@njit
-def _history_and_step(body):
-    return body.history, body.step
-
-
 @cache
-def _fused(forces: Any, more: Any) -> Any:
+def _fused(forces: Any) -> Any:
     @njit
     def fused(body, u, v, total):
         a, b = body.extent
@@ -121,7 +104,8 @@ def _fused(forces: Any, more: Any) -> Any:
             body.factors,
             body.buffers,
             total[a:b],
-            *more(body),
+            body.history,
+            body.step,
         )
 
     return fused
@@ -163,7 +147,7 @@ def _data(part: ReferenceBody, step: float, *, staged: bool) -> BodyData:
         force_rows=part.force,
         stress=np.zeros((d, d, n if staged else 0)),
         ghosts=np.flatnonzero(ghosts),
-        history=np.zeros((n, history_count(part.body))),
+        history=part.history(),
         step=step,
     )
 

@@ -8,7 +8,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numba import prange
+from numba import prange, types
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
@@ -23,8 +23,13 @@ from solidsph.engines.compiled.pointwise import (
     compiled_function,
     compiled_rate_flux,
     numbers_type,
+    tensor_type,
 )
 from solidsph.engines.compiled.time_loop.call_each import call_each
+from solidsph.engines.compiled.time_loop.deformation_forces import (
+    deformation_data,
+    deformation_forces,
+)
 from solidsph.engines.compiled.time_loop.merged import MergedLoad
 from solidsph.engines.compiled.time_loop.pair_load import pair_arrays, pair_sweep
 from solidsph.engines.compiled.vectors import ROW, moved
@@ -35,6 +40,7 @@ from solidsph.interfaces.compilable_terms import (
     RateStressLoad,
     ScheduledLoad,
 )
+from solidsph.interfaces.deformation_load import DeformationLoad
 from solidsph.interfaces.plan import CompilationUnit
 from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array, Indices
@@ -217,12 +223,23 @@ def _prepare_pointwise(load: PointwiseLoad, setting: Setting) -> CompiledLoad:
     )
 
 
+def _prepare_deformation(load: DeformationLoad, setting: Setting) -> CompiledLoad:
+    d, data = setting.dimension, deformation_data(load)
+    count = data.values.shape[1]
+    force = compiled_function(load.force, tensor_type(d), types.float64, numbers_type(count))
+    return CompiledLoad(
+        _accounted(deformation_forces(force, d, count), d, setting.threaded),
+        lambda times: data._replace(table=np.ascontiguousarray(load.schedule(times))),
+    )
+
+
 LOAD_KINDS = (
     LoadKind(ScheduledLoad, _prepare_scheduled, CompilationUnit.LOAD, formula=False),
     LoadKind(HourglassLoad, _prepare_hourglass, CompilationUnit.HOURGLASS_LOAD),
     LoadKind(RateStressLoad, _prepare_rate_stress, CompilationUnit.RATE_LOAD),
     LoadKind(PairLoad, _prepare_pairs, CompilationUnit.PAIR_LOAD),
     LoadKind(PointwiseLoad, _prepare_pointwise, CompilationUnit.LOAD),
+    LoadKind(DeformationLoad, _prepare_deformation, CompilationUnit.LOAD),
 )
 """The kinds of load that the loop can compile."""
 

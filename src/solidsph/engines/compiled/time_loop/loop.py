@@ -27,6 +27,7 @@ from solidsph.interfaces.compilable_terms import (
     ScheduledConstraint,
     ScheduledLoad,
 )
+from solidsph.interfaces.deformation_load import DeformationLoad
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
@@ -151,8 +152,8 @@ class CompiledLoop(TimeLoop):
         return max(1, min(_TABLE // max(1, width), int(_AT_ONCE / work)))
 
     @property
-    def _scheduled_loads(self) -> Sequence[ScheduledLoad]:
-        return [c for c in self.equation.loads if isinstance(c, ScheduledLoad)]
+    def _scheduled_loads(self) -> Sequence[ScheduledLoad | DeformationLoad]:
+        return [c for c in self.equation.loads if isinstance(c, ScheduledLoad | DeformationLoad)]
 
     @property
     def _scheduled_motions(self) -> Sequence[ScheduledConstraint]:

@@ -9,12 +9,10 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
 from numpy.typing import NDArray
 
 from solidsph.engines.compiled.fixed.penalty_sweep import added_stress_pass
 from solidsph.engines.compiled.fixed.rows import Rows
-from solidsph.engines.compiled.history_law import history_count, particle_stress
 from solidsph.engines.compiled.hourglass_pairs import NearPairs, near_pass
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.planes import adding, filling
@@ -54,7 +52,7 @@ def penalised_data(part: ReferenceBody, near: HourglassPairs, step: float) -> Pe
         params=part.body.material.params,
         factors=part.factors,
         buffers=own.buffers,
-        history=np.zeros((part.body.particles.count, history_count(part.body))),
+        history=part.history(),
         step=step,
         near=pairs,
         gradients=pairs.tensors(pairs.jets),
@@ -64,15 +62,14 @@ def penalised_data(part: ReferenceBody, near: HourglassPairs, step: float) -> Pe
 
 def penalised_forces(part: ReferenceBody) -> Any:
     """Compiled (data, u (n, d), v (n, d), total (n, d)) that sets the forces of one body."""
-    stress_at = particle_stress(part.body, part.law)
     dimension, threaded = part.body.smoothing.dimension, part.gradient_partition.threaded
-    return _forces(dimension, part.gradients.stress, stress_at, threaded)
+    return _forces(dimension, part.gradient_pass, part.block_law, threaded)
 
 
 @cache
-def _forces(dimension: int, gather: Any, stress_at: Any, threaded: bool) -> Any:
+def _forces(dimension: int, gather: Any, apply: Any, threaded: bool) -> Any:
     d = dimension
-    pull, scatter = near_pass(d, threaded), added_stress_pass(d, stress_at, threaded)
+    pull, scatter = near_pass(d, threaded), added_stress_pass(d, apply, threaded)
 
     fill, add = filling(d, threaded), adding(d, threaded)
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from solidsph.engines.compiled.fixed.rated_pass import rated_pass
 from solidsph.engines.compiled.fixed.rows import Rows
-from solidsph.engines.compiled.history_law import history_count, particle_stress
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import compiled_rate_flux
 from solidsph.interfaces.compilable_terms import RateStressLoad
@@ -53,7 +52,7 @@ def rated_data(part: ReferenceBody, load: RateStressLoad, step: float) -> RatedB
         rate_params=load.params_of(part.body),
         factors=part.factors,
         buffers=own.buffers,
-        history=np.zeros((n, history_count(part.body))),
+        history=part.history(),
         step=step,
         stress=np.zeros((d, d, n)),
         gradients=np.zeros((d, d, n)),
@@ -69,9 +68,8 @@ def rated_forces(part: ReferenceBody, load: RateStressLoad) -> Any:
     """
     d, count = part.body.smoothing.dimension, len(load.params_of(part.body))
     rate_law = compiled_rate_flux(part.body.formulation, load.stress, d, count)
-    stress_at = particle_stress(part.body, part.law)
     threaded = part.gradient_partition.threaded
-    return _forces(rated_pass(d, part.u.dtype.name, stress_at, rate_law, threaded))
+    return _forces(rated_pass(d, part.u.dtype.name, part.block_law, rate_law, threaded))
 
 
 @cache
