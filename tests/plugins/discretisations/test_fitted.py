@@ -119,6 +119,26 @@ def test_the_divergence_theorem_holds_for_quadratic_functions(
     assert np.abs(f @ A - slope).max() < 1e-11 * size
 
 
+def test_an_eighth_of_a_ball_has_positive_areas_of_particles_on_each_face() -> None:
+    """What a plane of symmetry holds is all that owns a part of it."""
+    beyond = [
+        Box(
+            lengths=[1.5 if axis == cut else 3.0 for axis in range(3)],
+            origin=[-1.5, -1.5, -1.5],
+        )
+        for cut in range(3)
+    ]
+    eighth = Fitted().particles(Difference(Ball(radius=1.0), beyond), 1.0 / 7.0)
+    planes = 0
+    for face in eighth.faces.values():
+        X = eighth.positions[face.particles]
+        flat = np.abs(X).max(axis=0) < 1e-9
+        planes += int(flat.sum())
+        assert flat.any() or np.linalg.norm(X, axis=1) == pytest.approx(1.0)
+        assert face.areas.min() > 0.0
+    assert planes == 3
+
+
 def test_a_ball_is_covered() -> None:
     """In space particles on the surface do not move along it: their distances vary more."""
     ball = Ball(radius=1.0)
