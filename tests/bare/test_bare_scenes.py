@@ -20,23 +20,18 @@ from tests.bare.study import HEADING, Study, studied
 
 # What falls short, and of what. The marks are strict: a scene that passes asks for its line to go.
 SHORT = {
-    "csm1": "-0.05 % at 9 across, 0.15 % at 17, within its bar",
+    "csm1": "-0.07 % at 9 across, 0.15 % at 17, within its bar",
     "cantilever-0.4999": "6 across: the pressure zigzags by 11 %",
-    "bent-bar-3d": "saddle -2.4 % at 6 across; tip 0.032 % at 9, 0.037 % at 12",
-    "squeezed-block-0.49": "pressure half way -3.2 % at 15 across; zigzag 3.9 % at 8",
-    "squeezed-block-0.4999": "pressure half way -3.5 % at 15 across; zigzag 12 % at 8",
-    "lame-ring": "8 across: radial stress 3.4 %, hoop stress 3.3 %",
-    "lame-ring-whole": "8 across: radial stress 4.2 %, hoop stress 3.7 %",
-    "spinning-ring": "8 across: hoop stress 2.1 %",
-    "inflated-ring-0.3": "8 across: growth 2.1 %",
-    "inflated-ring-0.4999": "8 across: growth 3.5 %; pressure zigzags by 10 %",
-    "sheet-0.49-quarter": "peak stress -0.07 % at 20 across, -0.5 % at 40",
-    "sheet-0.49-whole": "extension 0.08 % at 10 across, 0.2 % at 20",
-    "kirsch": "peak stress -0.1 % at 20 across, -0.7 % at 40",
-    "pressed-ball": "stress 0.318 % at 8 across, 0.325 % at 12",
-    "hollow-ball": "9 across: radial stress 5.1 %, hoop stress 6.7 %",
-    "heavy-ball": "8 across: shrinkage 6.9 %, pressure 4.4 %",
-    "breathing-ball": "0.03 % at 8 across, 0.05 % at 12",
+    "bent-bar-3d": "tip 0.034 % at 9 across, 0.036 % at 12; bending stress 0.05 and 0.09 %",
+    "curved-bar": "hoop stress outside -0.03 % at 5 across, 0.4 % at 8, within its bar",
+    "squeezed-block-0.49": "pressure half way -2.5 % at 15 across; zigzag 4.0 % at 8",
+    "squeezed-block-0.4999": "pressure half way -2.7 % at 15 across; zigzag 9.8 % at 8",
+    "lame-ring": "8 across: radial stress 4.6 %",
+    "lame-ring-whole": "8 across: radial stress 5.4 %, of which 1.4 % are the reading's",
+    "inflated-ring-0.4999": "8 across: growth 1.8 %; pressure zigzags by 7 %",
+    "hollow-ball": "9 across: radial stress 9.7 %",
+    "heavy-ball": "8 across: shrinkage 2.3 %, pressure 4.8 %",
+    "breathing-ball": "0.01 % at 5 across, 0.03 % at 8, within its bar",
 }
 
 
@@ -78,7 +73,7 @@ def test_some_of_them_in_seconds(name: str, across: int) -> None:
 
 
 @pytest.mark.validation
-@pytest.mark.xfail(reason="peaks differ by 2.2 and 3.1 % at 20 across", strict=True)
+@pytest.mark.xfail(reason="peaks differ by 4.6 and 5.9 % at 20 across", strict=True)
 @pytest.mark.parametrize("nu", SHEETS)
 def test_a_quarter_agrees_with_the_whole(nu: float) -> None:
     quarter, whole = (studied(f"sheet-{nu:g}-{part}") for part in ("quarter", "whole"))

@@ -117,7 +117,7 @@ def fitted_volumes(
         disturbed: depth to which the particles are no lattice [m].
     """
     # The function of a particle further inside meets complete neighbourhoods only.
-    reach = REACH * spacing
+    reach = REACH[positions.shape[1]] * spacing
     depth = disturbed + 2.0 * reach
     near = shape.signed_distance(positions) > -depth
     points, weights = _quadrature(discretisation, shape, spacing, depth + reach)

@@ -16,7 +16,7 @@ from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph_builtin.discretisations._grid import Grid
 
 # Lattice points on each side of a cell that count; what is computed must not reach further.
-_AROUND = 2
+AROUND = 2
 
 # Places closer than this part of a cell are the same.
 _SAME = 1e-6
@@ -38,9 +38,9 @@ class Surroundings:
         index = np.rint(places).astype(np.intp)
         at = (np.abs(places - index) <= _SAME).all(axis=1)
         at &= ((index >= 0) & (index < np.array(grid.counts))).all(axis=1)
-        shape = tuple(count + 2 * _AROUND for count in grid.counts)
+        shape = tuple(count + 2 * AROUND for count in grid.counts)
         numbers = np.full(np.prod(shape), -1, dtype=np.intp)
-        numbers[np.ravel_multi_index(tuple(index[at].T + _AROUND), shape)] = np.flatnonzero(at)
+        numbers[np.ravel_multi_index(tuple(index[at].T + AROUND), shape)] = np.flatnonzero(at)
         off = positions[~at]
         return cls(grid, numbers, shape, cKDTree(off) if len(off) else None)
 
@@ -60,7 +60,7 @@ class Surroundings:
         index, within = self._cells(points)
         home = self.home(points)
         bits = np.zeros(len(points), dtype=np.uint64)
-        steps = product(range(1 - _AROUND, 1 + _AROUND), repeat=index.shape[1])
+        steps = product(range(1 - AROUND, 1 + AROUND), repeat=index.shape[1])
         for bit, step in enumerate(steps):
             there = self.numbers[home + np.array(step) @ self._strides] >= 0
             bits |= there.astype(np.uint64) << np.uint64(bit)
@@ -71,13 +71,13 @@ class Surroundings:
     def home(self, points: Array) -> Indices:
         """Place in the array of the lower corner of the cell of each point, (m,)."""
         index = self._cells(points)[0]
-        home: Indices = (index + _AROUND) @ self._strides
+        home: Indices = (index + AROUND) @ self._strides
         return home
 
     def places(self, particles: Array) -> Indices:
         """Place in the array of lattice points at positions (m, d), (m,)."""
         index = np.rint((particles - self.grid.lower) / self.grid.steps - self.grid.first)
-        places: Indices = (index.astype(np.intp) + _AROUND) @ self._strides
+        places: Indices = (index.astype(np.intp) + AROUND) @ self._strides
         return places
 
     @property
