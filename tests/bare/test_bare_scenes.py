@@ -32,6 +32,7 @@ SHORT = {
     "hollow-ball": "9 across: radial stress 9.7 %",
     "heavy-ball": "8 across: shrinkage 2.3 %, pressure 4.8 %",
     "breathing-ball": "0.01 % at 5 across, 0.03 % at 8, within its bar",
+    "csm3": "0.03 % at 3 across, -0.27 % at 5, within its bar",
 }
 
 
