@@ -28,6 +28,7 @@ class Rule:
     radius: float  # [spacings]
     degree: int  # of the polynomials at most; PRODUCTS for products of squares along the axes
     determined: float  # of a polynomial at least this part must be left beside those before it
+    largest_sum: float  # of |N_p|: beyond it a fit of lower degree takes the place
 
 
 PRODUCTS = 3
@@ -35,28 +36,25 @@ PRODUCTS = 3
 # In a lattice the integrals are those of Gregory's rule, 3/8, 7/6, 23/24, 1 from the surface
 # inwards, which integrates cubics exactly, and nearly its products at edges and corners. Without
 # products of squares, the corner of a box in space would have 0.006 of a cell, in place of 0.042.
-IN_LATTICE = Rule(radius=2.0, degree=PRODUCTS, determined=1e-8)
+IN_LATTICE = Rule(radius=2.0, degree=PRODUCTS, determined=1e-8, largest_sum=3.0)
 
-# In bodies with scattered particles a fit by fewer of them serves better. In the plane the peak
-# stress at a hole is off by 13 % with 20 particles a side and a radius of 2, with 1.8 by 3 %.
-# Beside a surface that is a linear fit, and on a plane one the rule 5/12, 13/12, 1. In space, where
-# surface particles are less even, a smaller radius makes volumes that alternate: with 1.8 and 8
-# particles along the radius a ball under its own weight is off by 6.6 %, with 2.2 by 7.4 %, with
-# 2.35 and 2.5 by 2.4 and 2.2 %.
+# In bodies with scattered particles there are wider fits, for even volumes: with 15 particles
+# across, the radial stress in Lame's ring is off by 3.6 % with a radius of 1.8, by 1.6 % with 2.5.
+# In space, where surface particles are less even, volumes alternate with less than 2.4 or where a
+# fit may extrapolate: a ball under its own weight and with 8 particles along its radius is off by
+# 7 % with a radius of 1.8 or 2.1. A hollow ball has radial stresses off by 11 % with a sum of 3,
+# since volumes at its corners are thrice or a hundredth of what they should be, by 5 % with 1.6.
+# A sum of 1.4 leaves fits of the first degree.
 SCATTERED = {
-    1: Rule(radius=1.8, degree=2, determined=1e-4),
-    2: Rule(radius=1.8, degree=2, determined=1e-4),
-    3: Rule(radius=2.4, degree=2, determined=1e-4),
+    1: Rule(radius=1.8, degree=2, determined=1e-4, largest_sum=1.6),
+    2: Rule(radius=2.5, degree=2, determined=1e-4, largest_sum=1.6),
+    3: Rule(radius=2.4, degree=2, determined=1e-4, largest_sum=1.6),
 }
 
 REACH = {d: max(IN_LATTICE.radius, rule.radius) for d, rule in SCATTERED.items()}
 
-# Particles within the radius, at most: a lattice has 4, 14 and 40, scattered ones more.
-_MOST = {1: 6, 2: 24, 3: 100}
-
-# Sum of |N_p| beyond which a fit extrapolates too far, and one of lower degree takes its place. It
-# is 1.8 at most in lattices with particles on the boundary.
-_LARGEST_SUM = 3.0
+# Particles within the radius, at most: a lattice has 4, some 20 and 60, scattered ones more.
+_MOST = {1: 6, 2: 40, 3: 160}
 
 # Part of what is nearest to a particle that it gets at least: 0.56 at the corner of a lattice. With
 # nothing asked for, a corner of an eighth of a ball had a negative area, and sank in by 4 % of what
@@ -218,7 +216,7 @@ def _fits(weight: Array, offsets: Array, degree: Indices, rule: Rule) -> Array:
         size = int(np.sum(degrees <= number))
         factors = _first_column(moments[some, :size, :size], rule.determined)
         fitted = np.einsum("mkj,mj->mk", basis[some, :, :size], factors)
-        safe = np.abs(weight[some] * fitted).sum(axis=1) <= _LARGEST_SUM
+        safe = np.abs(weight[some] * fitted).sum(axis=1) <= rule.largest_sum
         accepted[some[safe]] = fitted[safe]
     return accepted
 

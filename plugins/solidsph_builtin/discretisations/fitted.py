@@ -34,6 +34,10 @@ _ALONG = 40
 _AT = 1e-6
 # Particles that the others push closer to the boundary than this are left out.
 _PUSHED_OUT = 0.2
+# Weight of a particle on the surface in fits to neighbours, in cells: what it stands for on a plane.
+# Where all weigh the same, the radial stress of a ring of 8 particles across is off by 3.6 %, with
+# 3/8 by 1.8 %. Fitted volumes as weights are too uneven in space.
+_ON_SURFACE = 0.25
 
 
 @final
@@ -68,7 +72,10 @@ class Fitted(Discretisation):
         owned = faces(surface, owners, X)
         whole = np.full(len(X), grid.cell_volume)
         given = without_ghosts(X, whole, size, owned)
-        return fitted(self, shape, spacing, given, _MOVES * size if irregular else 0.0)
+        if not irregular:
+            return fitted(self, shape, spacing, given)
+        cells = np.where(onto, _ON_SURFACE * grid.cell_volume, grid.cell_volume)
+        return attrs.evolve(fitted(self, shape, spacing, given, _MOVES * size), cells=cells)
 
     def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
         """True: this is what it is for."""
