@@ -27,9 +27,7 @@ def at(rest: Fields, values: Array, points: Array) -> Array:
     return fitted(rest.places, rest.spacing, values, np.atleast_2d(points))
 
 
-def fitted(
-    X: Array, spacing: float, values: Array, points: Array, degree: int = _DEGREE
-) -> Array:
+def fitted(X: Array, spacing: float, values: Array, points: Array, degree: int = _DEGREE) -> Array:
     """Moving least squares of a `degree`, weighed by a Gaussian of one spacing's width."""
     tree, (n, d) = cKDTree(X), X.shape
     least = min(n, _LEAST * comb(d + degree, degree))

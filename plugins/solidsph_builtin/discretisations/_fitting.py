@@ -22,7 +22,7 @@ from solidsph_builtin.discretisations._cells import cell_shares
 from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._pieces import finest_pieces
-from solidsph_builtin.discretisations._reproducing import REACH, Fit
+from solidsph_builtin.discretisations._reproducing import Fit
 from solidsph_builtin.discretisations._surface import area_vectors, sampled
 
 # Samples of the surface along a spacing, over those that an assignment to particles needs.
@@ -116,13 +116,12 @@ def fitted_volumes(
         volumes: that particles deep inside keep, (n,) [m^d].
         disturbed: depth to which the particles are no lattice [m].
     """
+    fit = Fit(positions, spacing, _lattice_of(discretisation, shape, spacing, positions))
     # The function of a particle further inside meets complete neighbourhoods only.
-    reach = REACH[positions.shape[1]] * spacing
-    depth = disturbed + 2.0 * reach
+    depth = disturbed + 2.0 * fit.reach
     near = shape.signed_distance(positions) > -depth
-    points, weights = _quadrature(discretisation, shape, spacing, depth + reach)
-    grid = _lattice_of(discretisation, shape, spacing, positions)
-    integrated = Fit(positions, spacing, grid).positive_integrals(points, weights, near)
+    points, weights = _quadrature(discretisation, shape, spacing, depth + fit.reach)
+    integrated = fit.positive_integrals(points, weights, near)
     return with_moments(positions, np.where(near, integrated, volumes), near, shape, spacing)
 
 

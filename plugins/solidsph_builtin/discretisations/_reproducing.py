@@ -51,8 +51,6 @@ SCATTERED = {
     3: Rule(radius=2.4, degree=2, determined=1e-4, largest_sum=1.6),
 }
 
-REACH = {d: max(IN_LATTICE.radius, rule.radius) for d, rule in SCATTERED.items()}
-
 # Particles within the radius, at most: a lattice has 4, some 20 and 60, scattered ones more.
 _MOST = {1: 6, 2: 40, 3: 160}
 
@@ -113,7 +111,7 @@ class Fit:
             poor = np.flatnonzero(result[:, 0] <= least)
             if not poor.size:
                 break
-            close = cKDTree(points).query_ball_point(self.particles[poor], self._reach)
+            close = cKDTree(points).query_ball_point(self.particles[poor], self.reach)
             around = np.unique(np.concatenate(close)).astype(np.intp)
             some = points[around], weights[around]
             result -= self._integrals(*some, degree[around])
@@ -127,8 +125,9 @@ class Fit:
         return IN_LATTICE if self._lattice.scattered is None else SCATTERED[self._tree.m]
 
     @property
-    def _reach(self) -> float:
-        return REACH[self._tree.m] * self.spacing
+    def reach(self) -> float:
+        """Distance up to which particles count [m]."""
+        return self._rule.radius * self.spacing
 
     @cached_property
     def _lattice(self) -> Surroundings:
@@ -139,7 +138,7 @@ class Fit:
         regular = degree == self._rule.degree
         # Surroundings tell points apart by no more of the lattice.
         regular &= self._rule.radius <= AROUND
-        regular &= self._lattice.regular(points, self._rule.radius * self.spacing)
+        regular &= self._lattice.regular(points, self.reach)
         elsewhere = np.flatnonzero(~regular)
         for start in range(0, elsewhere.size, _POINTS_AT_ONCE):
             some = elsewhere[start : start + _POINTS_AT_ONCE]

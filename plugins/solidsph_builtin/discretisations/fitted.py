@@ -34,9 +34,10 @@ _ALONG = 40
 _AT = 1e-6
 # Particles that the others push closer to the boundary than this are left out.
 _PUSHED_OUT = 0.2
-# Weight of a particle on the surface in fits to neighbours, in cells: what it stands for on a plane.
-# Where all weigh the same, the radial stress of a ring of 8 particles across is off by 3.6 %, with
-# 3/8 by 1.8 %. Fitted volumes as weights are too uneven in space.
+# Weight of a particle on the surface in fits to neighbours, in cells. With 8 particles across, the
+# radial stress in a ring is off by 4.1 % where all weigh the same, with 0.5 by 2.5 %, with 0.35 by
+# 1.7 %, with 0.2 by 0.7 % but then the hoop stress by 2.4 %, in place of 0.6. On a plane such a
+# particle stands for 3/8; fitted volumes as weights are too uneven in space.
 _ON_SURFACE = 0.25
 
 
