@@ -193,12 +193,16 @@ def _functions(
     alone = ~np.isfinite(distances[:, 0])
     if alone.any():
         distances[alone, :1], near[alone, :1] = tree.query(points[alone], k=[1])
+    near = np.minimum(near, tree.n - 1)  # those further away weigh nothing, and stand last
+    most = int(np.isfinite(distances).sum(axis=1).max(initial=1))
+    distances, some = distances[:, :most], near[:, :most]
     reach = np.maximum(radius, 1.01 * distances[:, :1])
     q = np.minimum(distances / reach, 1.0)
-    near = np.minimum(near, tree.n - 1)  # those further away weigh nothing
     weight = (1.0 - q) ** 4 * (1.0 + 4.0 * q)
-    offsets = (tree.data[near] - points[:, None, :]) / reach[:, :, None]
-    return weight * _fits(weight, offsets, degree, rule), near
+    offsets = (tree.data[some] - points[:, None, :]) / reach[:, :, None]
+    values = np.zeros(near.shape)
+    values[:, :most] = weight * _fits(weight, offsets, degree, rule)
+    return values, near
 
 
 def _fits(weight: Array, offsets: Array, degree: Indices, rule: Rule) -> Array:
