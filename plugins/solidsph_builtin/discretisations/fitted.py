@@ -34,11 +34,11 @@ _ALONG = 40
 _AT = 1e-6
 # Particles that the others push closer to the boundary than this are left out.
 _PUSHED_OUT = 0.2
-# Weight of a particle on the surface in fits to neighbours, in cells. With 8 particles across, the
-# radial stress in a ring is off by 4.1 % where all weigh the same, with 0.5 by 2.5 %, with 0.35 by
-# 1.7 %, with 0.2 by 0.7 % but then the hoop stress by 2.4 %, in place of 0.6. On a plane such a
-# particle stands for 3/8; fitted volumes as weights are too uneven in space.
-_ON_SURFACE = 0.25
+# Weight of a particle on the surface in fits to neighbours, in cells; on a plane such a particle
+# stands for 3/8 of one. With 8 particles across, the radial stress in a ring is off by 2.8 % with
+# 0.5, by 2.1 % with 0.375, by 1.9 % with 1/3, by 1.7 % with 0.3, and the peak beside a hole with
+# 20 particles a side by -4.5 to -5.0 %. Fitted volumes as weights are too uneven in space.
+_ON_SURFACE = 1.0 / 3.0
 
 
 @final
