@@ -24,14 +24,14 @@ SHORT = {
     "cantilever-0.4999": "6 across: the pressure zigzags by 11 %",
     "bent-bar-3d": "tip 0.02 % at 6 across, -0.04 % at 9; saddle -0.2 and -0.4 %",
     "curved-bar": "hoop stress outside 0.05 % at 8 across, -0.06 % at 15, within its bar",
-    "squeezed-block-0.49": "zigzag 3.7 % at 8",
-    "squeezed-block-0.4999": "zigzag 15 % at 8",
+    "squeezed-block-0.49": "zigzag 3.8 % at 8",
+    "squeezed-block-0.4999": "pressure half way -2.1 % at 15 across; zigzag 13 % at 8",
     "lame-ring": "8 across: radial stress 3.1 %, at the corners; elsewhere 1.9 %",
-    "inflated-ring-0.4999": "8 across: growth 1.5 %; pressure zigzags by 9 %",
+    "inflated-ring-0.4999": "8 across: growth 1.7 %; pressure zigzags by 10 %",
     "kirsch": "peak stress 0.35 % at 20 across, 1.0 % at 40, within its bar",
     "hollow-ball": "9 across: hoop stress 2.3 %",
     "heavy-ball": "8 across: shrinkage 4.4 %, pressure 3.8 %",
-    "csm3": "-0.06 % at 3 across, -0.24 % at 5, within its bar",
+    "csm3": "0.04 % at 3 across, -0.24 % at 5, within its bar",
 }
 
 
