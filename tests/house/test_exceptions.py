@@ -51,6 +51,7 @@ MADE = {
         cause="no descent",
         remedy="smaller steps",
     ),
+    "UnsolvedError": lambda kind: kind(0.1, 5000),
     "SingularError": lambda kind: kind(3),
     "_LoadStepError": lambda kind: kind("cause", "remedy", np.arange(3.0)),
     "UnsoundError": lambda kind: kind(

@@ -114,6 +114,6 @@ class _Viscosity(PairLoad):
 
     @staticmethod
     def pull(offset: Vector, velocity: Vector, values: Vector) -> Scalar:
-        square = dot(offset, offset)
-        approach = np.minimum(dot(velocity, offset), 0.0) / (square + values[2])
-        return (values[0] * approach - values[1] * approach**2) / np.sqrt(square + values[2])
+        nearness = 1.0 / np.sqrt(dot(offset, offset) + values[2])
+        approach = np.minimum(dot(velocity, offset), 0.0) * nearness * nearness
+        return (values[0] - values[1] * approach) * approach * nearness

@@ -40,6 +40,10 @@ class Cubic(Gradient):
 
     exact_degree: ClassVar[int] = 2
 
+    # On a lattice in space, with the cubic spline of 2.6 spacings, there are waves shorter than
+    # three spacings whose gradient is zero, beside those that alternate; with 2.4 there are none.
+    cover_in_space: ClassVar[float] = 0.925
+
     def weights(self, pairs: Pairs, kernel_gradients: Array, volumes: Array) -> Array:
         return by_distinct_rows(pairs, kernel_gradients, volumes, _weights)
 

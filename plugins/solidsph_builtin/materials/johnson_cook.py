@@ -15,7 +15,6 @@ from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.materials import _plastic
 from solidsph_builtin.materials._flow import (
     ROOT,
-    ROUNDING,
     chosen,
     deviator_length,
     direction_determinant,
@@ -35,6 +34,9 @@ TEMPERATURE = "temperature [K]"
 # at high rates. The residual is concave, so that the iteration is monotonic from a decrease that is
 # too large. Twelve steps reach rounding for strains of up to a per cent in a step.
 _STEPS = 12
+
+# Relative change from which the next is rounding: each is a thousandth of the last or less.
+_CLOSE = 1e-12
 
 # Slopes of powers below 1, and logarithms, have no value at zero.
 _SMALLEST = 1e-30
@@ -154,33 +156,27 @@ class JohnsonCook(HistoryMaterial):
         b = elastic_metric(wide, G)
         trial = deviator_length(b)
         det_n = direction_determinant(b, trial)
-        begin = ROOT * _flow_stress(e, 0.0, T, step, params) / mu
+        power, cold = e ** params[4], _of_temperature(T, params)
+        begin = ROOT * (params[2] + params[3] * power) * cold / mu
         if not np.any(trial > begin):
             return history
         fall = np.maximum(trial - begin, _SMALLEST)
         for _ in range(_STEPS):
             share = strain_of_flow(trial - fall, trial, det_n)
-            added = share * fall
-            after = T + params[10] * _plastic_work(e, added, T, step, params)
-            miss = mu * (trial - fall) - ROOT * _flow_stress(e, added, after, step, params)
-            slope = mu + ROOT * share * _slope(e, added, after, step, params)
+            _, stress, by_strain = _flow(e, power, share * fall, T, cold, step, params)
+            miss, slope = mu * (trial - fall) - ROOT * stress, mu + ROOT * share * by_strain
             before = fall
             longer = fall * np.exp(miss / (slope * fall))
             fall = np.maximum(np.minimum(longer, trial), _SMALLEST)
-            if not np.any(np.abs(fall - before) > ROUNDING * fall):
+            if not np.any(np.abs(fall - before) > _CLOSE * fall):
                 break
         flows, x = 1.0 * (trial > begin), trial - fall
         added = flows * strain_of_flow(x, trial, det_n) * fall
-        work = _plastic_work(e, added, T, step, params)
+        work, _, _ = _flow(e, power, added, T, cold, step, params)
         G_after = components(narrowed(flowed(wide, G, b, x, trial, det_n), F))
         G_kept = chosen(flows, G_after, history)
         # A sum of tuples: unpacking does not compile.
         return G_kept + (e + added, T + params[10] * work, lost + work)  # noqa: RUF005
-
-
-def _of_rate(added: Scalar, step: float, params: tuple[float, ...]) -> Scalar:
-    """1 + C ln of the rate over the reference rate."""
-    return 1.0 + params[5] * np.log(np.maximum(added / (step * params[7]), 1.0))
 
 
 def _of_temperature(T: Scalar, params: tuple[float, ...]) -> Scalar:
@@ -194,37 +190,34 @@ def _homologous(T: Scalar, params: tuple[float, ...]) -> Scalar:
     return np.minimum(np.maximum(share, 0.0), 1.0)
 
 
-def _flow_stress(
-    e: Scalar, added: Scalar, T: Scalar, step: float, params: tuple[float, ...]
-) -> Scalar:
-    """Equivalent stress of flow after `added` more plastic strain in a step, at T [Pa]."""
-    hardened = params[2] + params[3] * (e + added) ** params[4]
-    return hardened * _of_rate(added, step, params) * _of_temperature(T, params)
+def _flow(
+    e: Scalar,
+    power: Scalar,
+    added: Scalar,
+    T: Scalar,
+    cold: Scalar,
+    step: float,
+    params: tuple[float, ...],
+) -> tuple[Scalar, Scalar, Scalar]:
+    """Plastic work [J/m^3] of a step with `added` strain, stress of flow at its end, and the
+    derivative of that by the strain added [Pa].
 
-
-def _slope(e: Scalar, added: Scalar, T: Scalar, step: float, params: tuple[float, ...]) -> Scalar:
-    """Its derivative by the strain added, the heating included."""
-    total = np.maximum(e + added, _SMALLEST)
-    hardened = params[2] + params[3] * total ** params[4]
-    of_rate, of_temperature = _of_rate(added, step, params), _of_temperature(T, params)
+    The step begins at e and T, with e^n in `power` and 1 - T*^m in `cold`. Hardening is integrated,
+    heat taken at half of the step. All in one function, as powers and logarithms are what costs.
+    """
+    total = e + added
+    end_power = total ** params[4]
+    hardened = params[2] + params[3] * end_power
+    of_rate = 1.0 + params[5] * np.log(np.maximum(added / (step * params[7]), 1.0))
+    rise = params[3] / (params[4] + 1.0) * (end_power * total - power * e)
+    work = (params[2] * added + rise) * of_rate
+    work = work * _of_temperature(T + 0.5 * params[10] * work * cold, params)
+    warm = _homologous(T + params[10] * work, params)
+    lost = warm ** params[6]
+    stress = hardened * of_rate * (1.0 - lost)
     fast = 1.0 * (added > step * params[7])
     by_rate = fast * params[5] / np.maximum(added, _SMALLEST)
-    warm = np.maximum(_homologous(T, params), _SMALLEST)
-    softening = params[6] * warm ** (params[6] - 1.0) / (params[9] - params[8])
-    heating = params[10] * hardened * of_rate * of_temperature
-    return (
-        params[3] * params[4] * total ** (params[4] - 1.0) * of_rate * of_temperature
-        + hardened * by_rate * of_temperature
-        - hardened * of_rate * softening * heating
-    )
-
-
-def _plastic_work(
-    e: Scalar, added: Scalar, T: Scalar, step: float, params: tuple[float, ...]
-) -> Scalar:
-    """Of a step that begins at e and T [J/m^3]: hardening integrated, heat at its half."""
-    power = params[4] + 1.0
-    hardened = params[2] * added + params[3] / power * ((e + added) ** power - e**power)
-    work = hardened * _of_rate(added, step, params)
-    half = T + 0.5 * params[10] * work * _of_temperature(T, params)
-    return work * _of_temperature(half, params)
+    by_hardening = params[3] * params[4] * end_power / np.maximum(total, _SMALLEST)
+    softening = params[6] * lost / np.maximum(warm, _SMALLEST) / (params[9] - params[8])
+    slope = (by_hardening * of_rate + hardened * by_rate) * (1.0 - lost)
+    return work, stress, slope - hardened * of_rate * softening * params[10] * stress

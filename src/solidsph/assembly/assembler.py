@@ -35,6 +35,7 @@ from solidsph.scene.checks.terms import (
 )
 from solidsph.scene.placed_parts import PlacedParts
 from solidsph.scene.scene import Scene
+from solidsph.scene.static_solver import expected_evaluations
 
 S = TypeVar("S", bound=BuiltScene)
 
@@ -158,8 +159,10 @@ class Assembler:
         """Equation of motion, with the internal forces that the engine prepares."""
         problems, stresses = self._problems, _stresses(terms)
         engine = problems.settled(self._parts.engine)
-        # Equilibria are found with assembled matrices: there is nothing to compile for.
-        evaluations = steps if self._scene.statics is None else 1
+        evaluations, statics = steps, self._scene.statics
+        if statics is not None:
+            n, d = model.particles.positions.shape
+            evaluations = expected_evaluations(statics.solver, d, n * d)
         internal = problems.attempt(engine.prepare, model.bodies, stresses, evaluations)
         internal = problems.attempt(
             modified, problems.settled(internal), model.bodies, terms, stresses

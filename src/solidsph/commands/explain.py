@@ -37,6 +37,7 @@ from solidsph.run.cfl_step import cfl_step
 from solidsph.scene.default_cover import cover_of
 from solidsph.scene.scene import Scene
 from solidsph.scene.scheme import completed, scheme_of
+from solidsph.scene.static_solver import DIRECT, ITERATIVE, iterates
 from solidsph.simulation import Simulation
 from solidsph.statics import critical_step
 from solidsph.statics.freedoms import freedoms
@@ -331,6 +332,12 @@ def _of_statics(simulation: Simulation) -> Iterator[tuple[str, Any, str]]:
     assert statics is not None
     unknowns = freedoms(simulation.dynamics).count
     yield "free displacements", unknowns, "unknowns of Newton's method"
+    iterated = iterates(statics.solver, simulation.particles.dimension, unknowns)
+    yield (
+        "solver",
+        ITERATIVE if iterated else DIRECT,
+        "of its linear systems; direct in any case with ghosts, or without an energy",
+    )
     yield "load steps", statics.load_steps, "at first: halved on failure, doubled on success"
     yield "tolerance", statics.tolerance, "imbalance of forces over loads and reactions"
 

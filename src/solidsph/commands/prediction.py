@@ -110,9 +110,13 @@ def work_rows(work: Work) -> list[Row]:
     )
     if work.statics is None:
         return counts
+    solver = (
+        ("products with the tangent", work.statics.products, "of conjugate gradients, a guess")
+        if work.statics.products
+        else ("entries of the factors", work.statics.fill, "by nested dissection of the box")
+    )
     return counts + rows(
-        ("iterations", work.statics.iterations, "of Newton's method, a guess"),
-        ("entries of the factors", work.statics.fill, "by nested dissection of the box"),
+        ("iterations", work.statics.iterations, "of Newton's method, a guess"), solver
     )
 
 

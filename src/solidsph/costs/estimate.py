@@ -16,7 +16,7 @@ from math import ceil, floor, pi
 import attrs
 import numpy as np
 
-from solidsph.costs.count import ITERATIONS, full_box, record_bytes
+from solidsph.costs.count import ITERATIONS, full_box, iterated_work, record_bytes
 from solidsph.costs.factorisation import estimate_factorisation
 from solidsph.costs.work import Loop, StaticWork, Work
 from solidsph.interfaces.effect import Effect
@@ -32,6 +32,7 @@ from solidsph.scene.default_cover import cover_of
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import BodyScene, PartLike
 from solidsph.scene.scheme import SCHEMES, completed
+from solidsph.scene.static_solver import iterates
 
 # Random points to estimate the volume of a shape that has no formula for it.
 _POINTS = 1 << 15
@@ -171,12 +172,15 @@ def _sampled_volume(shape: Shape) -> float:
 
 def _statics(scene: Scene, bodies: Sequence[BodyEstimate], d: int, cover: float) -> StaticWork:
     assert scene.statics is not None
+    unknowns = round(sum(body.particles for body in bodies) * d)
+    if iterates(scene.statics.solver, d, unknowns):
+        return iterated_work(scene.statics, scene.statics.load_steps * ITERATIONS, unknowns)
     reach = 2.0 * cover
     factors = [estimate_factorisation(body.cells, reach, d) for body in bodies]
     return StaticWork(
         load_steps=scene.statics.load_steps,
         iterations=scene.statics.load_steps * ITERATIONS,
-        freedoms=round(sum(body.particles for body in bodies) * d),
+        freedoms=unknowns,
         entries=round(sum(b.particles for b in bodies) * ball(reach, d) * d * d),
         fill=sum(part.fill for part in factors),
         multiplications=sum(part.multiplications for part in factors),

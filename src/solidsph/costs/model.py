@@ -126,7 +126,10 @@ def _building(work: Work, machine: Calibration, extra: float) -> float:
 
 def _stepping(work: Work, machine: Calibration) -> float:
     if work.loop is Loop.NEWTON and work.statics is not None:
-        return work.statics.iterations * _total(terms.iteration_terms(work), machine)
+        statics = work.statics
+        if statics.products:  # each is two passes over the neighbours, as an evaluation
+            return statics.products * step_seconds(work, machine)
+        return statics.iterations * _total(terms.iteration_terms(work), machine)
     return work.evaluations * step_seconds(work, machine)
 
 

@@ -28,6 +28,7 @@ class StaticWork:
     entries: int  # of the tangent
     fill: int  # entries of its factors, by nested dissection of the body's box
     multiplications: int  # of the factorisation, likewise
+    products: int = 0  # with the tangent in all, an estimate; 0 if it is factorised
 
 
 @attrs.frozen

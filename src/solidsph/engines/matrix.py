@@ -171,6 +171,12 @@ class MatrixForces(InternalForces):
             condition.impose_stress(time, stress)
         return self._spread(matrices, stress)
 
+    def constant_operators(self) -> Sequence[Operators]:
+        """The matrices of each body; all sums must be taken in the reference configuration."""
+        fixed = [part.constant for part in self.parts if isinstance(part, _ReferenceBody)]
+        assert len(fixed) == len(self.parts), "the matrices of moving neighbours change"
+        return fixed
+
     def gradients(self, displacements: Array) -> Array:
         n, d = displacements.shape
         H = np.empty((n, d, d))

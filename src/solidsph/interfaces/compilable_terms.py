@@ -181,6 +181,9 @@ class PairLoad(Load):
     def pull(offset: Vector, velocity: Vector, values: Vector) -> Scalar:
         """Force on p divided by the offset x_q - x_p, along which it acts [N/m]; pointwise.
 
+        It is the same for the pair (q, p), whose offset and velocity are opposite: a compiled loop
+        asks once a pair.
+
         Args:
             offset: x_q - x_p [m].
             velocity: v_q - v_p [m/s].

@@ -20,6 +20,9 @@ from solidsph.model.particles import Particles
 class Gradient(Part):
     """Weights g_pq of the discrete gradient, grad f at p = sum over q of f_q g_pq."""
 
+    cover_in_space: ClassVar[float] = 1.0
+    """Part of a kernel's usual cover that suits it in three dimensions [-]."""
+
     @property
     @abstractmethod
     def exact_degree(self) -> int:

@@ -7,11 +7,13 @@ The default is therefore derived from the kernel.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import cache
 from itertools import product
 
 import numpy as np
 
+from solidsph.errors import SolidsphError
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.smoothing_kernel import check_profile, profile_slope
 from solidsph.maths.arrays import Array
@@ -44,7 +46,18 @@ def cover_of(scene: SceneData) -> float:
     scene = completed(scene)
     if scene.cover is not None:
         return scene.cover
-    return kernel_cover(construct("kernels", scene.kernel))
+    cover = kernel_cover(construct("kernels", scene.kernel))
+    return round(cover * _share(scene), 1)
+
+
+def _share(scene: SceneData) -> float:
+    """The part of it that suits the gradient; 1 if a part is wrong, which the build reports."""
+    with suppress(SolidsphError):
+        shapes = [construct("shapes", body.shape) for body in scene.bodies.values()]
+        if all(shape.dimension == 3 for shape in shapes):
+            gradient = construct("formulations", scene.formulation).gradient
+            return float(gradient.deep_inside.cover_in_space)
+    return 1.0
 
 
 def kernel_cover(kernel: Kernel) -> float:

@@ -21,6 +21,7 @@ from solidsph.scene.scene_data import (
     SleepScene,
     StaticsScene,
 )
+from solidsph.scene.static_solver import AUTOMATIC
 
 
 class SceneBuilder(ABC):
@@ -123,10 +124,15 @@ class SceneBuilder(ABC):
         return self._set_given(time_step_factor=time_step_factor, time_step=time_step)
 
     def statics(
-        self, *, load_steps: int = 1, tolerance: float = 1e-9, max_iterations: int = 25
+        self,
+        *,
+        load_steps: int = 1,
+        tolerance: float = 1e-9,
+        max_iterations: int = 25,
+        solver: str = AUTOMATIC,
     ) -> Self:
         """Find the equilibrium under the loads at the end of the duration, instead of a motion."""
-        return self._set(statics=StaticsScene(load_steps, tolerance, max_iterations))
+        return self._set(statics=StaticsScene(load_steps, tolerance, max_iterations, solver))
 
     def sleep(self, *, tolerance: float = 1e-9, slabs: int = 160) -> Self:
         """Do not step regions that no wave has reached, or that have come to rest."""

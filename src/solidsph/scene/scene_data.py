@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 import attrs
 
 from solidsph.model.regions import EVERYWHERE, Where
+from solidsph.scene.static_solver import AUTOMATIC
 
 PartLike: TypeAlias = str | Mapping[str, Any] | object
 """A registered name, a table with a `type` and parameters, or the part itself."""
@@ -78,6 +79,7 @@ class StaticsScene:
     load_steps: int = 1  # initial number
     tolerance: float = 1e-9  # imbalance over loads and reactions [-]
     max_iterations: int = 25  # of Newton's method per load step
+    solver: str = AUTOMATIC  # of its linear systems, one of `static_solver.SOLVERS`
 
 
 @attrs.frozen

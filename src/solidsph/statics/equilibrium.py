@@ -1,4 +1,4 @@
-"""Static equilibrium of a scene by Newton's method with a sparse tangent."""
+"""Static equilibrium of a scene by Newton's method."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ from solidsph.errors import ConvergenceError, PortableError, SceneError
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 from solidsph.run.built_scene import BuiltScene
-from solidsph.statics.factors import Factors, SingularError, factorise
-from solidsph.statics.freedoms import Freedoms, freedoms
+from solidsph.scene.static_solver import AUTOMATIC, SOLVERS
+from solidsph.statics.factors import SingularError
+from solidsph.statics.freedoms import Freedoms
+from solidsph.statics.linearised import Linearised, LinearSolver, UnsolvedError
 from solidsph.statics.load_path import Forces, LoadPath
-from solidsph.statics.tangent import Tangent, is_symmetric
+from solidsph.statics.solvers import linear_system
+from solidsph.statics.tangent import Tangent
 
 # Shorter fractions of a Newton step are not worth their cost.
 _SHORTEST_STEP = 2.0**-8
@@ -32,9 +35,16 @@ _ROUNDING = 4.0 * np.finfo(np.float64).eps
 # Largest imbalance by rounding, relative to all applied forces, that is accepted.
 _MOST_ROUNDED = 1e-4
 
+# What an iteration leaves of the forces, at least and at most, and its part of the tolerance.
+_LEAST_LEFT, _MOST_LEFT, _SAFETY = 1e-3, 0.1, 0.3
+
 _NOTHING_HOLDS = (
     "either the body is not fully clamped, or its gradients have a zero-energy mode; clamp it in "
     "every direction, or add hourglass control"
+)
+_TOO_SOFT = (
+    "the body may be nearly free to move in some way: clamp it in every direction; or a material "
+    "may be nearly incompressible: use solver = 'direct' if the body is small, or a damped motion"
 )
 _TOO_LITTLE = (
     "the loads deform the body by less than the rounding error of positions: apply larger loads, "
@@ -61,10 +71,11 @@ class EquilibriumResult:
 
     state: State  # velocities are zero; `applied` and `work` hold loads and reactions
     steps: tuple[LoadStep, ...]
-    iterations: int  # factorisations, those of failed load steps included
+    iterations: int  # of Newton's method, those of failed load steps included
     residual: float  # norm of the imbalance over that of all applied forces [-]
-    stable: bool | None  # pivots of the last tangent positive; None if forces have no energy
+    stable: bool | None  # last tangent positive; None if forces have no energy
     seconds: float  # wall time [s]
+    products: int = 0  # with the tangent, by an iterative solver
 
 
 class _LoadStepError(PortableError):
@@ -83,6 +94,7 @@ def equilibrium(
     load_steps: int = 1,
     tolerance: float = 1e-9,
     max_iterations: int = 25,
+    solver: str = AUTOMATIC,
     observer: Callable[[State], None] = lambda state: None,
 ) -> EquilibriumResult:
     """Find the displacements at which all forces on free particles balance.
@@ -104,6 +116,8 @@ def equilibrium(
         load_steps: initial number of equal load steps.
         tolerance: imbalance over the norm of loads and reactions [-].
         max_iterations: of Newton's method per load step.
+        solver: of its linear systems. "direct" factorises the tangent; "iterative" takes conjugate
+            gradients on the sums of the run; "automatic" what is faster.
         observer: called with the unloaded state, and with the state of every load step.
 
     Raises:
@@ -114,10 +128,12 @@ def equilibrium(
     for name, value in (("load_steps", load_steps), ("max_iterations", max_iterations)):
         if value < 1:
             raise SceneError(f"equilibrium: {name} must be at least 1, got {value}")
+    if solver not in SOLVERS:
+        raise SceneError(f"equilibrium: solver must be one of {SOLVERS}, got {solver!r}")
     if not 0.0 < tolerance < 1.0:
         raise SceneError(f"equilibrium: tolerance must lie between 0 and 1, got {tolerance}")
     start = clock.perf_counter()
-    newton = _Newton.of(simulation, tolerance, max_iterations)
+    newton = _Newton.of(simulation, tolerance, max_iterations, solver)
     state = newton.state(None, np.zeros_like(simulation.particles.positions), 0.0)
     observer(state)
     displacements = np.zeros_like(state.positions)
@@ -130,7 +146,7 @@ def equilibrium(
             displacements, residuals = newton.solve(displacements, target)
         except _LoadStepError as failure:
             step *= 0.5
-            hopeless = newton.singular_at_rest or step < _SHORTEST_LOAD_STEP / load_steps
+            hopeless = newton.hopeless_at_rest or step < _SHORTEST_LOAD_STEP / load_steps
             if hopeless:
                 raise newton.error(failure, factor, target) from None
             continue
@@ -147,6 +163,7 @@ def equilibrium(
         residual=steps[-1].residuals[-1],
         stable=newton.stable(),
         seconds=clock.perf_counter() - start,
+        products=newton.solver.products,
     )
 
 
@@ -154,9 +171,10 @@ def equilibrium(
 class _Correction:
     """Newton's correction at one configuration."""
 
-    factors: Factors
+    tangent: Linearised
     pull: Array  # (k,) force on free displacements by the missing part of the imposed ones
     values: Array  # (k,) change of free displacements [m]
+    size: float  # norm of about this change [m]
 
 
 @attrs.define(eq=False)
@@ -165,24 +183,28 @@ class _Newton:
 
     path: LoadPath
     tangent: Tangent
+    solver: LinearSolver
     freedoms: Freedoms
     symmetric: bool
     tolerance: float
     max_iterations: int
     iterations: int = 0
-    last: Factors | None = None
-    singular_at_rest: bool = False
+    last: Linearised | None = None
+    hopeless_at_rest: bool = False
     rounding: float = 0.0  # imbalance by rounding of displacements [N]
     coarsest: float = 0.0  # imbalance by rounding of positions [N]
 
     @classmethod
-    def of(cls, simulation: BuiltScene, tolerance: float, max_iterations: int) -> _Newton:
-        free = freedoms(simulation.dynamics)
+    def of(
+        cls, simulation: BuiltScene, tolerance: float, max_iterations: int, solver: str
+    ) -> _Newton:
+        system = linear_system(simulation, solver)
         return cls(
-            path=LoadPath.of(simulation),
-            tangent=Tangent.of(simulation),
-            freedoms=free,
-            symmetric=free.adjoint and is_symmetric(simulation),
+            path=LoadPath.of(simulation, system.internal),
+            tangent=system.tangent,
+            solver=system.solver,
+            freedoms=system.freedoms,
+            symmetric=system.symmetric,
             tolerance=tolerance,
             max_iterations=max_iterations,
         )
@@ -217,7 +239,7 @@ class _Newton:
         raise _LoadStepError(
             f"{self.max_iterations} iterations leave an imbalance of {residuals[-1]:.3g} of the "
             "applied forces",
-            _PATH_ENDS,
+            self._remedy(forces),
             u,
         )
 
@@ -225,28 +247,35 @@ class _Newton:
         self, u: Array, ahead: Array | None, missing: Array, forces: Forces, time: float
     ) -> _Correction:
         """Change of the free displacements if all of `missing` (n, d) is imposed."""
-        matrix = self.tangent.matrix(u, ahead, time)
-        reduced = self.freedoms.reduced(matrix)
         self.iterations += 1
-        free, diagonal = self.freedoms.free, reduced.diagonal()
-        x = self.path.simulation.particles.positions + u
-        self.rounding = _ROUNDING * float(np.linalg.norm(diagonal * np.abs(u[free])))
-        self.coarsest = _ROUNDING * float(np.linalg.norm(diagonal * np.abs(x[free])))
         try:
-            factors = factorise(reduced, symmetric=self.symmetric)
+            tangent = self.solver.linearised(u, ahead, time)
+            pull = tangent.pull(missing)
+            left = self._imbalance(forces) - pull
+            values = tangent.solve(left, self._accuracy(left, forces))
         except SingularError as error:
-            self.singular_at_rest = not u.any()
+            self.hopeless_at_rest = not u.any()
             raise _LoadStepError(self._free_motion(error), _NOTHING_HOLDS, u) from None
-        self.last = factors
-        pull = self.freedoms.reduction @ (matrix @ missing.ravel())
-        return _Correction(factors, pull, factors.solve(self._imbalance(forces) - pull))
+        except UnsolvedError as error:
+            self.hopeless_at_rest = not u.any()
+            raise _LoadStepError(str(error), _TOO_SOFT, u) from None
+        free, x = self.freedoms.free, self.path.simulation.particles.positions + u
+        self.rounding = _ROUNDING * float(np.linalg.norm(tangent.diagonal * np.abs(u[free])))
+        self.coarsest = _ROUNDING * float(np.linalg.norm(tangent.diagonal * np.abs(x[free])))
+        self.last = tangent
+        return _Correction(tangent, pull, values, float(np.linalg.norm(tangent.roughly(left))))
+
+    def _accuracy(self, left: Array, forces: Forces) -> float:
+        """What an iteration may leave of the forces: no more digits than are asked for."""
+        norm = float(np.linalg.norm(left))
+        enough = _SAFETY * max(self.tolerance * forces.scale, self.rounding) / norm if norm else 1.0
+        return min(max(enough, _LEAST_LEFT), _MOST_LEFT)
 
     def _advanced(
         self, u: Array, missing: Array, factor: float, newton: _Correction
     ) -> tuple[Array, Array]:
         """Displacements after the largest acceptable fraction of a step, and stress ahead."""
         direction = self.freedoms.expanded(newton.values) + missing
-        size = float(np.linalg.norm(newton.values))
         length = 1.0
         while length >= _SHORTEST_STEP:
             trial = u + length * direction
@@ -259,23 +288,21 @@ class _Newton:
                 left = self._imbalance(forces) + self.freedoms.reduction @ predicted
                 left -= (1.0 - length) * newton.pull
                 if np.all(np.isfinite(left)):
-                    next_size = float(np.linalg.norm(newton.factors.solve(left)))
+                    next_size = float(np.linalg.norm(newton.tangent.roughly(left)))
                     # Deuflhard (2004), section 3.3: the restricted natural monotonicity test.
-                    if next_size <= (1.0 - 0.25 * length) * size or self._converged(forces):
+                    if next_size <= (1.0 - 0.25 * length) * newton.size or self._converged(forces):
                         return trial, ahead
             length *= 0.5
         cause = "no fraction of the Newton step reduces the imbalance"
-        imbalance = float(np.linalg.norm(self._imbalance(self.path.forces(u, factor))))
-        raise _LoadStepError(cause, _TOO_LITTLE if imbalance <= self.coarsest else _PATH_ENDS, u)
+        raise _LoadStepError(cause, self._remedy(self.path.forces(u, factor)), u)
 
     def stable(self) -> bool | None:
-        """Whether the pivots of the last tangent were positive; None if the internal forces have no
-        energy.
+        """Whether the last tangent resists every motion; None if the forces have no energy.
 
         The stiffness of a load that follows its surface need not be symmetric. Where a path of
-        equilibria turns or branches, a pivot changes its sign all the same.
+        equilibria turns or branches, it loses its resistance all the same.
         """
-        return self.last.positive if self.symmetric and self.last is not None else None
+        return self.last.positive() if self.symmetric and self.last is not None else None
 
     def _free_motion(self, error: SingularError) -> str:
         if error.freedom is None:
@@ -302,6 +329,11 @@ class _Newton:
         """
         imbalance = float(np.linalg.norm(self._imbalance(forces)))
         return imbalance <= min(self.coarsest, _MOST_ROUNDED * forces.scale)
+
+    def _remedy(self, forces: Forces) -> str:
+        """What to do where no step reduces the imbalance."""
+        imbalance = float(np.linalg.norm(self._imbalance(forces)))
+        return _TOO_LITTLE if imbalance <= self.coarsest else _PATH_ENDS
 
     def _relative(self, forces: Forces) -> float:
         imbalance, scale = float(np.linalg.norm(self._imbalance(forces))), forces.scale

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import attrs
 import numpy as np
 
-from solidsph.engines.matrix import MatrixEngine, MatrixForces
-from solidsph.interfaces.terms import GhostConstraint, StressTerm
+from solidsph.interfaces.engine import InternalForces
+from solidsph.interfaces.terms import GhostConstraint
 from solidsph.maths.arrays import Array, Mask
 from solidsph.run.built_scene import BuiltScene
 
@@ -35,13 +35,13 @@ class LoadPath:
     """
 
     simulation: BuiltScene
-    internal: MatrixForces
+    internal: InternalForces  # in double precision
     offset: Array  # (n, d) motion imposed at t = 0 [m]
     initial_loads: Mapping[str, Array]  # (k, d) of each load at t = 0 [N]
     held: Mask  # (n, d) components of real particles that a constraint determines
 
     @classmethod
-    def of(cls, simulation: BuiltScene) -> LoadPath:
+    def of(cls, simulation: BuiltScene, internal: InternalForces) -> LoadPath:
         """Load path of a scene from its reference configuration."""
         dynamics, particles = simulation.dynamics, simulation.particles
         rest = np.zeros_like(particles.positions)
@@ -52,7 +52,7 @@ class LoadPath:
             held |= motion.held
         return cls(
             simulation=simulation,
-            internal=_double_precision(simulation),
+            internal=internal,
             offset=offset,
             initial_loads={
                 load.label: load.forces(0.0, particles.positions, rest) for load in dynamics.loads
@@ -98,14 +98,3 @@ class LoadPath:
             F = self.internal.fields(displacements).deformation_gradients
             ratios: Array = np.linalg.det(F)
         return ratios
-
-
-def _double_precision(simulation: BuiltScene) -> MatrixForces:
-    """Internal forces in double precision, whatever the engine of the scene."""
-    internal = simulation.dynamics.internal
-    if isinstance(internal, MatrixForces):
-        return internal
-    conditions = [c for c in simulation.terms if isinstance(c, StressTerm)]
-    prepared = MatrixEngine().prepare(simulation.model.bodies, conditions)
-    assert isinstance(prepared, MatrixForces)
-    return prepared

@@ -1,4 +1,4 @@
-"""Sparse tangent stiffness: minus the derivative of the forces by the displacements."""
+"""Tangent stiffness: minus the derivative of the forces by the displacements."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import attrs
 import numpy as np
 from scipy.sparse import block_diag, bsr_array, csr_array, diags_array
 
-from solidsph.engines.matrix import Operators, operators
+from solidsph.engines.matrix import MatrixForces, Operators
 from solidsph.errors import SolidsphError
 from solidsph.interfaces.body import Body
+from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.formulation import Configuration, Formulation
 from solidsph.interfaces.terms import Load, StressTerm
 from solidsph.maths.arrays import Array
@@ -19,22 +20,26 @@ from solidsph.maths.tensors import components_first, particles_first
 from solidsph.run.built_scene import BuiltScene
 from solidsph.statics.linear_part import linear_part
 from solidsph.statics.stiff import is_stiff
+from solidsph.statics.sums import sums_by_matrices
 
 
 @attrs.frozen(eq=False)
 class _BodyTangent:
-    """Tangent of one body, from its constant operators."""
+    """What the tangent of one body needs besides its sums."""
 
     body: Body
-    constant: Operators
     stresses: csr_array | None  # (d d n, d d n) extends stresses of real particles to ghosts
 
-    def matrix(self, displacements: Array, ahead: Array) -> csr_array:
-        """(d n, d n) [N/m] at displacements (n, d) of the body."""
-        n, d = displacements.shape
-        A = _moduli(self.body, self.deformation_gradients(displacements))
-        A += np.einsum("ij,pkl->pikjl", np.eye(d), ahead)
-        blocks = [self.constant.gradient[k * n : (k + 1) * n] for k in range(d)]
+    def moduli(self, F: Array, ahead: Array) -> Array:
+        """dT_ik / dF_jl of all particles, (n, d, d, d, d) [Pa], at F (n, d, d)."""
+        A = _moduli(self.body, F)
+        A += np.einsum("ij,pkl->pikjl", np.eye(F.shape[1]), ahead)
+        return A
+
+    def matrix(self, constant: Operators, A: Array) -> csr_array:
+        """(d n, d n) [N/m] with moduli (n, d, d, d, d)."""
+        n, d = A.shape[:2]
+        blocks = [constant.gradient[k * n : (k + 1) * n] for k in range(d)]
         g = np.stack([block.data for block in blocks], axis=1)
         # Change of stress T_ik at p per displacement of q along j, in blocks (p, q).
         starts, columns = blocks[0].indptr, blocks[0].indices
@@ -42,27 +47,23 @@ class _BodyTangent:
         of_displacement = bsr_array(
             (changes.reshape(-1, d * d, d), columns, starts), shape=(d * d * n, d * n)
         )
-        return csr_array(-(self._force(n, d) @ self._extended(of_displacement)))
+        return csr_array(-(self._force(constant, n, d) @ self._extended(of_displacement)))
 
-    def forces(self, stresses: Array) -> Array:
-        """Forces (n, d) of stresses (n, d, d) at real particles."""
-        n, d = stresses.shape[:2]
+    def stress(self, stresses: Array) -> Array:
+        """Stresses (n, d, d) at real particles, extended to ghosts."""
         real = np.where(self.body.particles.ghosts[:, None, None], 0.0, stresses)
-        forces: Array = (self._force(n, d) @ self._extended(real.ravel())).reshape(n, d)
-        return forces
+        extended: Array = self._extended(real.ravel()).reshape(stresses.shape)
+        return extended
 
-    def ahead(self, displacements: Array, change: Array, placed: Array) -> Array:
-        """`Tangent.ahead` for the particles of the body."""
-        n, d = displacements.shape
+    def ahead(self, before: Array, dF: Array, after: Array) -> Array:
+        """`Tangent.ahead` from F before (n, d, d), its linear change and F after the step."""
+        n, d = before.shape[:2]
         ghosts = self.body.particles.ghosts
         if not self.body.material.objective:  # linear forces have no geometric stiffness
             return np.zeros((n, d, d))
         material, identity = self.body.material, np.eye(d)
-        before = np.where(
-            ghosts[:, None, None], identity, self.deformation_gradients(displacements)
-        )
-        after = np.where(ghosts[:, None, None], identity, self.deformation_gradients(placed))
-        dF = self.deformation_gradients(change) - identity
+        before = np.where(ghosts[:, None, None], identity, before)
+        after = np.where(ghosts[:, None, None], identity, after)
         dP = particles_first(
             material.tangent(components_first(before), components_first(dF), material.params), n
         )
@@ -72,20 +73,13 @@ class _BodyTangent:
         lead[ghosts] = 0.0
         return lead
 
-    def deformation_gradients(self, displacements: Array) -> Array:
-        """Deformation gradients F, (n, d, d)."""
-        n, d = displacements.shape
-        along = (self.constant.gradient @ displacements).reshape(d, n, d)
-        F: Array = np.eye(d) + along.transpose(1, 2, 0)
-        return F
-
     def _extended(self, stresses: Any) -> Any:
         """Stresses of real particles, or their derivative, extended to ghosts."""
         return stresses if self.stresses is None else self.stresses @ stresses
 
-    def _force(self, n: int, d: int) -> bsr_array:
+    def _force(self, constant: Operators, n: int, d: int) -> bsr_array:
         """Matrix (d n, d d n) from stress components (j, k) at q to forces along i at p."""
-        blocks = [self.constant.force[:, k * n : (k + 1) * n] for k in range(d)]
+        blocks = [constant.force[:, k * n : (k + 1) * n] for k in range(d)]
         f = np.stack([block.data for block in blocks], axis=1)
         if self.body.formulation.divergence.uses_ghost_stress:  # nothing acts on ghosts then
             f[np.repeat(self.body.particles.ghosts, np.diff(blocks[0].indptr))] = 0.0
@@ -95,14 +89,15 @@ class _BodyTangent:
 
 @attrs.frozen(eq=False)
 class Tangent:
-    """Tangent of a scene; stores the operators that do not depend on the displacements."""
+    """Tangent of a scene, by the sums of its internal forces."""
 
     bodies: Sequence[_BodyTangent]
+    internal: InternalForces  # in double precision
     loads: Sequence[Load]
 
     @classmethod
-    def of(cls, simulation: BuiltScene) -> Tangent:
-        """Prepare the tangent of a scene.
+    def of(cls, simulation: BuiltScene, internal: InternalForces) -> Tangent:
+        """Prepare the tangent of a scene, whose sums are those of `internal`.
 
         Raises:
             SolidsphError: a formulation is not the total Lagrangian form.
@@ -113,14 +108,23 @@ class Tangent:
         conditions = [c for c in simulation.terms if isinstance(c, StressTerm)]
         return cls(
             [
-                _BodyTangent(
-                    body,
-                    operators(body, body.pairs()),
-                    _stress_extension(body, simulation, conditions),
-                )
+                _BodyTangent(body, _stress_extension(body, simulation, conditions))
                 for body in bodies
             ],
+            internal,
             simulation.dynamics.loads,
+        )
+
+    def moduli(self, displacements: Array, ahead: Array | None = None) -> Array:
+        """dT_ik / dF_jl of all particles, (n, d, d, d, d) [Pa], at displacements (n, d).
+
+        `ahead` (n, d, d) is added to the second Piola-Kirchhoff stress of the geometric stiffness.
+        """
+        F = self._deformation_gradients(displacements)
+        if ahead is None:
+            ahead = np.zeros_like(F)
+        return np.concatenate(
+            [part.moduli(F[part.body.extent], ahead[part.body.extent]) for part in self.bodies]
         )
 
     def matrix(
@@ -128,21 +132,28 @@ class Tangent:
     ) -> csr_array:
         """K, (d n, d n) [N/m], at displacements u = x - X (n, d) of all particles.
 
-        Rows and columns include ghosts. `ahead` (n, d, d) is added to the second Piola-Kirchhoff
-        stress of the geometric stiffness. Loads are those of `time` [s].
+        Rows and columns include ghosts. Loads are those of `time` [s].
         """
-        if ahead is None:
-            ahead = np.zeros((*displacements.shape, displacements.shape[1]))
+        A = self.moduli(displacements, ahead)
         parts = [
-            part.matrix(displacements[part.body.extent], ahead[part.body.extent])
-            for part in self.bodies
+            part.matrix(constant, A[part.body.extent])
+            for part, constant in zip(self.bodies, self._constant(), strict=True)
         ]
         total = parts[0] if len(parts) == 1 else csr_array(block_diag(parts, format="csr"))
-        for load in self.loads:
-            if is_stiff(load):
-                stiffness = load.stiffness(displacements, time)
-                total = total if stiffness is None else csr_array(total + stiffness)
-        return total
+        of_loads = self.of_loads(displacements, time)
+        return total if of_loads is None else csr_array(total + of_loads)
+
+    def of_loads(self, displacements: Array, time: float) -> csr_array | None:
+        """The part of K that loads add, (d n, d n) [N/m]; None if there is none."""
+        added = [load.stiffness(displacements, time) for load in self.loads if is_stiff(load)]
+        parts = [part for part in added if part is not None]
+        return csr_array(sum(parts[1:], parts[0])) if parts else None
+
+    def product(self, moduli: Array, motion: Array) -> Array:
+        """K motion without the part of the loads, (n, d) [N], with these moduli."""
+        n, d = motion.shape
+        H = self.internal.gradients(motion).reshape(n, d * d, 1)
+        return -self._forces(motion, (moduli.reshape(n, d * d, d * d) @ H).reshape(n, d, d))
 
     def ahead(self, displacements: Array, change: Array, placed: Array) -> Array:
         """Second Piola-Kirchhoff stress predicted by a step minus the actual one, (n, d, d) [Pa].
@@ -150,24 +161,34 @@ class Tangent:
         Predicted is S + dS, linear in `change` (n, d) from `displacements` (n, d); actual is S at
         `placed` (n, d). The difference is of second order in the change.
         """
+        fields = (
+            self._deformation_gradients(displacements),
+            self.internal.gradients(change),
+            self._deformation_gradients(placed),
+        )
         return np.concatenate(
-            [
-                part.ahead(*(u[part.body.extent] for u in (displacements, change, placed)))
-                for part in self.bodies
-            ]
+            [part.ahead(*(field[part.body.extent] for field in fields)) for part in self.bodies]
         )
 
     def forces_ahead(self, displacements: Array, ahead: Array) -> Array:
         """Forces (n, d) [N] that a second Piola-Kirchhoff stress `ahead` (n, d, d) adds."""
-        return np.concatenate(
-            [
-                part.forces(
-                    part.deformation_gradients(displacements[part.body.extent])
-                    @ ahead[part.body.extent]
-                )
-                for part in self.bodies
-            ]
-        )
+        return self._forces(displacements, self._deformation_gradients(displacements) @ ahead)
+
+    def _forces(self, displacements: Array, stresses: Array) -> Array:
+        """Forces (n, d) of stresses (n, d, d) at real particles."""
+        extended = [part.stress(stresses[part.body.extent]) for part in self.bodies]
+        whole = np.ascontiguousarray(components_first(np.concatenate(extended)))
+        return self.internal.spread(displacements, whole)
+
+    def _constant(self) -> Sequence[Operators]:
+        """The matrices of the sums of each body."""
+        assert isinstance(self.internal, MatrixForces), "a matrix is formed from matrices"
+        return self.internal.constant_operators()
+
+    def _deformation_gradients(self, displacements: Array) -> Array:
+        """Deformation gradients F, (n, d, d)."""
+        F: Array = np.eye(displacements.shape[1]) + self.internal.gradients(displacements)
+        return F
 
 
 def tangent(simulation: BuiltScene, displacements: Array) -> csr_array:
@@ -179,7 +200,7 @@ def tangent(simulation: BuiltScene, displacements: Array) -> csr_array:
     Raises:
         SolidsphError: a formulation is not the total Lagrangian form.
     """
-    return Tangent.of(simulation).matrix(displacements)
+    return Tangent.of(simulation, sums_by_matrices(simulation)).matrix(displacements)
 
 
 def is_symmetric(simulation: BuiltScene) -> bool:

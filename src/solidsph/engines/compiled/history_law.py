@@ -10,6 +10,7 @@ import numpy as np
 from numba import types
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
+from solidsph.engines.compiled.fixed.stress_at import of_history_law, of_law
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import (
     NotCompilableError,
@@ -75,6 +76,17 @@ def history_flux(body: Body) -> Any:
     return _flux(
         formulation.deformation_gradient, material.advance, material.stress, formulation.flux
     )
+
+
+def particle_stress(body: Body, law: Any) -> Any:
+    """The stress at a particle, as in `fixed/stress_at.py`, for the body's `law` if it has no
+    history.
+
+    Raises:
+        NotCompilableError: the law does not compile.
+    """
+    count = history_count(body)
+    return of_history_law(history_flux(body), count) if count else of_law(law)
 
 
 @cache

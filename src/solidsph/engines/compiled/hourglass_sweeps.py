@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple, final
 
 import attrs
 import numpy as np
-from numba import prange
-from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
 from solidsph.engines.compiled.fixed.blocks import group
@@ -22,10 +21,11 @@ from solidsph.engines.compiled.fixed.partition import (
 )
 from solidsph.engines.compiled.fixed.rows import Rows, compressed
 from solidsph.engines.compiled.fixed.subset_rows import part_of_rows
+from solidsph.engines.compiled.hourglass_pairs import NearPairs, near_pass
 from solidsph.engines.compiled.jit import njit
+from solidsph.engines.compiled.planes import adding, filling
 from solidsph.engines.compiled.pointwise import no_law
 from solidsph.engines.compiled.threads import check_alive
-from solidsph.engines.compiled.vectors import ROW, moved
 from solidsph.interfaces.hourglass_energy import HourglassOperator, HourglassPairs
 from solidsph.interfaces.plan import Operations, SumMethod, array_bytes, vectors
 from solidsph.maths.arrays import Array, Indices
@@ -40,15 +40,11 @@ class HourglassArrays(NamedTuple):
     table: Indices  # partition among threads
     rows: Rows  # of the gradient
     flat: NDArray[Any]  # displacements for loops over rows
-    factors: Array  # (n,) minus the volumes
+    factors: Array  # (n,) -1: the stress is times the volume already
     buffers: NDArray[Any]
-    starts: Indices  # of the near pairs of each particle
-    columns: NDArray[np.int32]
-    weights: Array  # (k,)
-    positions: Array  # (n, d) X
-    jets: Array  # (n, d, 1 + d) displacement and half of its gradient
-    tensors: Array  # (d, d, n) H, then S
-    pulls: Array  # (n, d) sums of pair forces
+    near: NearPairs
+    gradients: Array  # H among the jets of near pairs, (d, d, n and more)
+    stresses: Array  # S among their pulls, (d, d, n and more)
 
 
 @final
@@ -83,33 +79,31 @@ class HourglassSweeps(HourglassOperator):
         # Besides the near pairs there are those of the gradient, twice.
         threads = thread_count(3 * len(pairs.table.columns))
         partition = partitioned(rows, d, _DTYPE, threads)
+        near = NearPairs.of(pairs, threads)
         arrays = HourglassArrays(
             extent=(body.extent.start, body.extent.stop),
             table=partition.table,
             rows=rows,
             flat=flat_field(n, d, _DTYPE),
-            factors=-body.particles.volumes,
+            factors=np.full(n, -1.0),
             buffers=partition.buffers,
-            starts=pairs.table.starts,
-            columns=pairs.table.columns,
-            weights=pairs.weights,
-            positions=body.particles.positions,
-            jets=np.empty((n, d, 1 + d)),
-            tensors=np.zeros((d, d, n)),
-            pulls=np.zeros((n, d)),
+            near=near,
+            gradients=near.tensors(near.jets),
+            stresses=near.tensors(near.pulls),
         )
         return cls(pairs, arrays, hourglass_sweep(d, threads > 1))
 
     @property
     def bytes(self) -> int:
-        arrays = (a for a in self.arrays if isinstance(a, np.ndarray))
+        parts = (self.arrays, self.arrays.near, self.arrays.near.pairs)
+        arrays = (a for part in parts for a in part if isinstance(a, np.ndarray) and a.base is None)
         return array_bytes(arrays) + self.arrays.rows.bytes
 
     def operations(self, *, compiled: bool) -> Operations:
-        n, d = self.arrays.positions.shape
+        n, d = self.pairs.body.particles.positions.shape
         rows = self.arrays.rows
         # Once to gather H, once to scatter the stress, and the near pairs in between.
-        pairs = 2 * (rows.run_pairs + rows.row_pairs) + len(self.arrays.columns)
+        pairs = 2 * (rows.run_pairs + rows.row_pairs) + len(self.pairs.table.columns)
         threaded = len(self.arrays.table) > 1
         touched = self.bytes + vectors(n, d)
         return Operations(
@@ -124,64 +118,33 @@ class HourglassSweeps(HourglassOperator):
         return forces
 
 
+def compiled_sweeps(operators: Sequence[HourglassOperator]) -> Sequence[HourglassSweeps]:
+    """The operators as compiled sweeps."""
+    return [
+        operator if isinstance(operator, HourglassSweeps) else HourglassSweeps.of(operator.pairs)
+        for operator in operators
+    ]
+
+
 @cache
 def hourglass_sweep(dimension: int, threaded: bool) -> Any:
     """Compiled (arrays, displacements (n, d), forces (n, d)): the forces of one body."""
     d = dimension
     gather = passes(d, _DTYPE, no_law, threaded).stress
     scatter = spread_pass(d, _DTYPE, threaded)
-    row, nothing, size = ROW[d], (0.0,) * (1 + d), 1 + d
+    pull = near_pass(d, threaded)
 
-    @njit(parallel=threaded)
-    def place(displacements, tensors, jets):
-        for a in prange(len(jets)):
-            for i in range(d):
-                jets[a, i, 0] = displacements[a, i]
-                for k in range(d):
-                    jets[a, i, 1 + k] = 0.5 * tensors[i, k, a]
-
-    # A particle without volume gives undefined values, and no error.
-    @njit(parallel=threaded, error_model="numpy")
-    def pull(starts, columns, weights, X, factors, jets, pulls, tensors):
-        for a in prange(len(pulls)):
-            # Force and products of each component; those of missing dimensions are not used.
-            sums_x, sums_y, sums_z = nothing, nothing, nothing
-            X_a, own_x = row(X, a), to_fixed_tuple(jets[a, 0], size)
-            if d > 1:
-                own_y = to_fixed_tuple(jets[a, 1], size)
-            if d > 2:
-                own_z = to_fixed_tuple(jets[a, 2], size)
-            for k in range(starts[a], starts[a + 1]):
-                b, c = columns[k], weights[k]
-                X_ab = moved(row(X, b), -1.0, X_a)
-                sums_x = _with(sums_x, c * _error(own_x, jets, b, 0, X_ab), X_ab)
-                if d > 1:
-                    sums_y = _with(sums_y, c * _error(own_y, jets, b, 1, X_ab), X_ab)
-                if d > 2:
-                    sums_z = _with(sums_z, c * _error(own_z, jets, b, 2, X_ab), X_ab)
-            sums = (sums_x, sums_y, sums_z)
-            for i in range(d):
-                pulls[a, i] = -sums[i][0]
-                for k in range(d):
-                    # Divided by the volume, which the scatter multiplies by.
-                    tensors[i, k, a] = -0.5 * sums[i][1 + k] / factors[a]
+    fill, add = filling(d, threaded), adding(d, threaded)
 
     @njit
     def sweep(arrays, displacements, forces):
-        gather(arrays.table, arrays.rows, displacements, arrays.flat, (0.0,), arrays.tensors)
-        place(displacements, arrays.tensors, arrays.jets)
-        pull(
-            arrays.starts,
-            arrays.columns,
-            arrays.weights,
-            arrays.positions,
-            arrays.factors,
-            arrays.jets,
-            arrays.pulls,
-            arrays.tensors,
-        )
-        scatter(arrays.table, arrays.rows, arrays.tensors, arrays.factors, arrays.buffers, forces)
-        forces += arrays.pulls
+        near, table = arrays.near, arrays.table
+        threads, stride = len(table), arrays.gradients.shape[2]
+        gather(table, arrays.rows, displacements, arrays.flat, (0.0,), arrays.gradients)
+        fill(threads, displacements, near.jets, stride)
+        pull(near.shares, near.pairs, near.jets, near.sums, near.pulls)
+        scatter(table, arrays.rows, arrays.stresses, arrays.factors, arrays.buffers, forces)
+        add(threads, near.pulls, stride, forces)
 
     return sweep
 
@@ -197,25 +160,3 @@ def body_sweep(sweep: Any) -> Any:
         sweep(arrays, u[some], forces[some])
 
     return own
-
-
-@njit
-def _error(own, jets, b, i, X_ab):
-    """Component i of e_ab, from its row `own` of the jet of a; exactly minus that of e_ba."""
-    along = (own[1] + jets[b, i, 1]) * X_ab[0]
-    if len(X_ab) > 1:
-        along += (own[2] + jets[b, i, 2]) * X_ab[1]
-    error = own[0] - jets[b, i, 0] + along
-    if len(X_ab) > 2:
-        error += (own[3] + jets[b, i, 3]) * X_ab[2]
-    return error
-
-
-@njit
-def _with(sums, e, X_ab):
-    """Sums of e and of e X_ab, with one pair more."""
-    if len(X_ab) == 1:
-        return sums[0] + e, sums[1] + e * X_ab[0]
-    if len(X_ab) == 2:
-        return sums[0] + e, sums[1] + e * X_ab[0], sums[2] + e * X_ab[1]
-    return sums[0] + e, sums[1] + e * X_ab[0], sums[2] + e * X_ab[1], sums[3] + e * X_ab[2]

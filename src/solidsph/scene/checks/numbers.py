@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 
 from solidsph.scene.scene_data import OFF, SceneData, SleepScene, StaticsScene
+from solidsph.scene.static_solver import SOLVERS
 
 # No kernel is of use at such a cover, and its pairs would fill any memory.
 MOST_COVER = 100.0
@@ -53,6 +54,9 @@ def _statics(wanted: StaticsScene, scene: SceneData) -> Iterator[str]:
     for name in ("load_steps", "max_iterations"):
         yield from _whole_number(f"statics: {name}", getattr(wanted, name), 1)
     yield from _fraction("statics: tolerance", wanted.tolerance)
+    if wanted.solver not in SOLVERS:
+        known = ", ".join(map(repr, SOLVERS))
+        yield f"statics: solver must be one of {known}, got {wanted.solver!r}"
     default = attrs.fields(SceneData).time_step_factor.default
     for name, given in (
         ("an integrator", scene.integrator is not None),

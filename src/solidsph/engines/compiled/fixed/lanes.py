@@ -30,6 +30,11 @@ class Lanes(types.Type):
         super().__init__(name=f"Lanes({element}, {count})")
 
 
+def lanes_type(dimension: int, count: int) -> Any:
+    """The compiler's type of a vector of lanes, `count` numbers each."""
+    return types.UniTuple(Lanes(types.float64, count), dimension)
+
+
 @register_model(Lanes)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, lanes: Lanes) -> None:
@@ -51,6 +56,14 @@ class LaneOperations(NamedTuple):
     get: Any  # (array, at, plane) -> tensor
 
 
+def spread(context: Any, builder: Any, number: Any, lanes: Lanes) -> Any:
+    """Lanes of one number, the builder's way."""
+    empty = ir.Constant(context.get_value_type(lanes), ir.Undefined)
+    first = builder.insert_element(empty, number, ir.Constant(ir.IntType(32), 0))
+    everywhere = ir.Constant(ir.VectorType(ir.IntType(32), lanes.count), [0] * lanes.count)
+    return builder.shuffle_vector(first, empty, everywhere)
+
+
 def register_bytes() -> int:
     """Width of the vector registers of this machine [bytes]."""
     features = binding.get_host_cpu_features()
@@ -60,10 +73,13 @@ def register_bytes() -> int:
 
 
 @cache
-def lane_operations(dtype: str, count: int, dimension: int) -> LaneOperations:
-    """The operations for lanes of `count` numbers of type `dtype`, and tensors of a dimension."""
+def lane_operations(dtype: str, count: int | None, dimension: int) -> LaneOperations:
+    """The operations for lanes of `count` numbers of type `dtype`, and tensors of a dimension.
+
+    Without a count they are for single numbers.
+    """
     element = from_dtype(np.dtype(dtype))
-    lanes = Lanes(element, count)
+    lanes = element if count is None else Lanes(element, count)
     tensor = types.UniTuple(lanes, dimension)
     size = np.dtype(dtype).itemsize
     axes = range(dimension)
@@ -77,12 +93,6 @@ def lane_operations(dtype: str, count: int, dimension: int) -> LaneOperations:
         return builder.bitcast(
             address(context, builder, array_type, array, at), vector.as_pointer()
         )
-
-    def spread(context: Any, builder: Any, number: Any) -> Any:
-        empty = ir.Constant(context.get_value_type(lanes), ir.Undefined)
-        first = builder.insert_element(empty, number, ir.Constant(ir.IntType(32), 0))
-        everywhere = ir.Constant(ir.VectorType(ir.IntType(32), count), [0] * count)
-        return builder.shuffle_vector(first, empty, everywhere)
 
     def built(context: Any, builder: Any, column: Callable[[int], Any]) -> Any:
         value = ir.Constant(context.get_value_type(tensor), ir.Undefined)
@@ -127,7 +137,7 @@ def lane_operations(dtype: str, count: int, dimension: int) -> LaneOperations:
             def component(k: int) -> Any:
                 at = builder.add(first, ir.Constant(first.type, k))
                 where = address(context, builder, signature.args[0], args[0], at)
-                return spread(context, builder, builder.load(where, align=size))
+                return spread(context, builder, builder.load(where, align=size), lanes)
 
             return built(context, builder, component)
 
@@ -158,10 +168,11 @@ def lane_operations(dtype: str, count: int, dimension: int) -> LaneOperations:
     @intrinsic
     def total(typing: Any, h: Any, other: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            part = builder.extract_value
-            return built(
-                context, builder, lambda k: builder.fadd(part(args[0], k), part(args[1], k))
-            )
+            def sum_of(k: int) -> Any:
+                a, b = (builder.extract_value(one, k) for one in args)
+                return builder.fadd(a, b, flags=("contract",))
+
+            return built(context, builder, sum_of)
 
         return tensor(tensor, tensor), code
 

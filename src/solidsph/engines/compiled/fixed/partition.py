@@ -126,7 +126,7 @@ class Passes(NamedTuple):
 @cache
 def passes(dimension: int, dtype: str, law: Any, threaded: bool) -> Passes:
     """The passes for one dimension, number type and compiled law (H, params) -> T."""
-    place, cleared, total = _fields(dimension, dtype, threaded)
+    place, cleared, total = buffered(dimension, dtype, threaded)
     sweep_forces, sweep_stress = block_sweeps(dimension, dtype, law)
 
     @njit(parallel=threaded)
@@ -151,7 +151,7 @@ def passes(dimension: int, dtype: str, law: Any, threaded: bool) -> Passes:
 def history_pass(dimension: int, dtype: str, law: Any, count: int, threaded: bool) -> Any:
     """Compiled pass (table, rows, displacements, u, params, factors, buffers, forces, history
     (n, `count`), step) for a compiled law (H, h, step, params) -> (T, h)."""
-    place, cleared, total = _fields(dimension, dtype, threaded)
+    place, cleared, total = buffered(dimension, dtype, threaded)
     sweep = history_sweep(dimension, dtype, law, count)
 
     @njit(parallel=threaded)
@@ -170,7 +170,7 @@ def history_pass(dimension: int, dtype: str, law: Any, count: int, threaded: boo
 def rate_pass(dimension: int, dtype: str, law: Any, threaded: bool) -> Any:
     """Compiled pass (table, rows, displacements, velocities, u, v, params, factors, buffers,
     forces) for a compiled law (H, dH/dt, params) -> T."""
-    place, cleared, total = _fields(dimension, dtype, threaded)
+    place, cleared, total = buffered(dimension, dtype, threaded)
     sweep = rate_sweep(dimension, dtype, law)
 
     @njit(parallel=threaded)
@@ -189,7 +189,7 @@ def rate_pass(dimension: int, dtype: str, law: Any, threaded: bool) -> Any:
 @cache
 def spread_pass(dimension: int, dtype: str, threaded: bool) -> Any:
     """Compiled pass (table, rows, stress (d, d, n), factors, buffers, forces (n, d))."""
-    _, cleared, total = _fields(dimension, dtype, threaded)
+    _, cleared, total = buffered(dimension, dtype, threaded)
     sweep = spread_sweep(dimension, dtype)
 
     @njit(parallel=threaded)
@@ -204,7 +204,7 @@ def spread_pass(dimension: int, dtype: str, threaded: bool) -> Any:
 
 
 @cache
-def _fields(dimension: int, dtype: str, threaded: bool) -> tuple[Any, Any, Any]:
+def buffered(dimension: int, dtype: str, threaded: bool) -> tuple[Any, Any, Any]:
     """Compiled: displacements made flat, a share's buffer cleared, the sum of all buffers."""
     d, D = dimension, STRIDE[dimension]
     margin = group(dimension, dtype)

@@ -203,14 +203,6 @@ def compressed(
     return compressor.rows()
 
 
-def rows_of(starts: Indices, columns: Indices, weights: Array, shortest_run: int) -> Rows:
-    """Rows of all particles at once, from the starts (n + 1,) of their pairs, columns (m,) and
-    weights (m, k)."""
-    compressor = _Compressor(weights.shape[1], "float64", shortest_run)
-    compressor.add(0, np.diff(starts), columns, np.ascontiguousarray(weights))
-    return compressor.rows()
-
-
 def stretches(numbers: Indices, longest: int) -> tuple[Indices, Indices]:
     """First place (k,) and length (k,) of stretches of consecutive integers, cut at `longest`."""
     places = np.arange(len(numbers))

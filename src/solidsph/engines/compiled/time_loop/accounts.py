@@ -14,6 +14,7 @@ from solidsph.engines.compiled.time_loop.constraints import (
     constraint_data,
 )
 from solidsph.engines.compiled.time_loop.loads import LoadData
+from solidsph.engines.compiled.time_loop.merged import MergedLoad
 from solidsph.interfaces.compilable_terms import ScheduledConstraint
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
@@ -70,6 +71,14 @@ class Accounts:
         conditions = (*self.equation.loads, *self.equation.constraints)
         for condition, part in zip(conditions, (*loads, *motions), strict=True):
             self.work[condition.label] += float(part.work.sum())
+
+    def settle_merged(self, merged: Sequence[MergedLoad], before: Array, now: Array) -> None:
+        """Add forces and work of loads of which the loop has no account, from displacements
+        `before` to those of `now`, (n, d) [m]."""
+        for one in merged:
+            k = self.equation.loads.index(one.load)
+            self.load_forces[k], work = one.settle(self.load_forces[k], before, now)
+            self.work[one.load.label] += work
 
     def applied(self, time: float, u: Array) -> Mapping[str, Array]:
         """Force of every account on every particle, (n, d) [N], at displacements u (n, d) [m]."""

@@ -15,6 +15,7 @@ from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.constraints import following
+from solidsph.engines.compiled.time_loop.merged import MergedLoad
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.compilable_terms import LinearExtension
 from solidsph.interfaces.terms import StressTerm
@@ -45,22 +46,29 @@ class BodyData(NamedTuple):
 class Internal(NamedTuple):
     """Compiled internal forces, and their data."""
 
-    forces: Any  # (data, u (n, d), total (n, d)): total = internal forces of all bodies
+    forces: Any  # (data, u (n, d), v (n, d), total (n, d)): total = internal forces of all bodies
     data: Any
     histories: Sequence[tuple[Body, Array]] = ()  # of bodies that have some, in the data
 
 
 def internal_forces(
-    parts: Sequence[ReferenceBody], conditions: Sequence[StressTerm], step: float
+    parts: Sequence[ReferenceBody],
+    conditions: Sequence[StressTerm],
+    step: float,
+    merged: MergedLoad | None = None,
 ) -> Internal:
-    """The internal forces of prepared bodies under these conditions, in steps of `step` [s].
+    """The internal forces of prepared bodies under these conditions, in steps of `step` [s], with
+    those of a `merged` load.
 
     Raises:
         NotCompilableError: a condition is not of a compilable kind, or there are several bodies.
     """
     if all(part.fused for part in parts) and not conditions:
-        functions = tuple(map(_at_once, parts))
-        data = tuple(_data(part, step, staged=False) for part in parts)
+        if merged is None:
+            functions = tuple(map(_at_once, parts))
+            data: tuple[Any, ...] = tuple(_data(part, step, staged=False) for part in parts)
+        else:
+            functions, data = merged.functions, merged.data
         histories = [
             (part.body, one.history)
             for part, one in zip(parts, data, strict=True)
@@ -102,7 +110,7 @@ def _history_and_step(body):
 @cache
 def _fused(forces: Any, more: Any) -> Any:
     @njit
-    def fused(body, u, total):
+    def fused(body, u, v, total):
         a, b = body.extent
         forces(
             body.table,
@@ -122,7 +130,7 @@ def _fused(forces: Any, more: Any) -> Any:
 @cache
 def _staged(stress_pass: Any, imposed: Any, spread: Any, ghosts_act: bool) -> Any:
     @njit
-    def forces(data, u, total):
+    def forces(data, u, v, total):
         body, followed = data
         stress_pass(body.table, body.rows, u, body.u, body.params, body.stress)
         for p in body.ghosts:

@@ -12,10 +12,12 @@ from numba import prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
+from solidsph.engines.compiled.fixed.lanes import lanes_type
 from solidsph.engines.compiled.fixed.partition import rate_pass, thread_count
 from solidsph.engines.compiled.fixed.rows import Rows
-from solidsph.engines.compiled.hourglass_sweeps import HourglassSweeps, body_sweep
+from solidsph.engines.compiled.hourglass_sweeps import body_sweep, compiled_sweeps
 from solidsph.engines.compiled.jit import njit
+from solidsph.engines.compiled.pair_bundles import LANES
 from solidsph.engines.compiled.pointwise import (
     NotCompilableError,
     compiled_function,
@@ -23,6 +25,7 @@ from solidsph.engines.compiled.pointwise import (
     numbers_type,
 )
 from solidsph.engines.compiled.time_loop.call_each import call_each
+from solidsph.engines.compiled.time_loop.merged import MergedLoad
 from solidsph.engines.compiled.time_loop.pair_load import pair_arrays, pair_sweep
 from solidsph.engines.compiled.vectors import ROW, moved
 from solidsph.interfaces.compilable_terms import (
@@ -108,6 +111,7 @@ class CompiledLoad(NamedTuple):
     apply: Any  # compiled (load, step, u, v, path, total): total += force, work += that along path
     own: Callable[[Array], Any]  # times (t,) at which the steps to come end -> `LoadData.own`
     called: Call | None = None  # if its forces are those that a call has put into `own`
+    merged: MergedLoad | None = None  # if they are among the internal forces
 
 
 class LoadKind(NamedTuple):
@@ -124,11 +128,13 @@ def kind_of(load: Load) -> LoadKind | None:
     return next((known for known in LOAD_KINDS if isinstance(load, known.kind)), None)
 
 
-def compiled_load(load: Load, setting: Setting) -> CompiledLoad:
-    """A load, prepared.
+def compiled_load(load: Load, setting: Setting, merged: MergedLoad | None = None) -> CompiledLoad:
+    """A load, prepared, and maybe `merged` with the internal forces.
 
     One of no known kind, or with a formula that does not compile, is called.
     """
+    if merged is not None and merged.load is load:
+        return CompiledLoad(merged.apply, lambda times: (), merged=merged)
     kind = kind_of(load)
     if kind is not None:
         with suppress(NotCompilableError):
@@ -157,10 +163,7 @@ def _summed(setting: Setting, sums: Sequence[Any], parts: Sequence[Any]) -> Comp
 
 
 def _prepare_hourglass(load: HourglassLoad, setting: Setting) -> CompiledLoad:
-    sweeps = [
-        operator if isinstance(operator, HourglassSweeps) else HourglassSweeps.of(operator.pairs)
-        for operator in load.operators
-    ]
+    sweeps = compiled_sweeps(load.operators)
     sums = [body_sweep(sweep.sweep) for sweep in sweeps]
     return _summed(setting, sums, [sweep.arrays for sweep in sweeps])
 
@@ -193,10 +196,15 @@ def _prepare_rate_stress(load: RateStressLoad, setting: Setting) -> CompiledLoad
 def _prepare_pairs(load: PairLoad, setting: Setting) -> CompiledLoad:
     d, table = setting.dimension, load.pairs
     count, vector = table.values.shape[1], numbers_type(d)
-    pull = compiled_function(load.pull, vector, vector, numbers_type(count))
+    pull, together = compiled_function(load.pull, vector, vector, numbers_type(count)), False
+    with suppress(NotCompilableError):
+        lanes = lanes_type(d, LANES)
+        compiled_function(load.pull, lanes, lanes, numbers_type(count))
+        together = True
     threads = thread_count(len(table.columns)) if setting.threaded else 1
-    sweep = pair_sweep(pull, d, count, threads > 1)
-    return _summed(setting, [sweep], [pair_arrays(table, setting.reference, threads)])
+    sweep = pair_sweep(pull, d, count, together, threads > 1)
+    arrays = pair_arrays(table, setting.reference, threads, together=together)
+    return _summed(setting, [sweep], [arrays])
 
 
 def _prepare_pointwise(load: PointwiseLoad, setting: Setting) -> CompiledLoad:

@@ -20,8 +20,13 @@ from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.constraints import ConstraintCalls, constraint_calls
 from solidsph.engines.compiled.time_loop.internal_forces import Internal, internal_forces
 from solidsph.engines.compiled.time_loop.loads import Call, CompiledLoad, Setting, compiled_load
+from solidsph.engines.compiled.time_loop.merged import merged_load
 from solidsph.errors import BuildError
-from solidsph.interfaces.compilable_terms import LinearExtension, ScheduledConstraint, ScheduledLoad
+from solidsph.interfaces.compilable_terms import (
+    LinearExtension,
+    ScheduledConstraint,
+    ScheduledLoad,
+)
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.integrator import MEAN_VELOCITY, Integrator, PointwiseIntegrator
@@ -101,9 +106,10 @@ def compiled_loop(
     threads = thread_count(PER_PARTICLE * particles.count)  # for loops over particles
     for body in bodies:
         body.gradient_partition.check()
-    internal = internal_forces(bodies, conditions, equation.step_size)
+    merged = merged_load(equation.loads, bodies, conditions, equation.step_size)
+    internal = internal_forces(bodies, conditions, equation.step_size, merged)
     setting = Setting(particles.positions, bodies, threads > 1)
-    loads = [compiled_load(load, setting) for load in equation.loads]
+    loads = [compiled_load(load, setting, merged) for load in equation.loads]
     calls = [constraint_calls(motion, d) for motion in equation.constraints]
     by_call = [tuple(call[k] for call in calls) for k in range(len(ConstraintCalls._fields))]
     steps = _steps(
@@ -168,6 +174,7 @@ class CompiledLoop(TimeLoop):
         accounts = Accounts.of(self.sums, equation, state)
         for body, history in self.internal.histories:
             history[...] = ArrayLaw(body).history_of(state.memory)
+        merged = [one.merged for one in self.loads if one.merged is not None]
         done, memory = 0, state.memory
         while state.step + done < stop:
             count = min(stop - state.step - done, self.most_steps)
@@ -176,6 +183,9 @@ class CompiledLoop(TimeLoop):
             loads = accounts.loads([one.own(times) for one in self.loads], self.threads)
             motions = accounts.motions(times)
             data = equation.masses, inverse_masses, self.internal.data, loads, motions
+            before = moving.u.copy()
+            for one in merged:
+                one.begin(before)
             if self._calls:
                 try:
                     # Overflow and invalid values show in the accelerations.
@@ -188,6 +198,7 @@ class CompiledLoop(TimeLoop):
                 carried_out = self.steps.all(count, dt, self.threads, moving, *data)
             done += carried_out
             accounts.settle(loads, motions)
+            accounts.settle_merged(merged, before, moving.u)
             if not np.isfinite(moving.a.sum()):
                 break
         time = state.time + self.equation.step_size * done
@@ -285,7 +296,7 @@ def _steps(
     @njit
     def end(step, dt, threads, moving, masses, inverse_masses, bodies, load_parts, motion_parts):
         u, v, a, _, path, total = moving
-        internal(bodies, u, total)
+        internal(bodies, u, v, total)
         loads(load_parts, step, u, v, path, total)
         hand_on(motion_parts, total)
         kick(threads, dt, moving, inverse_masses)
