@@ -23,12 +23,12 @@ SHORT = {
     "csm1": "-0.04 % at 9 across, 0.15 % at 17, within its bar",
     "cantilever-0.4999": "6 across: the pressure zigzags by 11 %",
     "bent-bar-3d": "tip 0.02 % at 6 across, -0.04 % at 9; saddle -0.2 and -0.4 %",
-    "curved-bar": "hoop stress outside 0.05 % at 8 across, -0.06 % at 15, within its bar",
-    "squeezed-block-0.49": "zigzag 3.8 % at 8",
-    "squeezed-block-0.4999": "pressure half way -2.1 % at 15 across; zigzag 13 % at 8",
-    "lame-ring": "8 across: radial stress 3.1 %, at the corners; elsewhere 1.9 %",
+    "curved-bar": "hoop stress inside -0.4 % at 8 across, 0.8 % at 15, within its bar",
+    "squeezed-block-0.49": "pressure half way -3.4 % at 15 across; zigzag 3.8 % at 8",
+    "squeezed-block-0.4999": "pressure half way -4.6 % at 15 across; zigzag 13 % at 8",
+    "lame-ring": "8 across: radial stress 3.8 %, at the corners; elsewhere 1.7 %",
     "inflated-ring-0.4999": "8 across: growth 1.7 %; pressure zigzags by 10 %",
-    "kirsch": "peak stress 0.35 % at 20 across, 1.0 % at 40, within its bar",
+    "kirsch": "peak stress 0.2 % at 20 across, 0.9 % at 40, within its bar",
     "hollow-ball": "9 across: hoop stress 2.3 %",
     "heavy-ball": "8 across: shrinkage 4.4 %, pressure 3.8 %",
     "csm3": "0.04 % at 3 across, -0.24 % at 5, within its bar",
@@ -73,7 +73,6 @@ def test_some_of_them_in_seconds(name: str, across: int) -> None:
 
 
 @pytest.mark.validation
-@pytest.mark.xfail(reason="peaks differ by 3.9 and 4.5 % at 20 across", strict=True)
 @pytest.mark.parametrize("nu", SHEETS)
 def test_a_quarter_agrees_with_the_whole(nu: float) -> None:
     quarter, whole = (studied(f"sheet-{nu:g}-{part}") for part in ("quarter", "whole"))

@@ -111,7 +111,7 @@ class Fit:
         return self._with_least(found, least)
 
     def _nearest(self, points: Array, weights: Array) -> Array:
-        """Sum of the weights (m,) of the points (m, d) that each particle is the nearest to, (n,)."""
+        """Sum of the weights (m,) of the points (m, d) nearest to each particle, (n,)."""
         _, owners = self._tree.query(points)
         sums = np.bincount(owners, weights, minlength=len(self.particles))
         return np.asarray(sums, dtype=np.float64)
