@@ -1,8 +1,9 @@
-"""Values between particles: a quadratic field fitted to those around a point."""
+"""Values between particles: a cubic field fitted to those around a point."""
 
 from __future__ import annotations
 
-from math import pi
+from itertools import combinations_with_replacement
+from math import comb, pi
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -13,8 +14,17 @@ from tests.bare.scene import Fields
 
 # The fit takes what lies within so many spacings of a point, and at least twice as many particles
 # as it has coefficients: at corners the former are too few.
-_REACH = 2.5
+_REACH = 3.0
 _LEAST = 2
+
+# Of the Gaussian, in spacings. With 1, stresses along an edge that bends around a hole of 4
+# spacings are smoothed: Kirsch's own field has a peak 5 % too low in a whole sheet, and is read
+# right in a quarter. With 0.6 it is 0.5 % too low.
+_WIDTH = 0.6
+
+# Of the polynomials. With 2, and a width of 1, the reading at the inner edge of Lame's ring of 8
+# particles across is itself off by 1.6 % of the pressure, with 3 by 0.6 %.
+_DEGREE = 3
 
 
 def at(rest: Fields, values: Array, points: Array) -> Array:
@@ -22,19 +32,30 @@ def at(rest: Fields, values: Array, points: Array) -> Array:
     return fitted(rest.places, rest.spacing, values, np.atleast_2d(points))
 
 
-def fitted(X: Array, spacing: float, values: Array, points: Array) -> Array:
-    """Moving least squares of the second degree, weighed by a Gaussian of one spacing's width."""
+def fitted(
+    X: Array,
+    spacing: float,
+    values: Array,
+    points: Array,
+    *,
+    degree: int = _DEGREE,
+    width: float = _WIDTH,
+) -> Array:
+    """Moving least squares of a `degree`, weighed by a Gaussian of a `width` in spacings."""
     tree, (n, d) = cKDTree(X), X.shape
-    least = min(n, _LEAST * (1 + d + d * (d + 1) // 2))
+    least = min(n, _LEAST * comb(d + degree, degree))
+    factors = [
+        list(chosen)
+        for order in range(degree + 1)
+        for chosen in combinations_with_replacement(range(d), order)
+    ]
     rows = []
     for point, near in zip(points, tree.query_ball_point(points, _REACH * spacing), strict=True):
         chosen = near if len(near) >= least else tree.query(point, k=least)[1]
         offsets = (X[chosen] - point) / spacing
-        weights = np.exp(-0.25 * np.sum(offsets**2, axis=1))[:, None]  # the root of the Gaussian
-        first, second = np.triu_indices(d)
-        terms = np.hstack(
-            [np.ones((len(offsets), 1)), offsets, offsets[:, first] * offsets[:, second]]
-        )
+        squares = np.sum(offsets**2, axis=1) / width**2
+        weights = np.exp(-0.25 * squares)[:, None]  # the root of the Gaussian
+        terms = np.stack([offsets[:, some].prod(axis=1) for some in factors], axis=1)
         wanted = values[chosen].reshape(len(offsets), -1)
         rows.append(np.linalg.lstsq(weights * terms, weights * wanted, rcond=1e-8)[0][0])
     return np.array(rows).reshape(len(points), *values.shape[1:])
@@ -54,7 +75,7 @@ def zigzag(rest: Fields, values: Array) -> float:
     fitted to it and its neighbours: where values alternate by a, they differ by 2 a. A linear
     field would count the curvature of the solution as well.
     """
-    smooth = fitted(rest.places, rest.spacing, values, rest.places)
+    smooth = fitted(rest.places, rest.spacing, values, rest.places, degree=2, width=1.0)
     return float(2.0 * np.sqrt(np.mean((values - smooth) ** 2)) / np.ptp(values))
 
 

@@ -50,6 +50,28 @@ def test_lames_stress_is_read_to_a_quarter_of_a_per_cent_at_8_across() -> None:
     assert np.abs(read / 5.0 - 1.0).max() < 2.5e-3
 
 
+def test_kirschs_peak_is_read_to_a_per_cent_at_20_a_side() -> None:
+    """In a whole sheet, where 24 particles go around the hole, as in a quarter."""
+    h = 0.05
+    rows = [
+        r * np.stack([np.cos(t), np.sin(t)], axis=1)
+        for r in 0.2 + h * np.arange(8)
+        for steps in [round(0.5 * np.pi * r / h)]
+        for t in [0.5 * np.pi * np.arange(4 * steps) / steps]
+    ]
+    whole = np.concatenate(rows)
+    quarter = whole[(whole > -1e-9).all(axis=1)]
+    peaks = []
+    for X in (whole, quarter):
+        a2 = 0.04 / np.sum(X**2, axis=1)
+        c = (X[:, 0] ** 2 - X[:, 1] ** 2) * a2 / 0.04
+        c4 = 2.0 * c**2 - 1.0
+        stress = 1.0 - a2 * (1.5 * c + c4) + 1.5 * a2**2 * c4
+        peaks.append(float(fitted(X, h, stress, np.array([[0.0, 0.2]]))[0]) / 3.0)
+    assert np.abs(np.array(peaks) - 1.0).max() < 0.01
+    assert abs(peaks[0] - peaks[1]) < 0.01
+
+
 def test_a_zigzag_is_told_from_a_smooth_field() -> None:
     fields = moving_block()
     X = fields.places

@@ -59,10 +59,15 @@ def test_the_edge_moves_as_the_impedance_has_it(records: Mapping[str, Record]) -
     low = np.isclose(X[:, 0], COARSE.width) & (X[:, 1] < 0.45 * COARSE.width)
     assert low.sum() == 5
     crossings = record.times / COARSE.crossing
-    watched = (crossings > 0.4) & (crossings < 0.6)
+    watched = (crossings > 0.29) & (crossings < 0.71)
+    assert watched.sum() == 8
     moved = (record.positions[:][watched][:, low, 0] - X[low, 0]).mean(axis=1)
-    # The jump rings with the period of a few spacings: five per cent of what has moved so far.
-    assert moved == pytest.approx(velocity * record.times[watched], rel=0.05)
+    ahead = moved - velocity * record.times[watched]
+    # The jump rings with the period of a few spacings, 0.25 W / c_p here, by 0.4 of what the edge
+    # moves while the front passes a particle; what is left over nearly two periods is small.
+    passing = velocity * COARSE.spacing / MATERIAL.wave_speed
+    assert np.abs(ahead).max() < 0.5 * passing
+    assert abs(ahead.mean()) < 0.1 * passing
 
 
 def test_nothing_moves_ahead_of_the_front(records: Mapping[str, Record]) -> None:

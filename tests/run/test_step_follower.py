@@ -93,7 +93,7 @@ def test_a_resumed_run_is_cut_as_one_without_a_break(
 ) -> None:
     monkeypatch.setattr(checkpointer, "SHARE", OFTEN)
     monkeypatch.setattr(step_follower, "_CHECKED", 7)  # between outputs as well
-    simulation = pulled_sheet(8, 4e-3, 6).engine(engine).build()
+    simulation = pulled_sheet(8, 4e-3, 8).engine(engine).build()
     whole = tmp_path / "whole.h5"
     result = simulation.run(record=whole)
     assert result.notes

@@ -12,6 +12,7 @@ from math import sqrt
 
 import attrs
 import numpy as np
+from scipy.spatial import cKDTree
 
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
@@ -21,7 +22,7 @@ from solidsph_builtin.discretisations._cells import cell_shares
 from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._pieces import finest_pieces
-from solidsph_builtin.discretisations._reproducing import REACH, Fit
+from solidsph_builtin.discretisations._reproducing import Fit
 from solidsph_builtin.discretisations._surface import area_vectors, sampled
 
 # Samples of the surface along a spacing, over those that an assignment to particles needs.
@@ -32,6 +33,13 @@ _HALVINGS = {1: 3, 2: 3, 3: 2}
 
 # Particles this close to the boundary, in spacings, are on it.
 _ON_BOUNDARY = 1e-6
+
+# Particles along a face for functions of its own.
+_ENOUGH_ALONG = 4
+
+# Particles on a face are no further than this from the tangent plane of the nearest sample, in
+# spacings: half a sample along a curve, but not half a spacing down another face.
+_ABOVE = 0.15
 
 # Moments that differ by less, as parts of the volume, are those of the body.
 _ROUNDING = 1e-12
@@ -108,13 +116,12 @@ def fitted_volumes(
         volumes: that particles deep inside keep, (n,) [m^d].
         disturbed: depth to which the particles are no lattice [m].
     """
+    fit = Fit(positions, spacing, _lattice_of(discretisation, shape, spacing, positions))
     # The function of a particle further inside meets complete neighbourhoods only.
-    reach = REACH * spacing
-    depth = disturbed + 2.0 * reach
+    depth = disturbed + 2.0 * fit.reach
     near = shape.signed_distance(positions) > -depth
-    points, weights = _quadrature(discretisation, shape, spacing, depth + reach)
-    grid = _lattice_of(discretisation, shape, spacing, positions)
-    integrated = Fit(positions, spacing, grid).positive_integrals(points, weights, near)
+    points, weights = _quadrature(discretisation, shape, spacing, depth + fit.reach)
+    integrated = fit.positive_integrals(points, weights, near)
     return with_moments(positions, np.where(near, integrated, volumes), near, shape, spacing)
 
 
@@ -159,31 +166,45 @@ def fitted_faces(
 ) -> dict[str, Face]:
     """Faces with areas and moments that are integrals of functions of the particles on them.
 
-    All particles of the `given` faces must lie on the surface. The functions are those of the whole
-    surface: beside an edge, particles around it own a little of a face, which may be negative. A
-    load that varies then has its exact sum.
+    All particles of the `given` faces must lie on the surface. The functions on a face are those of
+    the particles on it, where they are enough: a particle beside it that owned a part of the face
+    would be pushed as that part is, but not held as the face is by a plane of symmetry. Those on
+    smaller faces, such as the sides of an outline, are of the whole surface.
     """
     d = shape.dimension
     surface = sampled(discretisation, shape, spacing / _FINER[d])
     names = np.array(surface.faces)
     outer = np.unique(np.concatenate([face.particles for face in given.values()]))
-    X = positions[outer]
-    fit = Fit(X, spacing, _lattice_of(discretisation, shape, spacing, positions))
+    grid = _lattice_of(discretisation, shape, spacing, positions)
     faces = {}
-    for name in given:
-        own = np.flatnonzero(names == name)
-        area = surface.area_vectors[own]
+    for name, face in given.items():
+        samples = np.flatnonzero(names == name)
+        points, area = surface.points[samples], surface.area_vectors[samples]
+        owners = face.particles[_on_face(positions[face.particles], points, area, spacing)]
+        if len(owners) < _ENOUGH_ALONG ** (d - 1):
+            owners = outer
+        X = positions[owners]
         # About the middle, so that rounding is that of the face's own size.
-        middle = surface.points[own].mean(axis=0)
-        x = surface.points[own] - middle
-        products = (area[:, :, None] * x[:, None, :]).reshape(len(own), d * d)
-        weights = np.column_stack([area, products, np.linalg.norm(area, axis=1)])
-        found = fit.integrals(surface.points[own], weights)
+        middle = points.mean(axis=0)
+        x = points - middle
+        products = (area[:, :, None] * x[:, None, :]).reshape(len(x), d * d)
+        sizes = np.linalg.norm(area, axis=1)
+        weights = np.column_stack([area, products, sizes])
+        found = Fit(X, spacing, grid).integrals(points, weights, sizes)
         some = np.flatnonzero(np.abs(found[:, -1]) > _ROUNDING * np.abs(found[:, -1]).max())
         vectors, about_middle = found[some, :d], found[some, d:-1].reshape(-1, d, d)
         moments = about_middle - vectors[:, :, None] * (X[some] - middle)[:, None, :]
-        faces[name] = Face(outer[some], vectors, found[some, -1], moments)
+        faces[name] = Face(owners[some], vectors, found[some, -1], moments)
     return faces
+
+
+def _on_face(positions: Array, points: Array, areas: Array, spacing: float) -> Mask:
+    """Which of the particles at `positions` (n, d) are on a face with samples at `points` (m, d),
+    whose area vectors are `areas` (m, d), (n,)."""
+    nearest = cKDTree(points).query(positions)[1]
+    normals = areas[nearest] / np.linalg.norm(areas[nearest], axis=1, keepdims=True)
+    above = np.einsum("ni,ni->n", positions - points[nearest], normals)
+    return np.asarray(np.abs(above) < _ABOVE * spacing, dtype=np.bool_)
 
 
 def agreeing(faces: Mapping[str, Face], positions: Array, volumes: Array) -> dict[str, Face]:

@@ -15,9 +15,6 @@ from scipy.spatial import cKDTree
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph_builtin.discretisations._grid import Grid
 
-# Lattice points on each side of a cell that count; what is computed must not reach further.
-_AROUND = 2
-
 # Places closer than this part of a cell are the same.
 _SAME = 1e-6
 
@@ -29,20 +26,24 @@ class Surroundings:
     grid: Grid
     numbers: Indices  # (size,) of the particle at each lattice point, -1 for none
     shape: tuple[int, ...]  # of the array
+    around: int  # lattice points on each side of a cell that count
     scattered: cKDTree | None  # the particles that are not at a lattice point
 
     @classmethod
-    def of(cls, positions: Array, grid: Grid) -> Surroundings:
-        """Of particles at `positions` (n, d) [m]."""
+    def of(cls, positions: Array, grid: Grid, around: int) -> Surroundings:
+        """Of particles at `positions` (n, d) [m].
+
+        What is computed must not reach further than `around` lattice points on each side of a cell.
+        """
         places = (positions - grid.lower) / grid.steps - grid.first
         index = np.rint(places).astype(np.intp)
         at = (np.abs(places - index) <= _SAME).all(axis=1)
         at &= ((index >= 0) & (index < np.array(grid.counts))).all(axis=1)
-        shape = tuple(count + 2 * _AROUND for count in grid.counts)
+        shape = tuple(count + 2 * around for count in grid.counts)
         numbers = np.full(np.prod(shape), -1, dtype=np.intp)
-        numbers[np.ravel_multi_index(tuple(index[at].T + _AROUND), shape)] = np.flatnonzero(at)
+        numbers[np.ravel_multi_index(tuple(index[at].T + around), shape)] = np.flatnonzero(at)
         off = positions[~at]
-        return cls(grid, numbers, shape, cKDTree(off) if len(off) else None)
+        return cls(grid, numbers, shape, around, cKDTree(off) if len(off) else None)
 
     def regular(self, points: Array, reach: float) -> Mask:
         """Which of `points` (m, d) have particles of the lattice only within `reach` [m], (m,)."""
@@ -59,11 +60,12 @@ class Surroundings:
         around it."""
         index, within = self._cells(points)
         home = self.home(points)
-        bits = np.zeros(len(points), dtype=np.uint64)
-        steps = product(range(1 - _AROUND, 1 + _AROUND), repeat=index.shape[1])
-        for bit, step in enumerate(steps):
+        steps = list(product(range(1 - self.around, 1 + self.around), repeat=index.shape[1]))
+        bits = np.zeros((len(points), -(-len(steps) // 64)), dtype=np.uint64)
+        for number, step in enumerate(steps):
+            word, bit = divmod(number, 64)
             there = self.numbers[home + np.array(step) @ self._strides] >= 0
-            bits |= there.astype(np.uint64) << np.uint64(bit)
+            bits[:, word] |= there.astype(np.uint64) << np.uint64(bit)
         keys = np.column_stack([bits.view(np.int64), np.rint(within / _SAME).astype(np.int64)])
         _, first, kind = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         return first, kind.ravel()
@@ -71,13 +73,13 @@ class Surroundings:
     def home(self, points: Array) -> Indices:
         """Place in the array of the lower corner of the cell of each point, (m,)."""
         index = self._cells(points)[0]
-        home: Indices = (index + _AROUND) @ self._strides
+        home: Indices = (index + self.around) @ self._strides
         return home
 
     def places(self, particles: Array) -> Indices:
         """Place in the array of lattice points at positions (m, d), (m,)."""
         index = np.rint((particles - self.grid.lower) / self.grid.steps - self.grid.first)
-        places: Indices = (index.astype(np.intp) + _AROUND) @ self._strides
+        places: Indices = (index.astype(np.intp) + self.around) @ self._strides
         return places
 
     @property

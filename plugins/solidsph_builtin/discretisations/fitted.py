@@ -34,6 +34,11 @@ _ALONG = 40
 _AT = 1e-6
 # Particles that the others push closer to the boundary than this are left out.
 _PUSHED_OUT = 0.2
+# Weight of a particle on the surface in fits to neighbours, in cells; on a plane such a particle
+# stands for 3/8 of one. With 8 particles across, the radial stress in a ring is off by 2.8 % with
+# 0.5, by 2.1 % with 0.375, by 1.9 % with 1/3, by 1.7 % with 0.3, and the peak beside a hole with
+# 20 particles a side by -4.5 to -5.0 %. Fitted volumes as weights are too uneven in space.
+_ON_SURFACE = 1.0 / 3.0
 
 
 @final
@@ -68,7 +73,10 @@ class Fitted(Discretisation):
         owned = faces(surface, owners, X)
         whole = np.full(len(X), grid.cell_volume)
         given = without_ghosts(X, whole, size, owned)
-        return fitted(self, shape, spacing, given, _MOVES * size if irregular else 0.0)
+        if not irregular:
+            return fitted(self, shape, spacing, given)
+        cells = np.where(onto, _ON_SURFACE * grid.cell_volume, grid.cell_volume)
+        return attrs.evolve(fitted(self, shape, spacing, given, _MOVES * size), cells=cells)
 
     def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
         """True: this is what it is for."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import product
+from math import factorial, prod
 from typing import final
 
 import attrs
@@ -75,6 +76,25 @@ class LocalFits:
         d = self.pairs.offsets.shape[1]
         k = d + len(factors_of(d, degree))
         return attrs.evolve(self, basis=self.basis[:, :k], moments=self.moments[:, :k, :k])
+
+    def with_small_cubes(self, penalty: float) -> LocalFits:
+        """Fits up to the third degree whose cubic terms are held small, alike in all directions.
+
+        `penalty` is that of a cubic coefficient, relative to the mean moment of the cubic terms.
+        What the neighbours determine well stays nearly what it was, and the rest nearly vanishes.
+        """
+        d = self.pairs.offsets.shape[1]
+        factors = factors_of(d, 3)
+        powers = [tuple(map(int, row)) for row in np.eye(d)]
+        for i, j in factors:
+            powers.append(tuple(a + b for a, b in zip(powers[i], powers[j], strict=True)))
+        # How often each appears in the tensor x (x) x (x) x, whose norm is that of no direction.
+        times = np.array([6.0 / prod(map(factorial, p)) * (sum(p) == 3) for p in powers])
+        cubic = times > 0.0
+        mean = np.einsum("nii,i->n", self.moments, times) / cubic.sum()
+        held = np.where(cubic, penalty / np.where(cubic, times, 1.0), 0.0)
+        extra = mean[:, None, None] * np.diag(held)
+        return attrs.evolve(self, moments=self.moments + extra)
 
     def gradients(self) -> tuple[Array, Array]:
         """Weights of the gradient of the fit at p, (m, d) [1/m], and how they amplify noise, (n,).

@@ -18,7 +18,7 @@ from solidsph_builtin.gradients.corrected import Corrected
 # Largest sum of the lengths of a particle's weights, times its reach. A fit that relies on small
 # differences of large weights amplifies noise by this factor, and the stable step shrinks with it.
 # On lattices it is about 20 at a corner, five times that of a linear fit.
-_WORST_AMPLIFICATION = 60.0
+WORST_AMPLIFICATION = 60.0
 
 
 @final
@@ -67,7 +67,7 @@ def quadratic_fit(fits: LocalFits, kernel_gradients: Array, volumes: Array) -> t
         BuildError: the neighbours of a particle determine neither.
     """
     weights, noise = fits.of_degree(2).gradients()
-    poor: Mask = noise > _WORST_AMPLIFICATION
+    poor: Mask = noise > WORST_AMPLIFICATION
     if poor.any():
         replaced = fits.pairs.spread(poor)
         linear = Corrected().weights(fits.pairs, kernel_gradients, volumes)

@@ -53,7 +53,7 @@ _RECOMMENDED = Scheme(
         "kernels": "at 2.6 spacings, 2.4 in space, it resists relative motion of neighbours, half "
         "as many as the paper's kernel needs",
         "gradients": "exact for a constant gradient of strain, with forces that integrate by "
-        "parts: the peak stress at a hole is within 3 % with 20 particles a side",
+        "parts: the peak stress at a hole is within 5 % with 20 particles a side",
         "elsewhere": "exact for a constant strain; particles of a body end before its surface, or "
         "have ghosts beyond it, which 'consistent' does not suit",
         "divergences": "forces are the derivative of the energy",

@@ -119,6 +119,64 @@ def test_the_divergence_theorem_holds_for_quadratic_functions(
     assert np.abs(f @ A - slope).max() < 1e-11 * size
 
 
+def eighth(radius: float, hollow: float) -> Shape:
+    """Of a ball, `hollow` inside up to that radius."""
+    side = 3.0 * radius
+    beyond = [
+        Box(
+            lengths=[0.5 * side if axis == cut else side for axis in range(3)],
+            origin=[-0.5 * side] * 3,
+        )
+        for cut in range(3)
+    ]
+    inside = [Ball(radius=hollow)] if hollow else []
+    return Difference(Ball(radius=radius), [*inside, *beyond])
+
+
+def test_an_eighth_of_a_ball_has_positive_areas_of_particles_on_each_face() -> None:
+    """What a plane of symmetry holds is all that owns a part of it."""
+    found = Fitted().particles(eighth(1.0, 0.0), 1.0 / 7.0)
+    planes = 0
+    for face in found.faces.values():
+        X = found.positions[face.particles]
+        flat = np.abs(X).max(axis=0) < 1e-9
+        planes += int(flat.sum())
+        assert flat.any() or np.linalg.norm(X, axis=1) == pytest.approx(1.0)
+        assert face.areas.min() > 0.0
+    assert planes == 3
+
+
+def test_volumes_along_a_circle_are_even() -> None:
+    """Beside 3/8 of a cell. Fits to those within 1.8 spacings scatter by 0.10 of a cell."""
+    h = 1.0 / 14.0
+    ring = Fitted().particles(Annulus(inner_radius=1.0, outer_radius=2.0), h)
+    inner = ring.volumes[ring.tags["inner"]] / h**2
+    assert inner.mean() == pytest.approx(3.0 / 8.0, abs=0.03)
+    assert inner.std() < 0.05
+
+
+@pytest.mark.validation
+def test_volumes_along_a_rim_in_space_are_even() -> None:
+    """Where the fits may extrapolate, they scatter by 0.10 of a cell."""
+    h = 1.0 / 8.0
+    hollow = Fitted().particles(eighth(2.0, 1.0), h)
+    X = hollow.positions
+    rim = np.abs(np.linalg.norm(X, axis=1) - 1.0) < 1e-2 * h
+    rim &= (np.abs(X) < 1e-9).sum(axis=1) == 1
+    inner = hollow.volumes[rim] / h**3
+    assert len(inner) > 30
+    assert inner.std() < 0.05
+
+
+def test_particles_on_a_surface_off_the_lattice_weigh_less_in_fits() -> None:
+    h = 0.05
+    quarter = Fitted().particles(QUARTER, h)
+    surface = quarter.tags["surface"]
+    assert quarter.cells[~surface] == pytest.approx(h**2)
+    assert quarter.cells[surface] == pytest.approx(h**2 / 3.0)
+    assert Fitted().particles(Box(lengths=(1.0, 1.0)), h).cells == pytest.approx(h**2)
+
+
 def test_a_ball_is_covered() -> None:
     """In space particles on the surface do not move along it: their distances vary more."""
     ball = Ball(radius=1.0)

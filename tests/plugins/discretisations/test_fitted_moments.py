@@ -65,8 +65,8 @@ def test_on_the_boundary_of_a_box_they_are_those_of_gregory(dimension: int) -> N
     assert V.min() > 0.75 * (3 / 8) ** dimension
 
 
-def test_at_an_edge_the_particles_around_it_share_a_face() -> None:
-    """All of it, and its middle; tags stay those of the particles that are on the face."""
+def test_a_face_belongs_to_the_particles_on_it() -> None:
+    """All of it, and its middle."""
     shape = Box(lengths=(1.2, 1.0))
     block = FittedMoments(of=Lattice(on_boundary=True)).particles(shape, 0.1)
     bottom = block.faces["bottom"]
@@ -74,6 +74,7 @@ def test_at_an_edge_the_particles_around_it_share_a_face() -> None:
     # Samples of a quarter spacing leave the square of their size over that of the face.
     assert bottom.areas.sum() == pytest.approx(1.2, rel=1e-12)
     assert bottom.areas @ X == pytest.approx([0.72, 0.0], abs=1e-4)
+    assert np.array_equal(X[:, 1], np.zeros(len(X)))
     assert np.array_equal(block.tags["bottom"], block.positions[:, 1] == 0.0)
 
 
