@@ -19,6 +19,7 @@ from solidsph.costs.coefficients import REFERENCE
 from solidsph.registry import registry
 from solidsph.system.cache import CACHE, write_whole
 from tests.helpers.examples import QUICK, THOROUGH
+from tests.slow import SLOW
 
 # Machines that run the tests are shared: a slow moment is not a failure. Examples stay random, so
 # that every run looks elsewhere; what fails is printed in a form that repeats it.
@@ -49,8 +50,18 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 LONG = ("bare", "engines", "results", "studies", "testing", "cases")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The longest files first, so that neither of two processes ends long after the other."""
+@pytest.hookimpl(tryfirst=True)  # before what is not asked for by its mark is left out
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what is slow; the longest files first, so that neither of two processes ends long after
+    the other."""
+    files = {item.nodeid.partition("::")[0] for item in items}
+    single = any("::" in argument for argument in config.args)  # some tests of a file only
+    for slow in SLOW:
+        found = [item for item in items if item.nodeid.startswith(slow)]
+        for item in found:
+            item.add_marker(pytest.mark.validation)
+        if not found and not single and slow.partition("::")[0] in files:
+            raise pytest.UsageError(f"tests/slow.py names {slow!r}, which is no test any more")
     items.sort(key=lambda item: item.path.parent.name not in LONG)
 
 

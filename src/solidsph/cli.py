@@ -25,9 +25,9 @@ VERBS: Mapping[str, str] = {
     "plugins": "List the installed parts and where they come from.",
     "check": "Check a part, or certify a scheme.",
     "plot": "Draw the pictures of a record.",
-    "view": "Show a record in 3D.",
+    "view": "Show a record in 3D, with sliders for time and deformation.",
     "reproduce": "Reproduce figures of the paper.",
-    "cost": "Show the time that accuracy costs.",
+    "cost": "Show the time that accuracy costs for a scene or a case.",
     "stability": "Run the hard cases, or draw a stability map.",
     "cache": "Show or clear the compiled functions on disk.",
 }
