@@ -186,7 +186,7 @@ def test_the_command_on_a_scene(tmp_path: Path) -> None:
     assert told["case"] == "waves"
     assert len(told["points"]) >= 3
     (limit,) = told["without a reference"]
-    assert abs(limit["tends to"] / TRUTH - 1.0) <= limit["error [%]"] / 100.0
+    assert abs(limit["finest"] / TRUTH - 1.0) <= limit["error [%]"] / 100.0
     assert (tmp_path / told["picture"]).exists()
     table = solidsph("cost", "waves.toml", "--of", STRESS, cwd=tmp_path)
     assert "estimated by refinement" in table.stdout

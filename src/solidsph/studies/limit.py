@@ -31,9 +31,8 @@ class Limit:
     def error(self, value: float, settings: Mapping[str, Any]) -> float:
         """Estimated error of a value, relative to the scale.
 
-        Results of one scheme err together: if the limit is too low, so are its bars, which is less
-        than its distance from the finest value. To results of others the limit is as uncertain as
-        that value.
+        Results of one scheme err together, so that for them the limit counts as less uncertain than
+        it is: by less than the error of the finest value. For results of others that error is added.
 
         Args:
             value: of the quantity.
@@ -41,7 +40,7 @@ class Limit:
         """
         own = all(settings.get(name) == setting for name, setting in self.scheme.items())
         off = abs(value - self.value)
-        return self._relative(off + self.uncertainty) if own else self._relative(off) + self.bar
+        return self._relative(off + self.uncertainty) + (0.0 if own else self.bar)
 
     def _relative(self, off: float) -> float:
         if not isfinite(off):
