@@ -17,6 +17,7 @@ from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case
 from solidsph.studies.frontier import Frontier
 from solidsph.studies.journal import Journal
+from solidsph.studies.part_values import check_parts
 from solidsph.studies.point import Point
 from solidsph.studies.processes import Processes
 from solidsph.studies.refine import refine
@@ -182,5 +183,6 @@ def _priced(case: Case | Scene | str, axes: Axes | None) -> tuple[Case, Axes]:
         if not values:
             raise SceneError(f"axis {axis!r} has no values; give some")
         for value in values:
-            with_settings(priced, {axis: value}).scenes()
+            for scene in with_settings(priced, {axis: value}).scenes().values():
+                check_parts(scene, f"{axis} = {value!r}")
     return priced, axes
