@@ -47,10 +47,11 @@ _OUTCOMES: Mapping[type[SolidsphError], str] = {
 
 
 _RECORDED = "; the outputs so far are readable, and solidsph resume continues the run"
+
 _KEPT = "; finished points are kept, and the same command goes on from there"
 
 _WHEN_INTERRUPTED: Mapping[str, str] = {"run": _RECORDED, "resume": _RECORDED, "cost": _KEPT}
-"""What is left when a verb is interrupted."""
+"""What is left when a verb is interrupted, unless the interruption has a note of it."""
 
 
 class _Verbs(click.Group):
@@ -97,8 +98,9 @@ def main() -> None:
             cause.show()  # with the usage
             sys.exit(WRONG_INPUT)
         _end(WRONG_INPUT, "invalid input", f"error: {cause.format_message()}", facts)
-    except (click.Abort, KeyboardInterrupt):
-        text = f"interrupted{_WHEN_INTERRUPTED.get(_verb(), '')}"
+    except (click.Abort, KeyboardInterrupt) as cause:
+        (kept, *_) = [*_notes(cause), _WHEN_INTERRUPTED.get(_verb(), "")]
+        text = f"interrupted{kept}"
         _end(INTERRUPTED, "interrupted", text, facts)
     except SolidsphError as cause:
         outcome = _OUTCOMES.get(type(cause))
@@ -150,6 +152,12 @@ def _show_warning(
 
 def _as_json() -> bool:
     return "--json" in sys.argv[1:]
+
+
+def _notes(cause: BaseException) -> Sequence[str]:
+    """Notes of an interruption, which click wraps."""
+    notes: Sequence[str] = getattr(cause.__cause__ or cause, "__notes__", ())
+    return notes
 
 
 def _verb() -> str:

@@ -30,6 +30,13 @@ acceleration = {x = 1.0}
 label = "end"
 quantity = "displacement"
 point = [1.0, 0.25]
+
+[[initial]]
+velocity = {x = -1.0}
+
+[[reference]]
+quantity = "end displacement x"
+value = 0.1
 """
 SCENE = Scene.from_toml(SCENE_TOML + FURTHER)
 
@@ -65,6 +72,10 @@ def differences(one: Any, other: Any, at: str = "") -> dict[str, Any]:
         ("effect.gravity.acceleration.y", -1.0, "effect.1.acceleration.y"),
         ("boundary.traction.traction.x", 5.0, "boundary.1.traction.x"),
         ("probe.end.point", [0.5, 0.25], "probe.0.point.0"),
+        ("initial.all.velocity.x", -2.0, "initial.0.velocity.x"),
+        ("reference.end displacement x.tolerance", 0.2, "reference.0.tolerance"),
+        ("energy_tolerance", 0.02, "energy_tolerance"),
+        ("title", "another", "title"),
     ],
 )
 def test_one_value_is_changed(key: str, value: Any, place: str) -> None:
@@ -78,7 +89,7 @@ def test_one_value_is_changed(key: str, value: Any, place: str) -> None:
 
 
 def test_a_section_that_is_missing_is_added() -> None:
-    scene = with_key(SCENE, "statics.load_steps", 4)
+    scene = with_key(Scene.from_toml(SCENE_TOML), "statics.load_steps", 4)
     assert scene.statics is not None
     assert scene.statics.load_steps == 4
 
@@ -90,6 +101,7 @@ def test_a_section_that_is_missing_is_added() -> None:
         ("body.block.spacing.x", 0.1, "has no keys"),
         ("body.block.spacign", 0.1, "did you mean 'spacing'"),
         ("effect.viscosity.linear", 0.1, "no \\[\\[effect\\]\\] has the label or type"),
+        ("initial.0.velocity", {"x": 0.1}, "has the where '0'; there are: all"),
         ("effect.body-force.acceleration", {"x": 0.1}, "2 entries"),
         ("integrator.time_step_factor", "fast", "must be a number"),
         ("material.density", object(), "cannot stand in a scene file"),

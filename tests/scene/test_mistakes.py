@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -19,6 +21,7 @@ from solidsph.errors import BuildError, SceneError
 from solidsph.registry.construct import construct
 from solidsph.registry.problems import MOST_OF_A_KIND, Problems
 from solidsph.scene.checks import geometry
+from solidsph.studies.scene_words import changed as in_words
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 from tests.helpers.scenes import SCENE_TOML, box
 
@@ -113,6 +116,14 @@ def test_all_wrong_values_of_a_material_are_told() -> None:
     )
     for name in ("youngs_modulus", "poissons_ratio", "density"):
         assert f"{name} must" in message
+
+
+@pytest.mark.parametrize("name", ["duration", "outputs", "cover", "time_step", "time_step_factor"])
+@pytest.mark.parametrize("value", ["fast", [1.0], True])
+def test_a_number_of_the_wrong_type_by_its_word_is_told(name: str, value: Any) -> None:
+    # A file is read by type; what --set, an axis or the builder give comes another way.
+    with pytest.raises(BuildError, match=f"{name} must be .*got {re.escape(repr(value))}"):
+        Simulation.builder(in_words(Scene.from_toml(SCENE_TOML), name, value)).build()
 
 
 def test_a_mistyped_key_is_not_missing_as_well() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import inf, isclose, isnan
+from pathlib import Path
 
 import attrs
 import pandas
@@ -12,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solidsph.studies.frontier import Frontier, fitted_exponent
+from solidsph.studies.frontier_picture import draw_frontier
 from solidsph.studies.point import Point
 
 # error = a h^p, time = b h^-q, so that error ~ time^(-p / q)
@@ -146,6 +148,21 @@ def test_pandas_takes_it(frontier: Frontier) -> None:
     table = pandas.DataFrame(frontier)
     assert len(table) == len(frontier)
     assert table["time [s]"].min() == min(one.time for one in frontier.points)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("number", [1, 3])
+def test_equal_errors_are_drawn(number: int, tmp_path: Path) -> None:
+    points = [attrs.evolve(point(1.0, 1.0, h=n), spacing=0.1 * 2.0**n) for n in range(number)]
+    draw_frontier(Frontier(points, "h"), "equal", tmp_path / "equal.png")
+    assert (tmp_path / "equal.png").exists()
+
+
+def test_little_help_is_no_price() -> None:
+    front = Frontier([point(0.11, 1.0, h=1), point(0.1, 2.0, h=2)], "h")  # 2^24 for a digit
+    assert "hardly makes the error smaller" in front.sentence()
+    assert "digit" not in front.sentence()
+    assert "110 %" in Frontier([point(1.1, 1.0, h=1)], "h").sentence()
 
 
 def test_a_power_needs_two_costs() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solidsph import Record, Scene, SceneError
+from solidsph import Record, Scene, SceneError, cli
 from solidsph.studies.cost import SweepSetup, find_best, frontier
 from solidsph.studies.limit import Limit
 from solidsph.studies.point import Point
@@ -22,12 +22,17 @@ from solidsph.studies.search import Goal
 from solidsph.studies.task_lines import decode_point, encode_point
 from solidsph.studies.variant import with_settings
 from tests.commands.test_cli import solidsph
+from tests.helpers.scenes import SCENE_TOML
 from tests.studies.known_scenes import KNOWN, KnownScene
 
 WAVES: KnownScene = KNOWN["waves of displacement"]()
 SCENE = WAVES.scene(0.0625)
 STRESS = "quarter stress xx"
 TRUTH = WAVES.truth[f"final {STRESS} [Pa]"]
+OTHER = """[body.other]
+shape = {type = "box", lengths = [1.0, 1.0], origin = [2.0, 0.0]}
+spacing = 0.125
+"""
 
 
 def inline(folder: Path) -> SweepSetup:
@@ -148,11 +153,7 @@ def test_values_travel_between_processes() -> None:
 
 
 def test_bodies_keep_the_ratio_of_their_spacings() -> None:
-    text = SCENE.to_toml() + (
-        '[body.other]\nshape = {type = "box", lengths = [1.0, 1.0], origin = [2.0, 0.0]}\n'
-        "spacing = 0.125\n"
-    )
-    scene = Scene.from_toml(text)
+    scene = Scene.from_toml(SCENE.to_toml() + OTHER)
     case = with_settings(SceneCase.of(scene, [STRESS]), {"spacing": 0.05})
     (changed,) = case.scenes().values()
     assert [body.spacing for body in changed.bodies.values()] == [0.05, 0.1]
@@ -193,6 +194,46 @@ def test_the_command_on_a_scene(tmp_path: Path) -> None:
     assert "the scene as it is" in table.stdout
 
 
+def test_the_spacing_of_the_only_body_is_that_of_the_scene(tmp_path: Path) -> None:
+    (tmp_path / "waves.toml").write_text(SCENE.to_toml())
+    axis = "body.square.spacing=0.25,0.125,0.0625"
+    done = solidsph("cost", "waves.toml", "--of", STRESS, "--axis", axis, "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert [point["spacing"] for point in told["points"]] == [0.25, 0.125, 0.0625]
+    assert (told["outcome"], told["exit code"]) == ("finished", 0)
+
+
+def test_a_scene_that_never_finishes_has_no_front(tmp_path: Path) -> None:
+    text = SCENE_TOML.replace("1e3*min(t/0.005, 1)", "1e12*t")
+    probe = '\n[[probe]]\nlabel = "end"\nquantity = "displacement x"\npoint = [1.0, 0.25]\n'
+    (tmp_path / "scene.toml").write_text(text + probe)
+    done = solidsph("cost", "scene.toml", cwd=tmp_path)
+    assert done.returncode == 1, done.stderr
+    assert "the scene as it is: spacing 0.125: failed" in done.stdout
+    assert "picture" not in done.stdout
+    assert "inf" not in done.stdout
+    assert not list(tmp_path.rglob("*.png"))
+
+
+def test_an_interrupted_search_says_that_it_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    (tmp_path / "waves.toml").write_text(SCENE.to_toml())
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("solidsph.commands.accuracy.find_best", interrupted)
+    monkeypatch.setattr("sys.argv", ["solidsph", "run", "waves.toml", "--accuracy", "1%"])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == 130
+    told = capsys.readouterr().err
+    assert "the same command goes on" in told
+    assert "resume" not in told  # there is no record
+
+
 def test_a_run_to_an_accuracy(tmp_path: Path) -> None:
     (tmp_path / "waves.toml").write_text(SCENE.to_toml())
     done = solidsph("run", "waves.toml", "--accuracy", "1%", "--of", STRESS, "--json", cwd=tmp_path)
@@ -213,6 +254,7 @@ def test_a_run_to_an_accuracy(tmp_path: Path) -> None:
     )
     assert missed.returncode == 2
     assert "needs 3 spacings" in missed.stderr
+    assert "0.001 s are allowed; allow more" in missed.stderr
 
 
 @pytest.mark.parametrize(
@@ -223,6 +265,12 @@ def test_a_run_to_an_accuracy(tmp_path: Path) -> None:
         (("cost", "waves.toml", "--reference", f"{STRESS}=no.csv"), "cannot be read"),
         (("cost", "waves.toml", "--axis", "body.sqare.spacing=0.1,0.2"), "did you mean 'square'"),
         (("cost", "waves.toml", "--axis", "spacing=-1.0"), "must be a length"),
+        (("cost", "waves.toml", "--axis", "gradient=corrected,cubik"), "did you mean 'cubic'"),
+        (("cost", "waves.toml", "--axis", "material.densty=1,2"), "did you mean 'density'"),
+        (("cost", "waves.toml", "--axis", "cover=2.6,wide"), "cover = 'wide': cover must be"),
+        (("cost", "waves.toml", "--axis", "spacing=0.125,0.0625"), "needs 3 spacings"),
+        (("cost", "waves.toml", "--of", STRESS, "--reference", "late.csv"), "from t = 7 to 8 s"),
+        (("cost", "two.toml", "--axis", "body.other.spacing=0.2,0.1,0.05"), "all bodies together"),
         (("cost", "waves.toml", "--set", "colour=red"), "no such word of a scene"),
         (("cost", "csm1", "--of", "tip"), "are for a scene"),
         (("run", "waves.toml", "--of", STRESS), "add --accuracy"),
@@ -232,6 +280,8 @@ def test_a_run_to_an_accuracy(tmp_path: Path) -> None:
 )
 def test_bad_input_is_one_message(arguments: tuple[str, ...], message: str, tmp_path: Path) -> None:
     (tmp_path / "waves.toml").write_text(SCENE.to_toml())
+    (tmp_path / "two.toml").write_text(SCENE.to_toml() + OTHER)
+    (tmp_path / "late.csv").write_text("7,0\n8,1\n")
     done = solidsph(*arguments, cwd=tmp_path)
     assert done.returncode == 2
     assert message in done.stderr

@@ -22,6 +22,8 @@ from solidsph.studies.scene_case import SceneCase
 from solidsph.studies.search import SearchResult
 from solidsph.studies.variant import with_settings
 
+_KEPT = "; what the search has run is kept, and the same command goes on from there"
+
 
 @final
 @attrs.frozen
@@ -133,7 +135,11 @@ def accurate(
     case = SceneCase.of(scene, of)
     with sweep_progress(name, shown) as watch:
         setup = SweepSetup(Processes(1), folder, 1, watch)
-        result = find_best(case, goal, None, setup, longest=seconds(longest, "--longest"))
+        try:
+            result = find_best(case, goal, None, setup, longest=seconds(longest, "--longest"))
+        except KeyboardInterrupt as interruption:
+            interruption.add_note(_KEPT)  # there is no record yet
+            raise
     return Accurate(wanted, case, result)
 
 

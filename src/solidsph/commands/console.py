@@ -115,7 +115,8 @@ def present(
         SystemExit: the check or run has not passed; the exit code is 1.
     """
     if as_json:
-        show_json(facts)
+        ended = {"outcome": "finished" if passed else "failed", "exit code": 0 if passed else 1}
+        show_json({**facts, **{key: facts.get(key, known) for key, known in ended.items()}})
     else:
         for block in text:
             say(block) if isinstance(block, str) else block.show()

@@ -157,7 +157,8 @@ def _sweep(
     own = default_settings(case.priced(), axes)
     default = next((point for point in result.points if point.settings == own), None)
     picture, table = folder / f"{target}-frontier.png", folder / f"{target}-points.csv"
-    if result.finished():
+    is_drawn = bool(result.finished())
+    if is_drawn:
         draw_frontier(result, case.priced().title, picture)
     with table.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(rows[0]))
@@ -190,27 +191,28 @@ def _sweep(
         },
         "sentence": result.sentence(),
         "largest step": larger_step_sentence(faster),
-        "picture": str(picture),
+        "picture": str(picture) if is_drawn else None,
         "table": str(table),
         "report": None if page is None else str(page),
     }
-    return facts, _sweep_text(facts, result, default, options.verbose), bool(result.finished())
+    return facts, _sweep_text(facts, result, default, options.verbose), is_drawn
 
 
 def _sweep_text(
     facts: Mapping[str, Any], result: Frontier, default: Point | None, verbose: bool
 ) -> Iterator[Table | str]:
-    yield _points_table(
-        f"{facts['case']}: the front, of {len(result)} configurations",
-        result.front(),
-        verbose,
-        {"trusted [%]": [100.0 * result.trusted(point) for point in result.front()]},
-    )
-    yield Table(
-        "orders, by scheme",
-        ["scheme", "in spacing", "in time", "falls steadily"],
-        [[o.label, o.in_spacing, o.in_time, not o.crosses] for o in result.orders()],
-    )
+    if result.finished():
+        yield _points_table(
+            f"{facts['case']}: the front, of {len(result)} configurations",
+            result.front(),
+            verbose,
+            {"trusted [%]": [100.0 * result.trusted(point) for point in result.front()]},
+        )
+        yield Table(
+            "orders, by scheme",
+            ["scheme", "in spacing", "in time", "falls steadily"],
+            [[o.label, o.in_spacing, o.in_time, not o.crosses] for o in result.orders()],
+        )
     if result.limits:
         yield from with_warnings(ESTIMATED, facts["without a reference"])
     elif bars := facts["without a reference"]:
@@ -220,15 +222,19 @@ def _sweep_text(
             yield f"failed: {point.label()}: {point.outcome.splitlines()[0]}"
     if default is not None:
         excess = result.excess(default)
-        place = "on the front" if excess == 1.0 else "failed"
-        if isfinite(excess) and excess != 1.0:
-            place = f"{excess:.2g} times the time of an equally accurate one on the front"
+        place = f"{default.brief()}: on the front"
+        if not isfinite(excess):
+            place = f"{default.label()}: failed"
+        elif excess != 1.0:
+            more = f"{excess:.2g} times the time of an equally accurate one on the front"
+            place = f"{default.brief()}: {more}"
         whose = "the scene as it is" if facts["is a scene"] else "the case's own parameters"
-        yield f"{whose}: {default.brief()}: {place}"
+        yield f"{whose}: {place}"
     yield facts["sentence"]
     if facts["largest step"]:
         yield facts["largest step"]
-    yield f"picture: {facts['picture']}"
+    if facts["picture"] is not None:
+        yield f"picture: {facts['picture']}"
     yield f"all points: {facts['table']}"
     if facts["report"] is not None:
         yield f"report: {facts['report']}"

@@ -12,7 +12,8 @@ from solidsph.errors import SceneError
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case
 from solidsph.studies.cost import Axes, sweep_of
-from solidsph.studies.scene_case import SceneCase
+from solidsph.studies.scene_case import SPACING, SceneCase
+from solidsph.studies.scene_words import changed
 from solidsph.studies.search import Goal
 
 _UNITS = {"": 1.0, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
@@ -33,11 +34,32 @@ def axes_of(texts: Sequence[str], case: Case) -> Axes:
     """Axes from "name=value,value", after the one that refines; the case's own if none is given."""
     if not texts:
         return sweep_of(case.priced())
-    axes = dict(_axis(text) for text in texts)
+    axes = dict(_refining(*_axis(text), case) for text in texts)
     refining, values = next(iter(case.priced().sweep.items()), ("", ()))
     if refining and refining not in axes:
         return {refining: values, **axes}
     return {name: axes[name] for name in sorted(axes, key=lambda name: name != refining)}
+
+
+def _refining(name: str, values: Sequence[Any], case: Case) -> tuple[str, Sequence[Any]]:
+    """That axis; the spacing of the only body of a scene is the spacing of the scene.
+
+    Raises:
+        SceneError: it refines one of several bodies, and there is no reference: the others would
+            keep their error, which no refinement shows.
+    """
+    if not (isinstance(case, SceneCase) and re.fullmatch(r"body\.[^.]+\.spacing", name)):
+        return name, values
+    if case.scene.bodies.keys() == {name.split(".")[1]}:
+        return SPACING, values
+    if not case.references:
+        changed(case.scene, name, values[0])
+        raise SceneError(
+            f"--axis {name}: without a reference the error is estimated by refining all bodies "
+            f"together; take --axis spacing=..., with --set {name}={values[0]} for another ratio, "
+            "or give a --reference"
+        )
+    return name, values
 
 
 def _axis(text: str) -> tuple[str, Sequence[Any]]:

@@ -16,6 +16,8 @@ from solidsph.results.recorded import Recorded
 
 _SIZE = (1024, 768)  # of the window [pixels]
 
+_PICTURES = (".png", ".jpeg", ".jpg", ".bmp", ".tif", ".tiff")
+
 # Positions of the sliders in the window, from its lower left corner.
 _TIME = ((0.05, 0.08), (0.45, 0.08))
 _DEFORMATION = ((0.55, 0.08), (0.95, 0.08))
@@ -47,6 +49,10 @@ class View:
             RecordError: there is no display, or the picture cannot be drawn.
         """
         if picture is not None:
+            if picture.suffix.lower() not in _PICTURES:
+                raise RecordError(
+                    f"a picture ends in {', '.join(_PICTURES)}, got {str(picture)!r}; name it so"
+                )
             _hush()
             plotter = self._scene(off_screen=True)
             picture.parent.mkdir(parents=True, exist_ok=True)

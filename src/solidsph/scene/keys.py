@@ -8,16 +8,17 @@ from typing import Any
 
 from solidsph.errors import SceneError
 from solidsph.scene.scene import Scene
-from solidsph.scene.toml_reader import SECTIONS
+from solidsph.scene.toml_reader import SCALARS, SECTIONS
 
-# Sections that are lists; an entry is named by its label or its type.
+# Sections that are lists; an entry is named by its label or its type, or by what it has instead.
 _LISTS = tuple(name for name, shown in SECTIONS.items() if shown.startswith("[["))
+_NAMED_BY = {"initial": ("where",), "reference": ("quantity",)}
 
 
 def is_key(name: str) -> bool:
-    """Whether `name` begins with a section of a scene file, and goes on."""
+    """Whether `name` is a value at the top of a scene file, or goes on after a section."""
     section, dot, rest = name.partition(".")
-    return bool(dot and rest) and section in SECTIONS
+    return name in SCALARS or bool(dot and rest and section in SECTIONS)
 
 
 def with_key(scene: Scene, key: str, value: Any) -> Scene:
@@ -26,7 +27,8 @@ def with_key(scene: Scene, key: str, value: Any) -> Scene:
     Args:
         scene: one that can be written to a file.
         key: names joined by dots, as in `body.plate.spacing` or `integrator.time_step_factor`. An
-            entry of a list is named by its label or its type: `effect.artificial-viscosity.linear`.
+            entry of a list is named by its label or its type: `effect.artificial-viscosity.linear`;
+            an initial state by its place, `initial.all.velocity`, a reference by its quantity.
         value: as it would stand in the file.
 
     Raises:
@@ -85,7 +87,8 @@ def _entry(entries: Any, name: str, section: str) -> dict[str, Any]:
     for number, entry in enumerate(entries):
         if isinstance(entry, str):
             entries[number] = {"type": entry}
-    for word in ("label", "type"):
+    words = _NAMED_BY.get(section, ("label", "type"))
+    for word in words:
         found = [entry for entry in entries if entry.get(word) == name]
         if len(found) > 1:
             raise SceneError(
@@ -95,8 +98,9 @@ def _entry(entries: Any, name: str, section: str) -> dict[str, Any]:
         if found:
             one: dict[str, Any] = found[0]
             return one
-    known = [entry.get("label") or entry.get("type", "") for entry in entries]
-    raise SceneError(f"no [[{section}]] has the label or type {name!r}{_hint(name, known)}")
+    known = [next((entry[word] for word in words if word in entry), "") for entry in entries]
+    which = " or ".join(words)
+    raise SceneError(f"no [[{section}]] has the {which} {name!r}{_hint(name, known)}")
 
 
 def _hint(name: str, known: list[str]) -> str:

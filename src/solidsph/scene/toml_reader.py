@@ -49,8 +49,8 @@ SECTIONS = {
     "sleep": "[sleep]",
     "statics": "[statics]",
 }
-_SCALARS = ("title", "scheme", "duration", "outputs", "engine", "energy_tolerance", "silence")
-_KEYS = (*_SCALARS, *SECTIONS)
+SCALARS = ("title", "scheme", "duration", "outputs", "engine", "energy_tolerance", "silence")
+_KEYS = (*SCALARS, *SECTIONS)
 
 # Fields of a scene that stand in the table of a part.
 _NESTED = {"kernel": ("cover",), "integrator": ("time_step_factor", "time_step")}
@@ -138,7 +138,7 @@ def _scene(table: Mapping[str, Any], problems: Problems) -> tuple[dict[str, Any]
         entries = problems.attempt(_list, table, key) or []
         several = [problems.attempt(read_entry, entry, key, problems) for entry in entries]
         values[field] = tuple(entry for entry in several if entry is not None)
-    simple = {k: v for k, v in table.items() if k in (*_SCALARS, "material", "formulation")}
+    simple = {k: v for k, v in table.items() if k in (*SCALARS, "material", "formulation")}
     values |= _fields(SceneData, simple, "", problems)
     for key, kind in (("sleep", SleepScene), ("statics", StaticsScene)):
         if key in table:

@@ -17,12 +17,13 @@ from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case
 from solidsph.studies.frontier import Frontier
 from solidsph.studies.journal import Journal
+from solidsph.studies.part_values import check_parts
 from solidsph.studies.point import Point
 from solidsph.studies.processes import Processes
 from solidsph.studies.refine import refine
-from solidsph.studies.refinement import judged, limits, needs_estimate
+from solidsph.studies.refinement import LEAST, judged, limits, needs_estimate
 from solidsph.studies.runner import Runner
-from solidsph.studies.scene_case import SceneCase
+from solidsph.studies.scene_case import SPACING, SceneCase
 from solidsph.studies.search import Goal, SearchResult, Settings, own_scheme, search
 from solidsph.studies.sweep import StatusCallback, ignore_status, sweep
 from solidsph.studies.task import Task
@@ -69,14 +70,20 @@ def frontier(
             fewer than three spacings have finished.
     """
     priced, axes = _priced(case, axes)
+    refining = next(iter(axes))
     grid: list[Settings] = [
         dict(zip(axes, values, strict=True)) for values in product(*axes.values())
     ]
     own = default_settings(priced, axes)
     if own is not None and own not in grid:
         grid.append(own)
+    spacings = {settings[refining] for settings in grid} if refining == SPACING else ()
+    if isinstance(priced, SceneCase) and not priced.references and 0 < len(spacings) < LEAST:
+        raise SceneError(
+            f"an error bar needs {LEAST} spacings, and there are {len(spacings)}; give more by "
+            "--axis spacing=..., or a --reference"
+        )
     points = (setup or SweepSetup()).points(priced, grid)
-    refining = next(iter(axes))
     if not needs_estimate(points):
         return Frontier(points, refining)
     known = limits(points, refining)
@@ -176,5 +183,6 @@ def _priced(case: Case | Scene | str, axes: Axes | None) -> tuple[Case, Axes]:
         if not values:
             raise SceneError(f"axis {axis!r} has no values; give some")
         for value in values:
-            with_settings(priced, {axis: value}).scenes()
+            for scene in with_settings(priced, {axis: value}).scenes().values():
+                check_parts(scene, f"{axis} = {value!r}")
     return priced, axes

@@ -12,8 +12,11 @@ import attrs
 import numpy as np
 
 from solidsph.studies.limit import Limit
-from solidsph.studies.point import Point, label
+from solidsph.studies.point import Point, label, percent
 from solidsph.system import html
+
+# Factor in time for a tenth of the error, beyond which it is no price but says that nothing helps.
+_DEAR = 1e4
 
 Cost = Callable[[Point], float]
 
@@ -213,12 +216,14 @@ class Frontier:
         if not parts:
             parts.append(f"10 % was not reached by any of {len(self.points)} configurations")
         parts.append(
-            f"the smallest error was {100.0 * self.trusted(last):.2g} %, in {_time(last.time)} "
+            f"the smallest error was {percent(self.trusted(last))}, in {_time(last.time)} "
             f"with {last.label()}"
         )
         price = self.next_digit()
-        if isfinite(price) and len(front) > 1:
+        if len(front) > 1 and price <= _DEAR:
             parts.append(f"along the front each further digit takes {price:.2g} times the time")
+        elif len(front) > 1:
+            parts.append("along the front more time hardly makes the error smaller")
         return "; ".join(parts) + "."
 
 

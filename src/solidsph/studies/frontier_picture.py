@@ -29,7 +29,7 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
 
     others = [point for point in frontier.finished() if point not in front]
     _points(by_time, frontier, others, "o", "0.75", "dominated")
-    by_time.loglog(
+    by_time.plot(
         [point.time for point in front],
         [100.0 * frontier.trusted(point) for point in front],
         color="black",
@@ -47,8 +47,6 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
             textcoords="offset points",
             fontsize=8,
         )
-    by_time.set_xscale("log")
-    by_time.set_yscale("log")
     by_time.margins(x=0.12)
     by_time.set_xlabel("wall time [s]")
     kind = "estimated error" if frontier.limits else "error"
@@ -63,7 +61,7 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
 
     for scheme, points in frontier.schemes().items():
         on_front = scheme in markers
-        by_spacing.loglog(
+        by_spacing.plot(
             [point.spacing for point in points],
             [100.0 * point.error for point in points],
             color="black" if on_front else "0.75",
@@ -75,9 +73,12 @@ def draw_frontier(frontier: Frontier, title: str, path: Path) -> None:
     if line := frontier.second_order():
         spacings, errors = line[0], [100.0 * error for error in line[1]]
         end = (spacings[1], errors[1])
-        by_spacing.loglog(spacings, errors, ":", color="0.4", linewidth=1.0)
+        by_spacing.plot(spacings, errors, ":", color="0.4", linewidth=1.0)
         by_spacing.annotate("order 2", end, (4, -10), textcoords="offset points", fontsize=8)
     by_spacing.set_xlabel("particle spacing [m]")
+    by_time.set_xscale("log")  # after all is drawn: limits of equal errors alone would be a warning
+    by_time.set_yscale("log")
+    by_spacing.set_xscale("log")
     for axis in (by_time.xaxis, by_spacing.xaxis, by_time.yaxis):
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter("{x:g}")

@@ -74,7 +74,12 @@ class Point:
 
     def brief(self) -> str:
         """Settings, error and time in one line."""
-        return f"{self.label()}: {100.0 * self.error:.2g} % in {self.time:.2g} s"
+        return f"{self.label()}: {percent(self.error)} in {self.time:.2g} s"
+
+
+def percent(error: float) -> str:
+    """An error in per cent, to two digits."""
+    return f"{100.0 * error:.{2 if error < 0.995 else 4}g} %"
 
 
 def run_point(case: Case, settings: Mapping[str, Any]) -> Point:

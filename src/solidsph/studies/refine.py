@@ -9,9 +9,10 @@ from typing import final
 
 import attrs
 
+from solidsph.errors import SceneError
 from solidsph.studies.limit import Limit
 from solidsph.studies.point import Point
-from solidsph.studies.refinement import judged, limits
+from solidsph.studies.refinement import LEAST, judged, limits
 from solidsph.studies.scene_case import SPACING
 from solidsph.studies.search import Goal, Settings
 
@@ -61,7 +62,15 @@ def refine(
     points: list[Point] = []
     tried: list[float] = []
     for spacing in _finer(spacings):
-        if _predicted(points, spacing) > min(longest, goal.time):
+        expected = _predicted(points, spacing)
+        if expected > min(longest, goal.time):
+            if sum(point.ran for point in points) < LEAST:
+                raise SceneError(
+                    f"an error bar needs {LEAST} spacings, and {len(points)} were run: the next, "
+                    f"{spacing:.4g} m, is expected to take {expected:.2g} s, and "
+                    f"{min(longest, goal.time):.2g} s are allowed; allow more, or begin with "
+                    "coarser ones: --axis spacing=..."
+                )
             break
         points.append(run({SPACING: spacing, **scheme}))
         tried.append(spacing)
@@ -73,7 +82,7 @@ def refine(
 
 def _is_enough(points: Sequence[Point], goal: Goal) -> bool:
     """Whether the finest point has the accuracy that is asked for."""
-    if sum(point.ran for point in points) < 3:
+    if sum(point.ran for point in points) < LEAST:
         return False
     return max(limit.bar for limit in limits(points, SPACING)) <= goal.error < inf
 

@@ -18,8 +18,8 @@ from solidsph.studies.limit import Limit
 from solidsph.studies.point import Point
 from solidsph.studies.richardson import extrapolate
 
-# Spacings of one scheme that tell an order.
-_LEAST = 3
+LEAST = 3
+"""Spacings of one scheme that tell an order."""
 
 # Results that differ by less than this part of their scale are the same: rounding, and what the
 # iteration of an equilibrium leaves.
@@ -36,7 +36,7 @@ def limits(points: Sequence[Point], refining: str) -> Sequence[Limit]:
     found: dict[str, Limit] = {}
     for own in Frontier(ran, refining).schemes().values():
         levels = list({point.spacing: point for point in own}.values())
-        if len(levels) < _LEAST:
+        if len(levels) < LEAST:
             continue
         for name in levels[-1].values:
             limit = _limit(name, levels, refining)
@@ -46,7 +46,7 @@ def limits(points: Sequence[Point], refining: str) -> Sequence[Limit]:
         failed = next((point for point in points if not point.ran), None)
         why = f" ({failed.label()}: {failed.outcome.splitlines()[0]})" if failed else ""
         raise SceneError(
-            f"an error bar needs {_LEAST} spacings with the same scheme that finish, and there are "
+            f"an error bar needs {LEAST} spacings with the same scheme that finish, and there are "
             f"fewer{why}; give finer ones by --axis spacing=..., or a --reference"
         )
     return list(found.values())

@@ -80,7 +80,7 @@ class SceneCase(Case):
                     f"--reference {value!r} may be that of several columns: {names}; write which, "
                     "as COLUMN=VALUE"
                 )
-            known.append(Reference.of(which[0], value, folder=folder))
+            known.append(_in_time(Reference.of(which[0], value, folder=folder), scene))
         if not pairs:
             known += references_of(scene, columns, folder=folder)
         if known and not wanted:
@@ -141,16 +141,27 @@ def references_of(
     for entry in scene.references:
         quantity = one_quantity(scene, columns, str(entry.quantity))
         given = entry.value if entry.file is None else entry.file
-        known.append(
-            Reference.of(
-                quantity,
-                "" if given is None else given,
-                folder=folder,
-                source=entry.source,
-                tolerance=entry.tolerance,
-            )
+        reference = Reference.of(
+            quantity,
+            "" if given is None else given,
+            folder=folder,
+            source=entry.source,
+            tolerance=entry.tolerance,
         )
+        known.append(_in_time(reference, scene))
     return known
+
+
+def _in_time(reference: Reference, scene: Scene) -> Reference:
+    """That reference, unless its curve begins after the scene has ended."""
+    curve = reference.curve
+    if curve is not None and not (curve.times[0] <= scene.duration and curve.times[-1] >= 0.0):
+        raise SceneError(
+            f"the reference {reference.source!r} is from t = {curve.times[0]:g} to "
+            f"{curve.times[-1]:g} s, and the scene from 0 to {scene.duration:g} s; give times in "
+            "seconds"
+        )
+    return reference
 
 
 def _columns(scene: Scene) -> Sequence[str]:

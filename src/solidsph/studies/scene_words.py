@@ -38,7 +38,7 @@ def changed(scene: Scene, name: str, value: Any) -> Scene:
 
 def is_word(name: str) -> bool:
     """Whether `changed` may know the name: what has a dot is looked up in a scene."""
-    return name in WORDS or "." in name
+    return name in WORDS or "." in name or is_key(name)
 
 
 def named(scene: Scene) -> frozenset[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from math import ceil, sqrt
+from numbers import Real
 
 import numpy as np
 
@@ -27,7 +28,7 @@ def check_dimensions(shapes: Mapping[str, Shape], cover: float | None) -> Iterat
         return
     d = next(iter(dimensions.values()))
     least = sqrt(d)
-    if cover is not None and 0.0 < cover <= least:
+    if isinstance(cover, Real) and 0.0 < cover <= least:
         yield (
             f"cover = {cover:.6g} is too small in {d}D: a particle must reach its diagonal "
             f"neighbours, {least:.4g} spacings away; use at least {ceil(10 * least + 5) / 10:g}"

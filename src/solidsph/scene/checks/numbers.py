@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import isfinite
+from numbers import Integral, Real
 from typing import Any
 
 import attrs
@@ -31,17 +32,22 @@ def _motion(scene: SceneData) -> Iterator[str]:
         ("time_step_factor", scene.time_step_factor, "fractions of the critical step"),
         ("time_step", scene.time_step, "s"),
     ):
-        if value is not None and not (isfinite(value) and value > 0.0):
-            yield f"{name} must be positive and finite, got {value}; give it in {unit}"
-    if scene.cover is not None and isfinite(scene.cover) and scene.cover > MOST_COVER:
+        if value is not None and not (_is_number(value) and isfinite(value) and value > 0.0):
+            yield f"{name} must be positive and finite, got {value!r}; give it in {unit}"
+    cover: Any = scene.cover
+    if _is_number(cover) and isfinite(cover) and cover > MOST_COVER:
         yield (
-            f"cover must not exceed {MOST_COVER:g}, got {scene.cover:.6g}; it is in particle "
+            f"cover must not exceed {MOST_COVER:g}, got {cover:.6g}; it is in particle "
             "spacings, usually 3"
         )
-    if scene.time_step_factor > 1.0:
-        yield f"time_step_factor must not exceed 1, got {scene.time_step_factor}; 0.7 is usual"
-    if scene.outputs < 1:
-        yield f"outputs must be at least 1, got {scene.outputs}; the last state is always recorded"
+    factor: Any = scene.time_step_factor
+    if _is_number(factor) and factor > 1.0:
+        yield f"time_step_factor must not exceed 1, got {factor}; 0.7 is usual"
+    outputs: Any = scene.outputs
+    if isinstance(outputs, bool) or not isinstance(outputs, Integral):
+        yield f"outputs must be a whole number, got {outputs!r}; it is how many states to record"
+    elif outputs < 1:
+        yield f"outputs must be at least 1, got {outputs}; the last state is always recorded"
     tolerance: Any = scene.energy_tolerance
     if tolerance != OFF and not (_is_number(tolerance) and isfinite(tolerance) and tolerance > 0.0):
         yield (
@@ -88,4 +94,4 @@ def _whole_number(name: str, value: Any, least: int) -> Iterator[str]:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    return isinstance(value, Real) and not isinstance(value, bool)
