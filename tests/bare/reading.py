@@ -13,8 +13,9 @@ from solidsph.maths.arrays import Array
 from tests.bare.scene import Fields
 
 # The fit takes what lies within so many spacings of a point, and at least twice as many particles
-# as it has coefficients: at corners the former are too few.
-_REACH = 3.0
+# as it has coefficients: at corners the former are too few. Beside a flat face the fourth layer is
+# up to 3 spacings away, and a cubic field needs several of its particles.
+_REACH = 3.6
 _LEAST = 2
 
 # Of the Gaussian, in spacings. With 1, stresses along an edge that bends around a hole of 4
@@ -40,6 +41,7 @@ def fitted(
     *,
     degree: int = _DEGREE,
     width: float = _WIDTH,
+    reach: float = _REACH,
 ) -> Array:
     """Moving least squares of a `degree`, weighed by a Gaussian of a `width` in spacings."""
     tree, (n, d) = cKDTree(X), X.shape
@@ -50,7 +52,7 @@ def fitted(
         for chosen in combinations_with_replacement(range(d), order)
     ]
     rows = []
-    for point, near in zip(points, tree.query_ball_point(points, _REACH * spacing), strict=True):
+    for point, near in zip(points, tree.query_ball_point(points, reach * spacing), strict=True):
         chosen = near if len(near) >= least else tree.query(point, k=least)[1]
         offsets = (X[chosen] - point) / spacing
         squares = np.sum(offsets**2, axis=1) / width**2
@@ -75,7 +77,7 @@ def zigzag(rest: Fields, values: Array) -> float:
     fitted to it and its neighbours: where values alternate by a, they differ by 2 a. A linear
     field would count the curvature of the solution as well.
     """
-    smooth = fitted(rest.places, rest.spacing, values, rest.places, degree=2, width=1.0)
+    smooth = fitted(rest.places, rest.spacing, values, rest.places, degree=2, width=1.0, reach=3.0)
     return float(2.0 * np.sqrt(np.mean((values - smooth) ** 2)) / np.ptp(values))
 
 

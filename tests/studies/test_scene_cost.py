@@ -271,6 +271,7 @@ def test_a_run_to_an_accuracy(tmp_path: Path) -> None:
         (("cost", "waves.toml", "--axis", "spacing=0.125,0.0625"), "needs 3 spacings"),
         (("cost", "waves.toml", "--of", STRESS, "--reference", "late.csv"), "from t = 7 to 8 s"),
         (("cost", "two.toml", "--axis", "body.other.spacing=0.2,0.1,0.05"), "all bodies together"),
+        (("cost", "waves.toml", "--axis", "material.density=1,2"), "what is simulated, not how"),
         (("cost", "waves.toml", "--set", "colour=red"), "no such word of a scene"),
         (("cost", "csm1", "--of", "tip"), "are for a scene"),
         (("run", "waves.toml", "--of", STRESS), "add --accuracy"),

@@ -24,6 +24,7 @@ from solidsph.studies.refine import refine
 from solidsph.studies.refinement import LEAST, judged, limits, needs_estimate
 from solidsph.studies.runner import Runner
 from solidsph.studies.scene_case import SPACING, SceneCase
+from solidsph.studies.scene_words import is_of_the_scheme
 from solidsph.studies.search import Goal, SearchResult, Settings, own_scheme, search
 from solidsph.studies.sweep import StatusCallback, ignore_status, sweep
 from solidsph.studies.task import Task
@@ -185,4 +186,11 @@ def _priced(case: Case | Scene | str, axes: Axes | None) -> tuple[Case, Axes]:
         for value in values:
             for scene in with_settings(priced, {axis: value}).scenes().values():
                 check_parts(scene, f"{axis} = {value!r}")
+        unjudged = priced.scene if isinstance(priced, SceneCase) and not priced.references else None
+        if unjudged is not None and not is_of_the_scheme(unjudged, axis):
+            raise SceneError(
+                f"axis {axis!r} says what is simulated, not how: results with different values of "
+                "it tend to different limits, and errors cannot be estimated from one. Set a value "
+                "by --set, or give a --reference"
+            )
     return priced, axes

@@ -32,7 +32,7 @@ class Limit:
         """Estimated error of a value, relative to the scale.
 
         Results of one scheme err together, so that for them the limit counts as less uncertain than
-        it is: by less than the error of the finest value. For results of others that error is added.
+        it is, by less than the error of the finest value. For those of others that error is added.
 
         Args:
             value: of the quantity.

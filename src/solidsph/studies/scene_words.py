@@ -41,6 +41,33 @@ def is_word(name: str) -> bool:
     return name in WORDS or "." in name or is_key(name)
 
 
+# Keys of a scene file that say how it is simulated, not what.
+_HOW = ("kernel.", "formulation.", "integrator.", "statics.")
+_OF_A_BODY = ("spacing", "discretisation")
+_NUMERICAL = ("artificial-viscosity", _CONTROL)
+_WHAT = ("material", "duration", "outputs")  # words that are no part of the scheme
+
+
+def is_of_the_scheme(scene: Scene, name: str) -> bool:
+    """Whether a word or a key says how `scene` is simulated, so that any value has the same limit.
+
+    Its loads, materials and shapes say what is simulated.
+    """
+    if name in WORDS:
+        return name not in _WHAT
+    parts = name.split(".")
+    if parts[0] == "body":
+        return len(parts) > 2 and parts[2] in _OF_A_BODY
+    if parts[0] == "effect":
+        types = {
+            label: _table("effects", effect.part)["type"]
+            for effect in scene.effects
+            for label in (effect.label, _table("effects", effect.part)["type"])
+        }
+        return types.get(parts[1]) in _NUMERICAL
+    return name.startswith(_HOW) or parts[0] in _NUMERICAL
+
+
 def named(scene: Scene) -> frozenset[str]:
     """Words of the scheme that a scene states by itself, such as its gradient.
 
