@@ -29,8 +29,8 @@ from solidsph.results.layout import (
     unpadded,
 )
 from solidsph.results.layout_checks import Tree, check_first, check_rest, check_values
+from solidsph.results.recorded import DISPLACEMENT
 from solidsph.results.time_series import TimeSeries
-from solidsph.system import html
 
 if TYPE_CHECKING:
     import pandas
@@ -40,8 +40,6 @@ if TYPE_CHECKING:
     from solidsph.probes.values import Values
 
 T = TypeVar("T")
-
-DISPLACEMENT = "displacement"
 
 ALL = slice(None)
 
@@ -220,7 +218,7 @@ class Record:
         """
         from solidsph.results.tables import history_table  # loaded only when asked for
 
-        return history_table(self.times, self.history)
+        return history_table(self)
 
     def to_xarray(
         self, fields: Sequence[str] | None = None, outputs: slice = ALL
@@ -236,19 +234,7 @@ class Record:
         """
         from solidsph.results.tables import dataset  # loaded only when asked for
 
-        names = self.field_names if fields is None else fields
-        return dataset(
-            self.particles,
-            self.times,
-            {"position": self.positions, **{name: self.field(name) for name in names}},
-            self.history,
-            outputs,
-            {
-                "title": self.path.stem,
-                "source": f"solidsph {self.versions.get('solidsph', '')}".strip(),
-                "outcome": self.outcome,
-            },
-        )
+        return dataset(self, fields, outputs)
 
     def plot(self, what: str = "motion", field: str = "cauchy_stress") -> Figure:
         """A picture: "motion", "energy" or "probes"; see `solidsph.results.pictures.figure`.
@@ -279,24 +265,9 @@ class Record:
 
     def _repr_html_(self) -> str:
         """Table for notebooks."""
-        times = self.times
-        until = f"{times[0]:.5g} to {times[-1]:.5g}" if len(times) else ""
-        known = {
-            "outcome": self.outcome,
-            "outputs": self.count,
-            "t [s]": until,
-            "particles": self.particles.count,
-            "fields": ", ".join([DISPLACEMENT, *self.field_names]),
-            "notes": "; ".join(self.notes) or None,
-        }
-        final = {name: float(values[-1]) for name, values in self.history.items() if len(values)}
-        bars = {name: str(bar) for name, bar in self.error_bars.items()}
-        return (
-            html.heading(f"Record {self.path}")
-            + html.of_values({name: value for name, value in known.items() if value is not None})
-            + (html.heading("at the end") + html.of_values(final) if final else "")
-            + (html.heading("with error bars") + html.of_values(bars) if bars else "")
-        )
+        from solidsph.results.tables import overview
+
+        return overview(self)
 
     def at(self, points: ArrayLike, output: int = -1, *, body: str | None = None) -> Values:
         """Displacement, velocity, F and stress at any points of the undeformed bodies.

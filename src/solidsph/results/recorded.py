@@ -1,8 +1,9 @@
-"""Recorded: what pictures and views need of a record."""
+"""Recorded: what pictures, views and tables need of a record."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Protocol
 
 from solidsph.maths.arrays import Array
@@ -10,9 +11,32 @@ from solidsph.model.particles import Particles
 from solidsph.results.error_bars import ErrorBar
 from solidsph.results.time_series import TimeSeries
 
+DISPLACEMENT = "displacement"
+"""Field of every record, though none holds it."""
+
 
 class Recorded(Protocol):
-    """A run that can be drawn, such as a `Record`."""
+    """A run that can be shown, such as a `Record`."""
+
+    @property
+    def path(self) -> Path:
+        """Its file."""
+
+    @property
+    def outcome(self) -> str:
+        """How it ended."""
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What happened to it."""
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """Versions of the software that produced it, by its name."""
+
+    @property
+    def field_names(self) -> Sequence[str]:
+        """The fields that each output holds."""
 
     @property
     def scene(self) -> str:

@@ -1,71 +1,66 @@
-"""Records as tables of pandas and datasets of xarray."""
+"""Records as tables of pandas, datasets of xarray, and an overview for notebooks."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from solidsph.errors import RecordError
-from solidsph.maths.arrays import Array
-from solidsph.model.particles import Particles
 from solidsph.model.regions import AXES
 from solidsph.results.output_fields import split_unit
-from solidsph.results.time_series import TimeSeries
+from solidsph.results.recorded import DISPLACEMENT, Recorded
+from solidsph.system import html
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
+ALL = slice(None)
 
-def history_table(times: Array, history: Mapping[str, Array]) -> pandas.DataFrame:
+
+def history_table(record: Recorded) -> pandas.DataFrame:
     """The history, one row an output, over the time [s].
 
     Raises:
         RecordError: pandas is not installed.
     """
-    made: Any = _library("pandas").DataFrame(dict(history), index=times)
+    made: Any = _library("pandas").DataFrame(dict(record.history), index=record.times)
     made.index.name = "time [s]"
     table: pandas.DataFrame = made
     return table
 
 
 def dataset(
-    particles: Particles,
-    times: Array,
-    fields: Mapping[str, TimeSeries],
-    history: Mapping[str, Array],
-    outputs: slice,
-    about: Mapping[str, str],
+    record: Recorded, fields: Sequence[str] | None = None, outputs: slice = ALL
 ) -> xarray.Dataset:
     """Fields over outputs and particles, and the history over outputs, with units.
 
     Args:
-        particles: reference data.
-        times: of all outputs (steps,) [s].
-        fields: by name.
-        history: column -> (steps,) values.
+        record: to be read.
+        fields: names of those wanted; all that the record holds if None.
         outputs: those that are wanted.
-        about: attributes of the whole.
 
     Raises:
-        RecordError: xarray is not installed.
+        RecordError: xarray is not installed, or there is no such field.
     """
-    d = particles.dimension
+    particles, d = record.particles, record.dimension
+    names = record.field_names if fields is None else fields
+    wanted = {"position": record.positions, **{name: record.field(name) for name in names}}
     data: dict[str, Any] = {}
-    for name, series in fields.items():
+    for name, series in wanted.items():
         data[name] = (_dims(series.shape[2:]), series[outputs], _named(name, series.unit))
-    for column, values in history.items():
+    for column, values in record.history.items():
         quantity, unit = split_unit(column)
         data[_variable(quantity)] = ("time", values[outputs], _named(quantity, unit))
     bodies = np.empty(particles.count, dtype=object)
     for body, place in particles.bodies.items():
         bodies[place] = body
     coordinates: dict[str, Any] = {
-        "time": ("time", times[outputs], {**_named("time", "s"), "standard_name": "time"}),
+        "time": ("time", record.times[outputs], {**_named("time", "s"), "standard_name": "time"}),
         "axis": ("axis", list(AXES[:d])),
         "body": ("particle", bodies.astype(str)),
         "volume": ("particle", particles.volumes, _named("reference volume", f"m{d}")),
@@ -79,9 +74,37 @@ def dataset(
     for tag, mask in particles.tags.items():
         coordinates[_variable(f"tag {tag}")] = ("particle", mask)
     made: xarray.Dataset = _library("xarray").Dataset(
-        data, coords=coordinates, attrs={"Conventions": "CF-1.11", **about}
+        data,
+        coords=coordinates,
+        attrs={
+            "Conventions": "CF-1.11",
+            "title": record.path.stem,
+            "source": f"solidsph {record.versions.get('solidsph', '')}".strip(),
+            "outcome": record.outcome,
+        },
     )
     return made
+
+
+def overview(record: Recorded) -> str:
+    """HTML for notebooks: what the record holds, and its numbers at the end."""
+    times = record.times
+    known = {
+        "outcome": record.outcome,
+        "outputs": record.count,
+        "t [s]": f"{times[0]:.5g} to {times[-1]:.5g}" if len(times) else "",
+        "particles": record.particles.count,
+        "fields": ", ".join(dict.fromkeys([DISPLACEMENT, *record.field_names])),
+        **({"notes": "; ".join(record.notes)} if record.notes else {}),
+    }
+    final = {name: float(values[-1]) for name, values in record.history.items() if len(values)}
+    bars = {name: str(bar) for name, bar in record.error_bars.items()}
+    return (
+        html.heading(f"Record {record.path}")
+        + html.of_values(known)
+        + (html.heading("at the end") + html.of_values(final) if final else "")
+        + (html.heading("with error bars") + html.of_values(bars) if bars else "")
+    )
 
 
 def _variable(quantity: str) -> str:
