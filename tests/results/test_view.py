@@ -68,6 +68,9 @@ def test_what_cannot_be_shown_is_told(path: Path, monkeypatch: pytest.MonkeyPatc
     done = solidsph("view", str(path), "--field", "colour", "--picture", "a.png", cwd=path.parent)
     assert done.returncode == 2
     assert "no field 'colour'" in done.stderr
+    done = solidsph("view", str(path), "--factor", "nan", "--picture", "a.png", cwd=path.parent)
+    assert done.returncode == 2
+    assert "times nan" in done.stderr
     done = solidsph("view", str(path), "--picture", "a.tga", cwd=path.parent)
     assert (done.returncode, "ends in .png" in done.stderr) == (2, True)
 

@@ -179,6 +179,12 @@ def test_a_scene_that_says_what_it_should_be(tmp_path: Path) -> None:
     assert "beside the references" in done.stdout
 
 
+def test_a_column_may_have_several_references(tmp_path: Path) -> None:
+    case = SceneCase.of(SCENE, [], [f"{STRESS}={TRUTH!r}", f"{STRESS}={2.0 * TRUTH!r}"])
+    made = frontier(case, {"spacing": (0.125,)}, inline(tmp_path))
+    assert made.points[0].error == pytest.approx(0.5, abs=0.05)  # the worst counts
+
+
 def test_the_command_on_a_scene(tmp_path: Path) -> None:
     (tmp_path / "waves.toml").write_text(SCENE.to_toml())
     done = solidsph("cost", "waves.toml", "--of", STRESS, "--json", cwd=tmp_path)

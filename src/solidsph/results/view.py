@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from math import isfinite
 from pathlib import Path
 from typing import Any, final
 
@@ -174,8 +175,11 @@ def view(
         picture: a file to draw instead of opening a window.
 
     Raises:
-        RecordError: PyVista is not installed, or the record has no output or no such field.
+        RecordError: PyVista is not installed, the factor is no number, or the record has no output
+            or no such field.
     """
+    if not isfinite(factor):
+        raise RecordError(f"displacements cannot be shown times {factor}; give a number such as 10")
     if not record.count:
         raise RecordError("the record holds no output yet, so there is nothing to show")
     output = record.count - 1 if time is None else int(np.abs(record.times - time).argmin())

@@ -110,23 +110,29 @@ class SceneCase(Case):
 
     def measure(self, records: Mapping[str, Record]) -> Sequence[Measurement]:
         record = records[_NAME]
-        known = {reference.quantity: reference for reference in self.references}
+        known = {reference.quantity for reference in self.references}
         return [
-            known[quantity].measurement(record)
-            if quantity in known
-            else Measurement(
-                quantity=quantity.name,
-                value=quantity.value(record),
-                unit=quantity.unit,
-                scale=quantity.scale(record),
-            )
-            for quantity in self.quantities
+            *(reference.measurement(record) for reference in self.references),
+            *(
+                _without_reference(quantity, record)
+                for quantity in self.quantities
+                if quantity not in known
+            ),
         ]
 
     def accuracy(self, measurements: Sequence[Measurement]) -> Measurement:
         """The measurement with the largest error; the first if none has a reference."""
         errors = [m for m in measurements if m.error is not None]
         return max(errors, key=lambda m: abs(m.error or 0.0)) if errors else measurements[0]
+
+
+def _without_reference(quantity: Quantity, record: Record) -> Measurement:
+    return Measurement(
+        quantity=quantity.name,
+        value=quantity.value(record),
+        unit=quantity.unit,
+        scale=quantity.scale(record),
+    )
 
 
 def references_of(
