@@ -42,6 +42,7 @@ from solidsph.simulation import Simulation
 from solidsph.statics import critical_step
 from solidsph.statics.freedoms import freedoms
 from solidsph.studies.case import Case
+from solidsph.studies.part_values import named_parts
 
 Facts = dict[str, Any]
 
@@ -236,21 +237,13 @@ def _on_paper(scene: Scene, prediction: Prediction) -> Facts:
 
 
 def _named_parts(scene: Scene) -> tuple[registry.Entry, ...]:
-    """The parts that a scene and its scheme name, without those inside them."""
-    scene = completed(scene)
-    named: list[tuple[str, Any]] = [
-        ("kernels", scene.kernel),
-        ("formulations", scene.formulation),
-        ("integrators", scene.integrator),
-        *(("boundaries", boundary.part) for boundary in scene.boundaries),
-        *(("effects", effect.part) for effect in scene.effects),
+    """The parts that a scene and its scheme name, as those of a built scene are told."""
+    found = [
+        registry.entry_of(kind, construct(kind, part))
+        for kind, part in named_parts(completed(scene))
+        if kind != "engines"
     ]
-    for body in scene.bodies.values():
-        material = body.material if body.material is not None else scene.material
-        named += [("shapes", body.shape), ("discretisations", body.discretisation)]
-        named += [("materials", material)]
-    parts = [(kind, construct(kind, part)) for kind, part in named]
-    return tuple(dict.fromkeys(registry.entry_of(kind, part) for kind, part in parts))
+    return tuple(dict.fromkeys(found))
 
 
 def _parts(scene: Scene, entries: tuple[registry.Entry, ...]) -> list[Facts]:

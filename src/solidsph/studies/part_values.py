@@ -22,7 +22,7 @@ def check_parts(scene: Scene, what: str) -> None:
         SceneError: a part is unknown or has wrong parameters, or a number is wrong.
     """
     try:
-        for kind, part in _named(scene):
+        for kind, part in named_parts(scene):
             construct(kind, part)
     except SceneError as cause:
         raise SceneError(f"{what}: {cause}") from None
@@ -30,7 +30,8 @@ def check_parts(scene: Scene, what: str) -> None:
         raise SceneError(f"{what}: {problem}")
 
 
-def _named(scene: Scene) -> Iterator[tuple[str, PartLike]]:
+def named_parts(scene: Scene) -> Iterator[tuple[str, PartLike]]:
+    """Kind and description of every part that a scene names, without those inside them."""
     several = [("boundaries", scene.boundaries), ("effects", scene.effects)]
     parts: list[tuple[str, PartLike | None]] = [
         ("kernels", scene.kernel),
