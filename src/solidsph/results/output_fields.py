@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -64,6 +64,15 @@ def split_unit(name: str) -> tuple[str, str]:
     """Quantity and unit of "quantity [unit]"."""
     quantity, _, unit = name.rpartition(" [")
     return quantity, unit.rstrip("]")
+
+
+# Where an extreme is jumps from one sample to the next, so that no curve and no limit shows it.
+_PLACE = " maximum at "
+
+
+def of_probe(label: str, columns: Iterable[str]) -> Iterator[str]:
+    """Columns of the probe of this label, but for the places of extremes."""
+    return (c for c in columns if c.startswith(f"{label} ") and not c.startswith(label + _PLACE))
 
 
 def name_clashes(at_rest: Observation, terms: Sequence[Term]) -> Iterator[str]:

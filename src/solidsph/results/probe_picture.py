@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solidsph.errors import RecordError
+from solidsph.results.output_fields import of_probe
 from solidsph.results.recorded import Recorded
 
 _STYLES = ("-", "--", "-.", ":")
-_AT_PLACE = " maximum at "
 
 
 def draw_probes(record: Recorded) -> Figure:
@@ -46,12 +46,9 @@ def probe_columns(record: Recorded) -> Mapping[str, Sequence[str]]:
     except tomllib.TOMLDecodeError:  # a scene composed in Python
         probes = []
     columns: dict[str, list[str]] = {}
-    for name, unit in record.history_units.items():
-        for probe in probes:
-            label = str(probe.get("label"))
-            if name.startswith(f"{label} ") and not name.startswith(label + _AT_PLACE):
-                columns.setdefault(unit, []).append(name)
-                break
+    found = [name for probe in probes for name in of_probe(probe["label"], record.history_units)]
+    for name in dict.fromkeys(found):  # a label may begin with another
+        columns.setdefault(record.history_units[name], []).append(name)
     return columns
 
 

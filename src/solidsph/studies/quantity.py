@@ -11,7 +11,7 @@ import numpy as np
 
 from solidsph.errors import SceneError
 from solidsph.maths.arrays import Array
-from solidsph.results.output_fields import history, split_unit
+from solidsph.results.output_fields import history, of_probe, split_unit
 from solidsph.results.record import Record
 from solidsph.run.built_scene import BuiltScene
 from solidsph.scene.scene import Scene
@@ -47,9 +47,6 @@ REDUCTIONS: Mapping[str, Callable[[Array, Array], float]] = {
 }
 """What makes a number of a column: the last value, the one of the largest magnitude with its sign,
 the mean over time."""
-
-# Where an extreme is jumps from one sample to the next, so that no refinement settles it.
-_PLACE = " maximum at "
 
 
 @final
@@ -124,7 +121,7 @@ def quantities(scene: Scene, columns: Sequence[str], wanted: Sequence[str] = ())
     labels = [probe.label or "" for probe in scene.probes]
     usual = ("final",) if scene.statics is not None else ("final", "peak")
     if not wanted:
-        wanted = [label for label in labels if list(_of_probe(label, columns))]
+        wanted = [label for label in labels if list(of_probe(label, columns))]
         if not wanted:
             raise SceneError(
                 "the scene has no [[probe]], so nothing to be accurate about; add one, or name a "
@@ -167,7 +164,7 @@ def _chosen(
         choices.append((rest, (first,)))
     for name, reductions in choices:
         exact = [column for column in columns if name in (column, split_unit(column)[0])]
-        names = exact or (list(_of_probe(name, columns)) if name in labels else [])
+        names = exact or (list(of_probe(name, columns)) if name in labels else [])
         if names:
             return names, reductions
     known = [split_unit(column)[0] for column in columns]
@@ -176,16 +173,11 @@ def _chosen(
     raise SceneError(f"the history has no column {text!r}; {hint}")
 
 
-def _of_probe(label: str, columns: Sequence[str]) -> Iterator[str]:
-    """Columns of a probe, but for the places of extremes."""
-    return (c for c in columns if c.startswith(f"{label} ") and not c.startswith(label + _PLACE))
-
-
 def _beside(column: str, labels: Sequence[str], columns: Sequence[str]) -> Iterator[str]:
     """Columns of the probe of `column` that have its unit; itself if it is of none."""
     unit = split_unit(column)[1]
     for label in labels:
-        mine = list(_of_probe(label, columns))
+        mine = list(of_probe(label, columns))
         if column in mine:
             yield from (name for name in mine if split_unit(name)[1] == unit)
             return
