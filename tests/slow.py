@@ -40,4 +40,17 @@ SLOW = (
     "tests/studies/test_certificate.py::test_every_combination_has_a_certificate_or_is_refused",
     # A full disk late in a run, beside one early in it.
     "tests/results/test_resume.py::test_what_a_full_disk_stops_goes_on[900000-",
+    # What takes long to compile, beside what does not: other laws, the same in fewer dimensions.
+    "tests/engines/test_merged_loads.py::test_beside_a_material_that_remembers[effect0]",
+    "tests/engines/test_time_loop.py::test_every_effect[hourglass-control]",
+    "tests/engines/test_block_law.py::"
+    "test_lanes_know_all_that_built_in_laws_are_made_of[holzapfel-ogden]",
+    "tests/engines/test_block_law.py::"
+    "test_lanes_know_all_that_built_in_laws_are_made_of[j2-plasticity]",
+    "tests/engines/test_block_law.py::"
+    "test_lanes_know_all_that_built_in_laws_are_made_of[johnson-cook]",
+    "tests/plugins/materials/test_history.py::test_every_engine_remembers_the_same[2-johnson-cook]",
+    "tests/plugins/effects/test_contact.py::test_momenta_stay_and_the_ledger_closes[0.0-3]",
+    "tests/statics/test_lowest_modes.py::"
+    "test_frequencies_by_iteration_are_those_of_a_factorisation[0.3-3]",
 )

@@ -23,7 +23,7 @@ def with_effects(builder: SceneBuilder, *effects: tuple[str, dict[str, float]]) 
 
 @pytest.mark.parametrize("effect", [HOURGLASS, DASHPOT])
 def test_beside_a_material_that_remembers(effect: tuple[str, dict[str, float]]) -> None:
-    law = example_part("materials", "j2-plasticity")
+    law = example_part("materials", "viscoelastic")
     assert_agree(with_effects(box(1, 24).material(law), effect))
 
 

@@ -14,13 +14,14 @@ from typing import Any
 import pytest
 
 from solidsph.registry import registry
-from tests.helpers.absent_effects import BUSY, EVERY, LEAKS
+from tests.helpers.absent_effects import BUSY, LEAKS
 
 ROOT = Path(__file__).parents[2]
 
-EFFECTS = registry.names("effects")
+EFFECTS = tuple(registry.names("effects"))
+OTHERS = tuple(name for name in EFFECTS if name not in BUSY)
 
-Question = tuple[str | None, str | None, str]  # effect that is gone, leak, engine
+Question = tuple[Sequence[str], str | None, str]  # effects that are gone, leak, engine
 
 
 def answers(questions: Sequence[Question]) -> list[dict[str, Any]]:
@@ -40,16 +41,16 @@ def answers(questions: Sequence[Question]) -> list[dict[str, Any]]:
 
 
 @cache
-def by_effect() -> dict[str | None, dict[str, Any]]:
-    """What is measured where all effects are installed, under None, and where one is not."""
-    gone: list[str | None] = [None, *EFFECTS]
-    return dict(zip(gone, answers([(one, None, "matrix") for one in gone]), strict=True))
+def measured() -> dict[tuple[str, ...], dict[str, Any]]:
+    """What is measured where some effects are not installed."""
+    gone: list[tuple[str, ...]] = [(), EFFECTS, OTHERS]
+    return dict(zip(gone, answers([(some, None, "matrix") for some in gone]), strict=True))
 
 
 @cache
 def by_leak() -> dict[str, set[str]]:
     """What differs for an effect that nobody names, by how the core leaks."""
-    found = answers([(gone, leak, "matrix") for leak in LEAKS for gone in (None, EFFECTS[-1])])
+    found = answers([(gone, leak, "matrix") for leak in LEAKS for gone in ((), EFFECTS[-1:])])
     pairs = zip(found[::2], found[1::2], strict=True)
     return {leak: differences(*pair) for leak, pair in zip(LEAKS, pairs, strict=True)}
 
@@ -64,20 +65,28 @@ def differences(here: dict[str, Any], gone: dict[str, Any]) -> set[str]:
     }
 
 
+@pytest.mark.parametrize(("gone", "scene"), [(EFFECTS, "bare"), (OTHERS, "busy")])
+def test_a_scene_is_as_if_what_it_does_not_name_did_not_exist(
+    gone: tuple[str, ...], scene: str
+) -> None:
+    here, without = measured()[()], measured()[gone]
+    assert scene in without
+    assert differences(here, without) == set()
+    assert here["bare"]["instructions"] > 1000  # something was counted
+
+
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_a_scene_without_it_is_as_if_it_did_not_exist(effect: str) -> None:
-    here, gone = by_effect()[None], by_effect()[effect]
-    assert differences(here, gone) == set()
+def test_a_scene_without_it_does_not_import_it(effect: str) -> None:
+    here = measured()[()]
     module = registry.find("effects", effect).target.partition(":")[0]
     assert module not in here["bare"]["modules"]
     if effect not in BUSY:
         assert module not in here["busy"]["modules"]
-    assert here["bare"]["instructions"] > 1000  # something was counted
 
 
 def test_what_a_scene_does_name_shows() -> None:
     """The measures do tell an effect that is there from one that is not."""
-    bare, busy = (by_effect()[None][scene] for scene in ("bare", "busy"))
+    bare, busy = (measured()[()][scene] for scene in ("bare", "busy"))
     assert {what for what in bare if bare[what] != busy[what]} >= {
         "results",
         "bytes of arrays",
@@ -103,7 +112,7 @@ def test_a_core_that_leaks_is_found_out(leak: str, shows: str) -> None:
 @pytest.mark.validation
 def test_the_compiled_loop_has_no_code_for_any_of_them() -> None:
     """As many lines of code, and no load: the chain of loads is unrolled as it compiles."""
-    here, gone = answers([(None, None, "compiled"), (EVERY, None, "compiled")])
+    here, gone = answers([((), None, "compiled"), (EFFECTS, None, "compiled")])
     assert differences(here, gone) == set()
     assert here["bare"]["loads"] == 1  # the traction
     assert here["bare"]["lines of code"] > 1000

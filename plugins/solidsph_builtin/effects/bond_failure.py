@@ -8,7 +8,6 @@ from typing import Any, ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.engines.array_law import ArrayLaw
 from solidsph.errors import SceneError
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
@@ -20,7 +19,8 @@ from solidsph.maths.arrays import Array, Indices
 from solidsph.model.regions import Where
 from solidsph.registry.parameters import check_positive, number
 from solidsph.run.cfl_step import lattice_frequency
-from solidsph_builtin.effects._breaking import Bonds, BreakingForces
+from solidsph_builtin.effects._bonds import Bonds
+from solidsph_builtin.effects._breaking import BreakingForces
 from solidsph_builtin.effects._gradients import in_the_reference
 
 # Increase of the highest frequency of a lattice by cracks, relative: one-sided corrections are
@@ -114,8 +114,7 @@ class _Cracks(FieldTerm, Load, ForcesModifier):
                 "bond-failure: it is named twice, and a bond fails once; give it one "
                 "critical_stretch, and places by `where`"
             )
-        laws = [ArrayLaw(bonds.body) for bonds in self.bonds]
-        return BreakingForces(internal, self.bonds, laws, stress_terms)
+        return BreakingForces(internal, self.bonds, stress_terms)
 
     @property
     def arrays(self) -> Mapping[str, int]:

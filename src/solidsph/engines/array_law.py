@@ -48,6 +48,22 @@ def flux(body: Body, H: Tensor) -> Tensor:
     return body.formulation.flux(F, body.material.first_piola(F, body.material.params))
 
 
+def energy_densities(body: Body, gradients: Array, history: Array) -> Array:
+    """Strain energy densities (k,) [J/m^3] of some particles.
+
+    Args:
+        body: the body that they belong to.
+        gradients: their displacement gradients H, (k, d, d).
+        history: their internal variables, (k, j).
+    """
+    material = body.material
+    with np.errstate(all="ignore"):  # as above
+        F = body.formulation.deformation_gradient(components_first(gradients))
+        if isinstance(material, HistoryMaterial):
+            return np.asarray(material.stored(F, tuple(history.T), material.params))
+        return np.asarray(material.energy(F, material.params))
+
+
 def stress_fields(bodies: Sequence[Body], gradients: Array) -> StressFields:
     """Deformation, stress and energy, without history.
 

@@ -44,8 +44,14 @@ def modified(
     for term in terms:
         if isinstance(term, ForcesModifier):
             internal = term.modified(internal, conditions)
-    have_history = any(isinstance(body.material, HistoryMaterial) for body in bodies)
-    if internal.advances_histories or not have_history:
+    return internal if internal.advances_histories else with_histories(internal, bodies, conditions)
+
+
+def with_histories(
+    internal: InternalForces, bodies: Sequence[Body], conditions: Sequence[StressTerm]
+) -> InternalForces:
+    """Internal forces by an engine, which advance the histories of materials that have some."""
+    if not any(isinstance(body.material, HistoryMaterial) for body in bodies):
         return internal
     return HistoryForces(
         internal, tuple(internal.law(body) or ArrayLaw(body) for body in bodies), tuple(conditions)

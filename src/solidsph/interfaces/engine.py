@@ -23,6 +23,7 @@ from solidsph.interfaces.plan import (
     Plan,
     SumMethod,
 )
+from solidsph.interfaces.row_weights import RowWeights
 from solidsph.interfaces.terms import StressTerm
 from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.maths.arrays import Array, Indices
@@ -96,6 +97,16 @@ class InternalForces(ABC):
 
         Args:
             chosen: particles in ascending order, (k,).
+        """
+        return None
+
+    def reweighted(self, changed: Sequence[RowWeights]) -> InternalForces | None:
+        """These forces with other weights of the gradient, and the divergence adjoint to it.
+
+        None, the default, if the engine cannot change its sums.
+
+        Args:
+            changed: rows that take the place of the engine's own, for every body.
         """
         return None
 

@@ -26,6 +26,7 @@ from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.law import Law
 from solidsph.interfaces.plan import BodySize, Compilation, Operations, Plan
+from solidsph.interfaces.row_weights import RowWeights
 from solidsph.interfaces.terms import StressTerm
 from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.maths.arrays import Array, Indices
@@ -187,6 +188,13 @@ class CompiledForces(InternalForces):
         if not only.fused or only.body.particles.ghosts.any():
             return None
         return CompiledForces((only.part(chosen),), ())
+
+    def reweighted(self, changed: Sequence[RowWeights]) -> InternalForces | None:
+        fixed = self._fixed
+        if len(fixed) < len(self.parts) or not all(part.fused for part in fixed):
+            return None
+        parts = [part.reweighted(own) for part, own in zip(fixed, changed, strict=True)]
+        return CompiledForces(parts, self.conditions)
 
     def law(self, body: Body) -> Law | None:
         try:

@@ -1,4 +1,4 @@
-"""The law of a material with history, as one compiled loop over the particles of a body."""
+"""The law of a body as one compiled loop over its particles."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import (
     NotCompilableError,
+    compiled_flux,
     compiled_function,
     numbers,
     numbers_type,
@@ -36,13 +37,16 @@ class CompiledLaw(Law):
 
     @classmethod
     def of(cls, body: Body) -> CompiledLaw:
-        """The law of a body whose material has a history.
+        """The law of a body.
 
         Raises:
-            NotCompilableError: the material has no history, or does not compile.
+            NotCompilableError: it does not compile.
         """
-        d = body.smoothing.dimension
-        return cls(body, _loop(d, history_count(body), history_flux(body)))
+        d, count = body.smoothing.dimension, history_count(body)
+        if count:
+            return cls(body, _loop(d, count, history_flux(body)))
+        law = compiled_flux(body.formulation, body.material, d)
+        return cls(body, _loop(d, count, without_history(law)))
 
     def flux(self, H: Array, history: Array, step: float) -> tuple[Array, Array]:
         n, d, _ = H.shape

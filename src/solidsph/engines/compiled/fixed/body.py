@@ -23,12 +23,14 @@ from solidsph.engines.compiled.fixed.partition import (
     stress_pass,
     thread_count,
 )
+from solidsph.engines.compiled.fixed.replaced_rows import replaced_rows
 from solidsph.engines.compiled.fixed.rows import Rows, compressed
 from solidsph.engines.compiled.fixed.subset_rows import part_of_rows
 from solidsph.engines.compiled.history_law import history_count, stepping_law, without_history
 from solidsph.engines.compiled.pointwise import no_law
 from solidsph.interfaces.body import Body, part_of
 from solidsph.interfaces.plan import Operations, SumMethod, vectors
+from solidsph.interfaces.row_weights import RowWeights
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.neighbours import Pairs
 
@@ -82,6 +84,12 @@ class ReferenceBody:
         return self.of(
             part_of(self.body, chosen), self.law, rows, rows, self.factors[chosen], count
         )
+
+    def reweighted(self, changed: RowWeights) -> ReferenceBody:
+        """A fused body with other weights at some particles."""
+        rows = replaced_rows(self.gradient, changed, self.body.particles.count)
+        count = rows.run_pairs + rows.row_pairs
+        return self.of(self.body, self.law, rows, rows, self.factors, count)
 
     @property
     def precision(self) -> float:

@@ -76,6 +76,7 @@ def spread(context: Any, builder: Any, number: Any, lanes: Lanes) -> Any:
     return builder.shuffle_vector(first, empty, everywhere)
 
 
+@cache
 def register_bytes() -> int:
     """Width of the vector registers of this machine [bytes]."""
     features = binding.get_host_cpu_features()
