@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from solidsph.maths.arrays import Mask
 from solidsph.model.particles import Face, Particles
-from solidsph.results.layout import PARTICLE_ARRAYS, static_fields, tag_name, unpadded
+from solidsph.results.layout import (
+    FORMAT,
+    PARTICLE_ARRAYS,
+    TAGS,
+    static_fields,
+    tag_bits,
+    tag_name,
+    unpadded,
+)
 
 
 def lines(group: Any, name: str) -> tuple[str, ...]:
@@ -43,7 +53,7 @@ def read_particles(run: Any, data: Any, dimension: int) -> Particles:
     arrays["ghosts"] = arrays["ghosts"].astype(np.bool_)
     return Particles(
         **arrays,
-        tags={tag: data[tag_name(tag)][()].astype(np.bool_) for tag in lines(run, "tags")},
+        tags=_tags(lines(run, "tags"), data, int(run.attrs["format"])),
         bodies={
             name: slice(int(start), int(stop))
             for name, (start, stop) in zip(
@@ -52,6 +62,16 @@ def read_particles(run: Any, data: Any, dimension: int) -> Particles:
         },
         faces=dict(_face(run[f"faces/{number}"]) for number in range(len(run.get("faces", ())))),
     )
+
+
+def _tags(names: Sequence[str], data: Any, written: int) -> dict[str, Mask]:
+    """Mask of each tag, from a record of format `written`."""
+    if written < FORMAT:
+        return {tag: data[tag_name(tag)][()].astype(np.bool_) for tag in names}
+    rows = data[TAGS][()]
+    if (rows >> len(names)).any():
+        raise ValueError(f"{data[TAGS].name} has bits of no tag")
+    return {tag: (rows & bit).astype(np.bool_) for tag, bit in tag_bits(names).items()}
 
 
 def _face(group: Any) -> tuple[str, Face]:
