@@ -45,8 +45,10 @@ def _discard_output(stream: IO[str]) -> None:
         os.close(null)
 
 
-# Files and pipes have no width of their own; this one fits the widest table.
-out = _Console(highlight=False, width=None if sys.stdout.isatty() else 170)
+# Files and pipes have no width of their own; this one fits the widest table. COLUMNS sets another.
+_WIDE = None if sys.stdout.isatty() or "COLUMNS" in os.environ else 170
+
+out = _Console(highlight=False, width=_WIDE)
 err = _Console(stderr=True, highlight=False)
 
 
@@ -211,8 +213,8 @@ class SweepObserver:
 
     def __call__(self, status: SweepStatus) -> None:
         point = status.point
-        if point is not None and not point.finished:
-            self._display.console.print(escape(f"{point.label()}: {point.outcome}"))
+        if point is not None and not point.ran:
+            self._display.console.print(escape(f"{point.label()}: {point.failure}"))
         kept = f", {status.kept} from before" if status.kept else ""
         self._display.update(
             self._task,

@@ -49,7 +49,7 @@ Facts = dict[str, Any]
 
 @attrs.frozen
 class _Options(Output):
-    settings: tuple[str, ...] = set_option("the case, or a word or key of the scene")
+    settings: tuple[str, ...] = set_option()
     cluster: tuple[str, ...] = option(
         "Assumption about the cluster on which a scene larger than this machine is priced: "
         "cores, memory [GiB], bandwidth [GB/s], network [GB/s], latency [us], storage [GB/s], "

@@ -30,7 +30,7 @@ def flag(text: str, *names: str) -> Any:
     return option(text, *names, is_flag=True, default=False)
 
 
-def set_option(of: str) -> Any:
+def set_option(of: str = "the case, or a word or key of the scene") -> Any:
     """Field for `--set NAME=VALUE`, of a case, a scene or a part."""
     return option(f"Set a parameter of {of}.", "--set", multiple=True, metavar="NAME=VALUE")
 
@@ -63,6 +63,25 @@ class ProgressOutput(Output):
     def progress(self) -> bool:
         """Whether progress is shown."""
         return not (self.as_json or self.quiet)
+
+
+@attrs.frozen
+class SearchOptions:
+    """Options of every verb that searches for an accuracy."""
+
+    of: tuple[str, ...] = option(
+        "Be accurate in this column of a scene's history, or this probe; before it may stand "
+        "final, peak or mean.  [default: all probes]",
+        "--of",
+        multiple=True,
+        metavar="[peak] NAME",
+    )
+    longest: str = option(
+        "A search runs nothing that is expected to take longer.",
+        default="10min",
+        show_default=True,
+        metavar="TIME",
+    )
 
 
 def option_group(cls: type[Any]) -> Any:

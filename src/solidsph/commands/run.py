@@ -25,8 +25,10 @@ from solidsph.commands.limit_tables import with_warnings
 from solidsph.commands.options import (
     FILE,
     ProgressOutput,
+    SearchOptions,
     flag,
     option,
+    option_group,
     options,
     output_option,
     set_option,
@@ -54,7 +56,7 @@ from solidsph.watch import Finding, run_watched
 
 @attrs.frozen
 class _Options(ProgressOutput):
-    settings: tuple[str, ...] = set_option("the case, or a word or key of the scene")
+    settings: tuple[str, ...] = set_option()
     output: Path | None = output_option(
         "Folder for records and pictures, or for a scene the file of its record (.h5 or .vtkhdf).  "
         "[default: results/NAME]"
@@ -77,19 +79,7 @@ class _Options(ProgressOutput):
         "probe with its error bar.",
         metavar="PERCENT",
     )
-    of: tuple[str, ...] = option(
-        "With --accuracy: of this column of the history or this probe only; before it may stand "
-        "final, peak or mean.",
-        "--of",
-        multiple=True,
-        metavar="[peak] NAME",
-    )
-    longest: str = option(
-        "With --accuracy: run nothing that is expected to take longer.",
-        default="10min",
-        show_default=True,
-        metavar="TIME",
-    )
+    search: SearchOptions = option_group(SearchOptions)
     receipts: bool = flag(
         "Then report what each effect cost and changed, by runs without it at reduced size."
     )
@@ -106,12 +96,13 @@ class _Options(ProgressOutput):
         if not self.beyond_memory:
             check_memory(scene)
 
-    def check_record(self, path: Path) -> None:
-        """Refuse to replace a record that must stay; print which one is replaced."""
+    def check_record(self, path: Path) -> str:
+        """Refuse to replace a record that must stay; tell which one is replaced, if any."""
         check_no_writer(path)
         earlier = check_replaceable(path, overwrite=self.overwrite)
-        if earlier is not None and earlier.count:
-            remark(f"{path} holds {earlier.description}; it is replaced")
+        if earlier is None or not earlier.count:
+            return ""
+        return f"{path} holds {earlier.description}; it is replaced"
 
 
 @click.command()
@@ -130,7 +121,7 @@ def run(target: str, options: _Options) -> None:
     folder = options.output or Path("results") / name_of(target)
     watch = options.watch or options.roll_back
     if isinstance(wanted, Case):
-        if options.accuracy is not None or options.of:
+        if options.accuracy is not None or options.search.of:
             raise SceneError(
                 "--accuracy is for a scene; of a case ask: solidsph cost CASE --accuracy"
             )
@@ -147,7 +138,7 @@ def run(target: str, options: _Options) -> None:
         raise SceneError("--watch is for motions; an equilibrium is tested by itself")
     path = folder if folder.suffix in RECORD_SUFFIXES else folder / "record.h5"
     if options.accuracy is None:
-        if options.of:
+        if options.search.of:
             raise SceneError("--of says what --accuracy is of; add --accuracy, such as 1%")
         _run_scene(target, wanted, path, options)
         return
@@ -156,8 +147,8 @@ def run(target: str, options: _Options) -> None:
         name_of(target),
         wanted,
         options.accuracy,
-        of=options.of,
-        longest=options.longest,
+        of=options.search.of,
+        longest=options.search.longest,
         folder=path.parent / "search",
         shown=options.progress,
     )
@@ -182,13 +173,15 @@ def _run_scene(
     target: str, scene: Scene, path: Path, options: _Options, found: Accurate | None = None
 ) -> None:
     options.check_memory(scene)
-    options.check_record(path)
+    replaced = options.check_record(path)
     known = known_facts()
     known |= {"scene": target, "record": str(path), "warnings": []}
     simulation, build = predictions.build_timed(scene)
     references = references_of(scene, columns_of(simulation)) if scene.references else ()
     advice = advise(simulation)
     known["warnings"] += [warning.line for warning in advice]
+    if replaced:  # said when nothing in the scene is refused any more
+        remark(replaced)
     if not options.as_json:
         _warn(advice)
     predicted = predictions.try_prediction(simulation, build)
@@ -291,7 +284,8 @@ class _Watchdog:
 
 def _run_case(target: str, case: Case, folder: Path, options: _Options) -> None:
     for name in case.scenes():
-        options.check_record(folder / f"{name}.h5")
+        if replaced := options.check_record(folder / f"{name}.h5"):
+            remark(replaced)
     known = known_facts()
     known |= {"case": target, "warnings": {}}
     predicted: dict[str, Prediction | None] = {}
