@@ -26,8 +26,10 @@ from rich.table import Table as RichTable
 
 from solidsph.interfaces.terms import Observation
 from solidsph.run.hooks import implementation
+from solidsph.run.progress import part_done
 from solidsph.simulation import Simulation
 from solidsph.studies.sweep import StatusCallback, SweepStatus
+from solidsph.system.progress_display import time_left
 
 
 class _Console(Console):
@@ -190,10 +192,7 @@ class ProgressObserver:
 
     @implementation
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
-        # By time, not by counting: load steps are halved and doubled on the way.
-        moves = simulation.scene.statics is None
-        end = simulation.steps * simulation.step_size if moves else simulation.scene.duration
-        part = observation.state.time / end
+        part = part_done(simulation, observation)
         self._display.update(self._task, completed=round(part * self._steps))
 
 
@@ -222,17 +221,6 @@ class SweepObserver:
             completed=status.total - status.remaining,
             note=f"{time_left(status.seconds_left)}{kept}",
         )
-
-
-def time_left(seconds: float | None) -> str:
-    """Estimated remaining time in words."""
-    if seconds is None:
-        return "time left not known yet"
-    if seconds < 90.0:
-        return f"about {seconds:.0f} s left"
-    if seconds < 5400.0:
-        return f"about {seconds / 60.0:.0f} min left"
-    return f"about {seconds / 3600.0:.1f} h left"
 
 
 def _longest(texts: Iterable[str]) -> int:

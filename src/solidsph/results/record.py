@@ -249,7 +249,7 @@ class Record:
         *,
         time: float | None = None,
         factor: float = 1.0,
-        picture: Path | None = None,
+        picture: Path | str | None = None,
     ) -> None:
         """Show the run in 3D, or draw a picture of it; see `solidsph.results.view.view`.
 
@@ -259,6 +259,10 @@ class Record:
         from solidsph.results.view import view  # imports the graphics library
 
         view(self, field=field, time=time, factor=factor, picture=picture)
+
+    def __repr__(self) -> str:
+        outputs = f"{self.count} outputs of {self.particles.count} particles"
+        return f"Record({str(self.path)!r}: {self.outcome}, {outputs})"
 
     def _repr_html_(self) -> str:
         """Table for notebooks."""

@@ -63,16 +63,16 @@ class View:
         plotter = self._scene(off_screen=False)
         plotter.add_slider_widget(
             self.to_time,
-            self._span(),
-            self._time(),
+            rng=self._span(),
+            value=self._time(),
             title="time [s]",
             pointa=_TIME[0],
             pointb=_TIME[1],
         )
         plotter.add_slider_widget(
             self.to_factor,
-            (0.0, max(2.0, 2.0 * self.factor)),
-            self.factor,
+            rng=(0.0, max(2.0, 2.0 * self.factor)),
+            value=self.factor,
             title="deformation",
             pointa=_DEFORMATION[0],
             pointb=_DEFORMATION[1],
@@ -162,7 +162,7 @@ def view(
     field: str = "cauchy_stress",
     time: float | None = None,
     factor: float = 1.0,
-    picture: Path | None = None,
+    picture: Path | str | None = None,
 ) -> None:
     """Show a record in a window with sliders for time and deformation, or draw a picture.
 
@@ -183,7 +183,7 @@ def view(
     if not record.count:
         raise RecordError("the record holds no output yet, so there is nothing to show")
     output = record.count - 1 if time is None else int(np.abs(record.times - time).argmin())
-    View(record, field, output, factor).show(picture)
+    View(record, field, output, factor).show(None if picture is None else Path(picture))
 
 
 def _library() -> Any:

@@ -26,7 +26,8 @@ from solidsph.studies.runner import Runner
 from solidsph.studies.scene_case import SPACING, SceneCase
 from solidsph.studies.scene_words import is_of_the_scheme
 from solidsph.studies.search import Goal, SearchResult, Settings, own_scheme, search
-from solidsph.studies.sweep import StatusCallback, ignore_status, sweep
+from solidsph.studies.sweep import StatusCallback, sweep
+from solidsph.studies.sweep_progress import default_watch
 from solidsph.studies.task import Task
 from solidsph.studies.variant import setting_of, with_settings
 
@@ -42,7 +43,7 @@ class SweepSetup:
     runner: Runner = attrs.field(factory=lambda: Processes(1))
     folder: Path | None = None  # of the journal; None keeps nothing
     repeats: int = 1  # of every configuration; times are medians
-    watch: StatusCallback = ignore_status
+    watch: StatusCallback = attrs.field(factory=default_watch)  # in notebooks a display
 
     def points(self, case: Case, grid: Sequence[Settings]) -> Sequence[Point]:
         """Points of `case` with each of these settings; from the journal if it has them."""
