@@ -12,6 +12,8 @@ import pytest
 from nbclient import NotebookClient
 from PIL import Image
 
+from tests.helpers.waiting import HANG
+
 BUILD = """
 from solidsph import Record, Simulation
 from solidsph.studies.cost import SweepSetup, frontier
@@ -71,7 +73,7 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Outputs:
     notebook = nbformat.v4.new_notebook(cells=cells)
     where = {"metadata": {"path": str(tmp_path_factory.mktemp("notebook"))}}
     client = NotebookClient(
-        notebook, timeout=100, kernel_name="python3", resources=where, allow_errors=True
+        notebook, timeout=HANG, kernel_name="python3", resources=where, allow_errors=True
     )
     client.execute()
     shown = {name: cell["outputs"] for name, cell in zip(CELLS, notebook.cells, strict=True)}
