@@ -58,7 +58,7 @@ def test_the_probes_shown_measure_what_is_said(tmp_path, monkeypatch) -> None:
 def test_the_particles_of_a_tag_are_found_as_is_said(tmp_path, monkeypatch) -> None:
     code, _ = blocks("docs/scenes.md", "python")
     monkeypatch.chdir(tmp_path)
-    built = box(2, tags={"low": "Y < 0.4", "left": "X < 0.3"}).build()
+    built = box(2, tags={"near": "X < 0.3", "low": "Y < 0.4"}).build()
     built.run(record="plate.vtkhdf")
     names: dict[str, Any] = {}
     exec(compile(code, "docs/scenes.md", "exec"), names)
