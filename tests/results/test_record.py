@@ -376,6 +376,7 @@ def test_tags_are_bits_of_one_integer(tmp_path: Path) -> None:
     """As many as it has, all of them on one particle and none on another."""
     some = some_particles(3, 2)
     tags = {f"t{k}": np.arange(3) == 1 for k in range(MOST_TAGS)}
+    tags |= {"bar": np.arange(3) < 1}  # the body, which takes no bit
     with opened(tmp_path / "run", attrs.evolve(some, tags=tags)) as writer:
         append(writer, some_step(0, some))
     with Record(tmp_path / "run") as record:
@@ -383,7 +384,9 @@ def test_tags_are_bits_of_one_integer(tmp_path: Path) -> None:
         for name, mask in tags.items():
             np.testing.assert_array_equal(record.particles.tags[name], mask)
     tags["one more"] = tags["t0"]
-    with pytest.raises(RecordError, match=f"at most {MOST_TAGS} tags, and the scene has 63"):
+    with pytest.raises(
+        RecordError, match=f"at most {MOST_TAGS} tags besides those of bodies, and the scene has 63"
+    ):
         opened(tmp_path / "run", attrs.evolve(some, tags=tags))
 
 

@@ -37,10 +37,11 @@ _LARGEST_CHUNK = 2**30  # bytes; HDF5 allows just under 4 GiB
 def check_fields(fields: Sequence[Field], particles: Particles) -> None:
     """Raise RecordError unless a record of these particles can hold these fields."""
     d = particles.dimension
-    if len(particles.tags) > MOST_TAGS:
+    tags = _own_tags(particles)
+    if len(tags) > MOST_TAGS:
         raise RecordError(
-            f"a record holds at most {MOST_TAGS} tags, and the scene has {len(particles.tags)}; "
-            "leave some out"
+            f"a record holds at most {MOST_TAGS} tags besides those of bodies, and the scene has "
+            f"{len(tags)}; leave some out"
         )
     taken = {field.name for field in static_fields(d)}
     for field in fields:
@@ -106,10 +107,10 @@ def _write_grid(file: Any, particles: Particles, fields: Sequence[Field]) -> Non
     arrays["body"] = np.full(n, -1, dtype=np.int32)
     for number, extent in enumerate(particles.bodies.values()):
         arrays["body"][extent] = number
-    bits = tag_bits(particles.tags)
+    bits = tag_bits(_own_tags(particles))
     arrays[TAGS] = np.zeros(n, dtype=np.int64)
-    for tag, mask in particles.tags.items():
-        arrays[TAGS][mask] |= bits[tag]
+    for tag, bit in bits.items():
+        arrays[TAGS][particles.tags[tag]] |= bit
     for field in static_fields(particles.dimension):
         rows = arrays[field.name]
         values = rows.astype(np.uint8) if rows.dtype == np.bool_ else rows
@@ -118,6 +119,19 @@ def _write_grid(file: Any, particles: Particles, fields: Sequence[Field]) -> Non
     names = {tag_name(tag): bit for tag, bit in bits.items()}
     names |= {body_name(body): number for number, body in enumerate(particles.bodies)}
     _write_names(grid, names, shared)
+
+
+def _own_tags(particles: Particles) -> Sequence[str]:
+    """The tags that say more than the numbers of bodies, each of which is a tag, too."""
+
+    def is_body(tag: str) -> bool:
+        place = particles.bodies.get(tag)
+        if place is None:
+            return False
+        mask = particles.tags[tag]
+        return bool(mask[place].all()) and int(mask.sum()) == len(mask[place])
+
+    return [tag for tag in particles.tags if not is_body(tag)]
 
 
 def _write_names(grid: Any, names: Mapping[str, int], shared: Any) -> None:
@@ -151,6 +165,7 @@ def _write_run(file: Any, reference: Reference) -> None:
     run["versions"] = _texts([f"{name} {version}" for name, version in reference.versions.items()])
     run["fields"] = _texts([field.name for field in reference.fields])
     run["tags"] = _texts(list(particles.tags))
+    run["bits"] = _texts(_own_tags(particles))
     run["bodies"] = _texts(list(particles.bodies))
     ranges = [rows.indices(particles.count)[:2] for rows in particles.bodies.values()]
     run["body_ranges"] = np.array(ranges, dtype=np.int64).reshape(-1, 2)

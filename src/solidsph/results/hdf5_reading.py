@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -51,27 +51,35 @@ def read_particles(run: Any, data: Any, dimension: int) -> Particles:
         if field.name in PARTICLE_ARRAYS
     }
     arrays["ghosts"] = arrays["ghosts"].astype(np.bool_)
+    bodies = {
+        name: slice(int(start), int(stop))
+        for name, (start, stop) in zip(lines(run, "bodies"), run["body_ranges"][()], strict=True)
+    }
     return Particles(
         **arrays,
-        tags=_tags(lines(run, "tags"), data, int(run.attrs["format"])),
-        bodies={
-            name: slice(int(start), int(stop))
-            for name, (start, stop) in zip(
-                lines(run, "bodies"), run["body_ranges"][()], strict=True
-            )
-        },
+        tags=dict(_tags(run, data, bodies)),
+        bodies=bodies,
         faces=dict(_face(run[f"faces/{number}"]) for number in range(len(run.get("faces", ())))),
     )
 
 
-def _tags(names: Sequence[str], data: Any, written: int) -> dict[str, Mask]:
-    """Mask of each tag, from a record of format `written`."""
-    if written < FORMAT:
-        return {tag: data[tag_name(tag)][()].astype(np.bool_) for tag in names}
-    rows = data[TAGS][()]
-    if (rows >> len(names)).any():
+def _tags(run: Any, data: Any, bodies: Mapping[str, slice]) -> Iterator[tuple[str, Mask]]:
+    """Every tag and its mask."""
+    names = lines(run, "tags")
+    if int(run.attrs["format"]) < FORMAT:
+        for name in names:
+            yield name, data[tag_name(name)][()].astype(np.bool_)
+        return
+    rows, bits = data[TAGS][()], tag_bits(lines(run, "bits"))
+    if (rows >> len(bits)).any():
         raise ValueError(f"{data[TAGS].name} has bits of no tag")
-    return {tag: (rows & bit).astype(np.bool_) for tag, bit in tag_bits(names).items()}
+    for name in names:
+        if name in bits:
+            mask = (rows & bits[name]).astype(np.bool_)
+        else:
+            mask = np.zeros(len(rows), dtype=np.bool_)
+            mask[bodies[name]] = True
+        yield name, mask
 
 
 def _face(group: Any) -> tuple[str, Face]:

@@ -15,7 +15,8 @@ dimensions only, so a vector is padded with zeros to 3 components and a tensor t
 | `/solidsph/step`, `/solidsph/history` | 1 every step | step numbers; named columns |
 | `/solidsph/error_bars` | 1 every quantity | numbers and their estimated errors, if any |
 | `/solidsph/digests` | 1 every step | digest of everything in the step |
-| the rest of `/solidsph` | | scene, plugins, versions, bodies, tags, faces, outcome; a digest |
+| `/solidsph/tags`, `/solidsph/bits` | 1 every tag | names; those that have a bit, from the lowest |
+| the rest of `/solidsph` | | scene, plugins, versions, bodies, faces, outcome; a digest |
 """
 
 from __future__ import annotations
@@ -97,7 +98,7 @@ def static_fields(dimension: int) -> tuple[Field, ...]:
         Field("ghost", (), "-"),  # 1 for a ghost
         Field("image", (d,), "m"),
         Field("body", (), "-"),  # number of the body, -1 outside all
-        Field(TAGS, (), "-"),  # the sum of the bits of its tags
+        Field(TAGS, (), "-"),  # the sum of the bits of its tags, but for that of the body
     )
 
 
