@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import os
 import signal
 import sys
@@ -16,6 +17,8 @@ from typing import Any, NoReturn, TextIO
 import click
 
 from solidsph.errors import BuildError, ConvergenceError, DivergedError, SolidsphError, UnsoundError
+
+LOG = logging.getLogger(__name__)
 
 VERBS: Mapping[str, str] = {
     "run": "Run a scene or a case, and record it.",
@@ -73,7 +76,9 @@ class _Verbs(click.Group):
 
 @click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(version("solidsph"), prog_name="solidsph")
-def cli() -> None:
+@click.option("-v", "--verbose", "verbosity", count=True, help="As of every command: say more.")
+@click.option("-q", "--quiet", is_flag=True, help="As of every command: results and errors only.")
+def cli(verbosity: int, quiet: bool) -> None:
     """Smoothed Particle Hydrodynamics for nonlinear solid mechanics.
 
     Exit codes: 0 success, 1 the run or the check failed, 2 invalid input, 130 interrupted.
@@ -143,11 +148,11 @@ def _show_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Print a warning about the input in one line, any other with its path and source."""
-    text = f"warning: {message}\n"
+    """Log a warning about the input in one line, any other with its path and source."""
+    text = str(message)
     if not isinstance(message, UserWarning):
-        text = warnings.formatwarning(message, category, filename, lineno, line)
-    print(text, end="", file=file or sys.stderr)
+        text = warnings.formatwarning(message, category, filename, lineno, line).rstrip()
+    LOG.warning(text)
 
 
 def _as_json() -> bool:

@@ -136,11 +136,6 @@ def say(text: str) -> None:
     out.print(escape(text), soft_wrap=not out.is_terminal)
 
 
-def remark(text: str) -> None:
-    """Print plain text on the standard error."""
-    err.print(escape(text), soft_wrap=True)
-
-
 def show_json(data: Mapping[str, Any]) -> None:
     """Print one JSON object on the standard output."""
     try:

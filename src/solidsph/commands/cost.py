@@ -15,7 +15,7 @@ from solidsph.commands.console import Table, present, sweep_progress
 from solidsph.commands.cost_options import axes_of, case_of, goal_of, seconds
 from solidsph.commands.limit_tables import ESTIMATED, limit_rows, measured_table, with_warnings
 from solidsph.commands.options import (
-    ProgressOutput,
+    Output,
     SearchOptions,
     flag,
     option,
@@ -23,7 +23,6 @@ from solidsph.commands.options import (
     options,
     output_option,
     set_option,
-    verbose_option,
 )
 from solidsph.commands.target import name_of, resolve, target_argument
 from solidsph.errors import SceneError
@@ -43,7 +42,7 @@ from solidsph.studies.variant import with_settings
 
 
 @attrs.frozen
-class _Options(ProgressOutput):
+class _Options(Output):
     settings: tuple[str, ...] = set_option()
     references: tuple[str, ...] = option(
         "For a scene: what a column should be, a number, a formula of t, or a file of times and "
@@ -85,7 +84,6 @@ class _Options(ProgressOutput):
     report: bool = flag(
         "Also write an HTML page with interactive plots and the scene of every point."
     )
-    verbose: bool = verbose_option()
 
     def folder(self, target: str) -> Path:
         """Folder of the results."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,13 +19,12 @@ from solidsph.commands.console import (
     present,
     progress,
     progress_observers,
-    remark,
     say,
 )
 from solidsph.commands.limit_tables import with_warnings
 from solidsph.commands.options import (
     FILE,
-    ProgressOutput,
+    Output,
     SearchOptions,
     flag,
     option,
@@ -32,7 +32,6 @@ from solidsph.commands.options import (
     options,
     output_option,
     set_option,
-    verbose_option,
 )
 from solidsph.commands.receipt_tables import case_receipts, case_receipts_text, receipts_text
 from solidsph.commands.target import name_of, resolve, target_argument
@@ -53,9 +52,11 @@ from solidsph.studies.receipts import quantity, receipts
 from solidsph.studies.scene_case import references_of
 from solidsph.watch import Finding, run_watched
 
+LOG = logging.getLogger(__name__)
+
 
 @attrs.frozen
-class _Options(ProgressOutput):
+class _Options(Output):
     settings: tuple[str, ...] = set_option()
     output: Path | None = output_option(
         "Folder for records and pictures, or for a scene the file of its record (.h5 or .vtkhdf).  "
@@ -89,7 +90,6 @@ class _Options(ProgressOutput):
         metavar="NAME=x@[X,Y]",
     )
     beyond_memory: bool = flag("Run even if more memory is predicted than is free.")
-    verbose: bool = verbose_option()
 
     def check_memory(self, scene: Scene) -> None:
         """Refuse a scene that needs more memory than is free, unless that is wanted."""
@@ -181,7 +181,7 @@ def _run_scene(
     advice = advise(simulation)
     known["warnings"] += [warning.line for warning in advice]
     if replaced:  # said when nothing in the scene is refused any more
-        remark(replaced)
+        LOG.warning(replaced)
     if not options.as_json:
         _warn(advice)
     predicted = predictions.try_prediction(simulation, build)
@@ -257,10 +257,9 @@ def _run_scene(
 def _warn(advice: Sequence[Advice], scene: str = "") -> None:
     """Print warnings ahead of a run on the standard error."""
     where = f"{scene}, " if scene else ""
-    for warning in advice:
-        remark(f"warning, {where}{warning.name}: {warning.finding}. Remedy: {warning.remedy}")
-    if advice:
-        remark('(more: solidsph explain; to silence: silence = ["NAME"])')
+    lines = [f"warning, {where}{a.name}: {a.finding}. Remedy: {a.remedy}" for a in advice]
+    if lines:
+        LOG.warning("\n".join([*lines, '(more: solidsph explain; to silence: silence = ["NAME"])']))
 
 
 @attrs.frozen
@@ -279,13 +278,13 @@ class _Watchdog:
             f"particle {finding.particle}; try {finding.remedy}"
         )
         self.warnings.append(text)
-        remark(text)
+        LOG.warning(text)
 
 
 def _run_case(target: str, case: Case, folder: Path, options: _Options) -> None:
     for name in case.scenes():
         if replaced := options.check_record(folder / f"{name}.h5"):
-            remark(replaced)
+            LOG.warning(replaced)
     known = known_facts()
     known |= {"case": target, "warnings": {}}
     predicted: dict[str, Prediction | None] = {}

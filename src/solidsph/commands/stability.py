@@ -12,7 +12,7 @@ import click
 
 from solidsph.commands.console import Table, present, progress
 from solidsph.commands.options import (
-    ProgressOutput,
+    Output,
     flag,
     option,
     option_group,
@@ -25,7 +25,7 @@ from solidsph.studies.suite import Verdict, run_trial, trials
 
 
 @attrs.frozen
-class _Options(ProgressOutput):
+class _Options(Output):
     listed: bool = flag("List the trials without running them.", "--list")
     brief: bool = flag("Run the short form of each trial.")
     map: bool = flag("Draw a stability map of a scheme instead.")
