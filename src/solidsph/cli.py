@@ -10,6 +10,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import version
 from typing import Any, NoReturn, TextIO
@@ -48,6 +49,10 @@ _OUTCOMES: Mapping[type[SolidsphError], str] = {
     UnsoundError: "unsound",
 }
 
+# What Click 8.2 and later raise where no verb is given; its message is the help.
+_NO_ARGUMENTS: tuple[type[click.UsageError], ...] = tuple(
+    kind for kind in [getattr(click.exceptions, "NoArgsIsHelpError", None)] if kind
+)
 
 _RECORDED = "; the outputs so far are readable, and solidsph resume continues the run"
 
@@ -68,6 +73,14 @@ class _Verbs(click.Group):
             return None
         command: click.Command = getattr(import_module(f"solidsph.commands.{cmd_name}"), cmd_name)
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args[0] not in VERBS and not args[0].startswith("-"):
+            near = get_close_matches(args[0], VERBS, 1)
+            ctx.fail(f"no such command {args[0]!r}{f'; did you mean {near[0]!r}?' if near else ''}")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
@@ -98,11 +111,11 @@ def main() -> None:
     facts: dict[str, Any] = {}  # filled by a verb with --json, printed whatever the outcome
     try:
         code = cli.main(prog_name="solidsph", standalone_mode=False, obj=facts)
+    except _NO_ARGUMENTS as cause:
+        cause.show()
+        sys.exit(WRONG_INPUT)
     except click.ClickException as cause:
-        if not _as_json():
-            cause.show()  # with the usage
-            sys.exit(WRONG_INPUT)
-        _end(WRONG_INPUT, "invalid input", f"error: {cause.format_message()}", facts)
+        _end(WRONG_INPUT, "invalid input", f"error: {_usage(cause)}", facts)
     except (click.Abort, KeyboardInterrupt) as cause:
         (kept, *_) = [*_notes(cause), _WHEN_INTERRUPTED.get(_verb(), "")]
         text = f"interrupted{kept}"
@@ -113,7 +126,9 @@ def main() -> None:
         code = WRONG_INPUT if outcome is None else FAILED
         _end(code, outcome or "invalid input", f"error: {cause}", facts, problems)
     except OSError as cause:
-        text = f"error: {cause}; check the path, its permissions and the disk"
+        where = f"{cause.filename}: " if cause.filename else ""
+        what = f"{where}{cause.strerror or cause}"
+        text = f"error: {what}; check the path, its permissions and the disk"
         _end(WRONG_INPUT, "invalid input", text, facts)
     except Exception as cause:
         if os.environ.get(TRACEBACK) == "1":
@@ -124,6 +139,12 @@ def main() -> None:
         )
         _end(FAILED, "failed", text, facts)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _usage(cause: click.ClickException) -> str:
+    """What is wrong with how a verb was called, in one line, and where to read on."""
+    text = " ".join(cause.format_message().split()).rstrip(".")
+    return f"{text[:1].lower()}{text[1:]}; see: {f'solidsph {_verb()}'.strip()} --help"
 
 
 def _redirect_closed_streams() -> None:

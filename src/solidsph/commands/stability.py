@@ -20,6 +20,7 @@ from solidsph.commands.options import (
     output_option,
 )
 from solidsph.commands.scheme_options import SchemeOptions
+from solidsph.commands.target import STANDARD_INPUT
 from solidsph.errors import SceneError
 from solidsph.studies.suite import Verdict, run_trial, trials
 
@@ -49,6 +50,12 @@ def stability(cases: tuple[str, ...], options: _Options) -> None:
     All cases or those named run with their own scheme, or with the parts given. Some trials must
     fail: a suite in which nothing can fail proves nothing.
     """
+    for name in cases:
+        if name == STANDARD_INPUT or name.endswith(".toml"):
+            raise SceneError(
+                f"stability runs cases, and {name!r} is a scene; look for failure in it with: "
+                f"solidsph run {name} --watch"
+            )
     if options.map:
         if cases:
             raise SceneError(f"a map is of a scheme, not of cases; leave out {', '.join(cases)}")

@@ -197,7 +197,7 @@ class Record:
         if name not in self._fields:
             near = get_close_matches(name, self.field_names, n=1)
             hint = f"did you mean {near[0]!r}? " if near else ""
-            known = ", ".join(self.field_names) or "none"
+            known = ", ".join(dict.fromkeys([*self.field_names, DISPLACEMENT]))
             raise RecordError(f"no field {name!r} in {self.path}; {hint}fields: {known}")
         return self._fields[name]
 
