@@ -88,22 +88,37 @@ class Table:
         cells = [[_text(cell) for cell in row] for row in self.rows]
         columns = [[row[index] for row in cells] for index in range(len(self.columns))]
         wide = sum(_longest([name, *columns[i]]) + 3 for i, name in enumerate(self.columns))
-        table = RichTable(title=escape(self.title), title_justify="left", header_style="bold")
-        for index, name in enumerate(self.columns):
-            values = [row[index] for row in self.rows]
-            numeric = bool(values) and all(_is_number(cell) or cell == "" for cell in values)
-            # Numbers are never cut to fit, their headings break between words; words wrap.
-            heading = name.replace(" ", "\n") if numeric and wide >= out.width else name
+        numeric = [self._is_numeric(index) for index in range(len(self.columns))]
+        # Numbers are never cut to fit, their headings break between words; words wrap.
+        least = [
+            _longest([*name.split(), *cells])
+            if numbers
+            else min(_LEAST, _longest([word for text in (name, *cells) for word in text.split()]))
+            for name, cells, numbers in zip(self.columns, columns, numeric, strict=True)
+        ]
+        crowded = sum(least) + 3 * len(least) + 1 > out.width
+        table = RichTable(
+            title=escape(self.title),
+            title_justify="left",
+            header_style="bold",
+            padding=(0, 0) if crowded else (0, 1),
+        )
+        for name, numbers, width in zip(self.columns, numeric, least, strict=True):
             table.add_column(
-                escape(heading),
-                justify="right" if numeric else "left",
-                no_wrap=numeric,
+                escape(name.replace(" ", "\n") if numbers and wide >= out.width else name),
+                justify="right" if numbers else "left",
+                no_wrap=numbers,
                 overflow="fold",
-                min_width=None if numeric else min(_LEAST, _longest([name, *columns[index]])),
+                min_width=width,
             )
         for row in cells:
             table.add_row(*map(escape, row))
         out.print(table)
+
+    def _is_numeric(self, index: int) -> bool:
+        """Whether a column holds numbers, and at least one."""
+        values = [row[index] for row in self.rows if row[index] not in ("", None)]
+        return bool(values) and all(map(_is_number, values))
 
 
 def present(
@@ -219,7 +234,7 @@ class SweepObserver:
 
 
 def _longest(texts: Iterable[str]) -> int:
-    return max(map(len, texts))
+    return max(map(len, texts), default=0)
 
 
 def _is_number(cell: Any) -> bool:
