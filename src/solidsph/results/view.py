@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from math import isfinite
 from pathlib import Path
+from textwrap import fill
 from typing import Any, final
 
 import attrs
@@ -16,6 +17,11 @@ from solidsph.results.pictures import colour_label, magnitudes
 from solidsph.results.recorded import Recorded
 
 _SIZE = (1024, 768)  # of the window [pixels]
+
+# The body takes this part of what it would fill, with its middle there, from -1 to 1.
+_ZOOM, _CENTRE = 0.95, (0.15, 0.0)
+
+_TITLE = 18  # letters of the colour bar's title in a line
 
 _PICTURES = (".png", ".jpeg", ".jpg", ".bmp", ".tif", ".tiff")
 
@@ -92,7 +98,10 @@ class View:
             render_points_as_spheres=True,
             ambient=0.5,  # colours are to be read beside the bar
             scalar_bar_args={
-                "title": colour_label(self.record, self.field) + "\n",
+                "title": fill(colour_label(self.record, self.field), _TITLE) + "\n",
+                "title_font_size": 16,
+                "label_font_size": 16,
+                "n_labels": 5,
                 "color": "black",
                 "fmt": "%.3g",
                 "vertical": True,
@@ -101,12 +110,23 @@ class View:
                 "height": 0.5,
             },
         )
-        # Spheres that touch each other, in metres.
-        actor.mapper.scale_factor = 0.9 * float(self.record.particles.spacings.max())
+        # The radius of spheres, in metres: a little more than that of touching ones, to hide gaps.
+        radius = 0.6 * float(self.record.particles.spacings.max())
+        actor.mapper.scale_factor = radius
         plotter.add_text(self._caption(), font_size=10, color="black", name="caption")
         plotter.add_axes(color="black")
         if self.record.dimension < 3:
             plotter.view_xy()
+        else:
+            plotter.view_isometric()
+        # Spheres reach beyond their centres; the bar needs room beside.
+        points = self.cloud.points
+        ends = np.stack([points.min(axis=0) - radius, points.max(axis=0) + radius], axis=1)
+        camera = plotter.camera  # which PyVista resets when it is asked for the first time
+        plotter.renderer.ResetCamera(*ends.ravel().tolist())
+        camera.zoom(_ZOOM)
+        camera.SetWindowCenter(*_CENTRE)
+        camera.is_set = True
         self._plotter = plotter
         return plotter
 
