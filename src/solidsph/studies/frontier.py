@@ -40,7 +40,7 @@ class Orders:
 
 
 @final
-@attrs.frozen(slots=False)
+@attrs.frozen(slots=False, repr=False)
 class Frontier:
     """Points of a sweep over one case. Iteration gives a row for each, for example for pandas."""
 
@@ -182,6 +182,9 @@ class Frontier:
             return None
         coarse, fine, least = max(spacings), min(spacings), 0.7 * min(errors)
         return (coarse, fine), (least * (coarse / fine) ** 2, least)
+
+    def __repr__(self) -> str:
+        return f"Frontier({len(self)} configurations: {self.sentence()})"
 
     def _repr_html_(self) -> str:
         """Table for notebooks."""
