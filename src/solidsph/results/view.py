@@ -19,7 +19,9 @@ from solidsph.results.recorded import Recorded
 _SIZE = (1024, 768)  # of the window [pixels]
 
 # The body takes this part of what it would fill, with its middle there, from -1 to 1.
-_ZOOM, _CENTRE = 0.95, (0.15, 0.0)
+_ZOOM, _CENTRE = 0.85, (0.15, -0.1)
+
+_AXES = (0.0, 0.14, 0.16, 0.3)  # place of the small axes in the window, above the sliders
 
 _TITLE = 18  # letters of the colour bar's title in a line
 
@@ -114,12 +116,12 @@ class View:
         radius = 0.6 * float(self.record.particles.spacings.max())
         actor.mapper.scale_factor = radius
         plotter.add_text(self._caption(), font_size=10, color="black", name="caption")
-        plotter.add_axes(color="black")
+        plotter.add_axes(color="black", viewport=_AXES)
         if self.record.dimension < 3:
             plotter.view_xy()
         else:
             plotter.view_isometric()
-        # Spheres reach beyond their centres; the bar needs room beside.
+        # Spheres reach beyond their centres; bar and sliders need room.
         points = self.cloud.points
         ends = np.stack([points.min(axis=0) - radius, points.max(axis=0) + radius], axis=1)
         camera = plotter.camera  # which PyVista resets when it is asked for the first time
