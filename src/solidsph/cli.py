@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import io
+import logging
 import os
 import signal
 import sys
 import threading
 import warnings
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import version
 from typing import Any, NoReturn, TextIO
@@ -16,6 +18,8 @@ from typing import Any, NoReturn, TextIO
 import click
 
 from solidsph.errors import BuildError, ConvergenceError, DivergedError, SolidsphError, UnsoundError
+
+LOG = logging.getLogger(__name__)
 
 VERBS: Mapping[str, str] = {
     "run": "Run a scene or a case, and record it.",
@@ -45,6 +49,10 @@ _OUTCOMES: Mapping[type[SolidsphError], str] = {
     UnsoundError: "unsound",
 }
 
+# What Click 8.2 and later raise where no verb is given; its message is the help.
+_NO_ARGUMENTS: tuple[type[click.UsageError], ...] = tuple(
+    kind for kind in [getattr(click.exceptions, "NoArgsIsHelpError", None)] if kind
+)
 
 _RECORDED = "; the outputs so far are readable, and solidsph resume continues the run"
 
@@ -66,6 +74,14 @@ class _Verbs(click.Group):
         command: click.Command = getattr(import_module(f"solidsph.commands.{cmd_name}"), cmd_name)
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args[0] not in VERBS and not args[0].startswith("-"):
+            near = get_close_matches(args[0], VERBS, 1)
+            ctx.fail(f"no such command {args[0]!r}{f'; did you mean {near[0]!r}?' if near else ''}")
+        return super().resolve_command(ctx, args)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl(list(VERBS.items()))
@@ -73,7 +89,9 @@ class _Verbs(click.Group):
 
 @click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(version("solidsph"), prog_name="solidsph")
-def cli() -> None:
+@click.option("-v", "--verbose", "verbosity", count=True, help="As of every command: say more.")
+@click.option("-q", "--quiet", is_flag=True, help="As of every command: results and errors only.")
+def cli(verbosity: int, quiet: bool) -> None:
     """Smoothed Particle Hydrodynamics for nonlinear solid mechanics.
 
     Exit codes: 0 success, 1 the run or the check failed, 2 invalid input, 130 interrupted.
@@ -93,11 +111,11 @@ def main() -> None:
     facts: dict[str, Any] = {}  # filled by a verb with --json, printed whatever the outcome
     try:
         code = cli.main(prog_name="solidsph", standalone_mode=False, obj=facts)
+    except _NO_ARGUMENTS as cause:
+        cause.show()
+        sys.exit(WRONG_INPUT)
     except click.ClickException as cause:
-        if not _as_json():
-            cause.show()  # with the usage
-            sys.exit(WRONG_INPUT)
-        _end(WRONG_INPUT, "invalid input", f"error: {cause.format_message()}", facts)
+        _end(WRONG_INPUT, "invalid input", f"error: {_usage(cause)}", facts)
     except (click.Abort, KeyboardInterrupt) as cause:
         (kept, *_) = [*_notes(cause), _WHEN_INTERRUPTED.get(_verb(), "")]
         text = f"interrupted{kept}"
@@ -108,7 +126,9 @@ def main() -> None:
         code = WRONG_INPUT if outcome is None else FAILED
         _end(code, outcome or "invalid input", f"error: {cause}", facts, problems)
     except OSError as cause:
-        text = f"error: {cause}; check the path, its permissions and the disk"
+        where = f"{cause.filename}: " if cause.filename else ""
+        what = f"{where}{cause.strerror or cause}"
+        text = f"error: {what}; check the path, its permissions and the disk"
         _end(WRONG_INPUT, "invalid input", text, facts)
     except Exception as cause:
         if os.environ.get(TRACEBACK) == "1":
@@ -119,6 +139,12 @@ def main() -> None:
         )
         _end(FAILED, "failed", text, facts)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _usage(cause: click.ClickException) -> str:
+    """What is wrong with how a verb was called, in one line, and where to read on."""
+    text = " ".join(cause.format_message().split()).rstrip(".")
+    return f"{text[:1].lower()}{text[1:]}; see: {f'solidsph {_verb()}'.strip()} --help"
 
 
 def _redirect_closed_streams() -> None:
@@ -143,11 +169,11 @@ def _show_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Print a warning about the input in one line, any other with its path and source."""
-    text = f"warning: {message}\n"
+    """Log a warning about the input in one line, any other with its path and source."""
+    text = str(message)
     if not isinstance(message, UserWarning):
-        text = warnings.formatwarning(message, category, filename, lineno, line)
-    print(text, end="", file=file or sys.stderr)
+        text = warnings.formatwarning(message, category, filename, lineno, line).rstrip()
+    LOG.warning(text)
 
 
 def _as_json() -> bool:

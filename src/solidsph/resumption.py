@@ -34,9 +34,11 @@ class Pending:
     simulation: Simulation
     since: RestartPoint
 
-    def solve(self, observers: Sequence[object] = ()) -> Result:
+    def solve(self, observers: Sequence[object] = (), progress: bool | None = None) -> Result:
         """Go on to the end; the record is then that of one run without a break."""
-        return self.simulation.run(record=self.path, observers=observers, since=self.since)
+        return self.simulation.run(
+            record=self.path, observers=observers, since=self.since, progress=progress
+        )
 
 
 def resume(
@@ -46,6 +48,7 @@ def resume(
     until: float | None = None,
     force: bool = False,
     observers: Sequence[object] = (),
+    progress: bool | None = None,
 ) -> Result:
     """Go on with the run that was recorded at `path`, in the same record.
 
@@ -57,6 +60,7 @@ def resume(
         force: go on although versions, plugins or the number of threads have changed; the last
             digits may then differ from those of one run without a break.
         observers: as in `Simulation.run`.
+        progress: whether to show how far the run is; by default in notebooks only.
 
     Raises:
         RecordError: the run is finished; the record or its checkpoint cannot be read or do not
@@ -66,7 +70,7 @@ def resume(
     run = pending(Path(path), simulation=simulation, until=until, force=force)
     if run is None:
         raise RecordError(f"the run in {path} is over; give `until` to extend it")
-    return run.solve(observers)
+    return run.solve(observers, progress)
 
 
 def pending(

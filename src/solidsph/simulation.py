@@ -16,6 +16,7 @@ from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.motion import run_motion, time_loop
 from solidsph.run.outcome import Result
+from solidsph.run.progress import progress_observers
 from solidsph.run.restart_point import RestartPoint
 from solidsph.run.session import exclusive
 from solidsph.scene.scene import Scene
@@ -23,7 +24,7 @@ from solidsph.watch.soundness import Soundness
 
 
 @final
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class Simulation(BuiltScene):
     """Everything that a run needs. A run does not change it, so it can be repeated."""
 
@@ -42,6 +43,7 @@ class Simulation(BuiltScene):
         record: Path | str | None = None,
         observers: Sequence[object] = (),
         since: RestartPoint | None = None,
+        progress: bool | None = None,
     ) -> Result:
         """Run the scene: find the equilibrium if it has [statics], else follow the motion.
 
@@ -50,6 +52,7 @@ class Simulation(BuiltScene):
                 the first output is complete; other files are never replaced.
             observers: objects with methods of `solidsph.run.hooks.Hooks`, called in this run only.
             since: restart point in the earlier run of `record`, from `solidsph.resume`.
+            progress: whether to show how far the run is; by default in notebooks only.
 
         Raises:
             DivergedError: the motion diverged; earlier outputs stay readable.
@@ -60,11 +63,16 @@ class Simulation(BuiltScene):
         """
         wanted = self.scene.statics
         if wanted is None:
-            return self.run_motion(record=record, observers=observers, since=since)
+            return self.run_motion(
+                record=record, observers=observers, since=since, progress=progress
+            )
         from solidsph.statics.run import run_statics  # imports the sparse solvers
 
         return self._run_with(
-            lambda listeners: run_statics(self, wanted, listeners, since), record, observers, since
+            lambda listeners: run_statics(self, wanted, listeners, since),
+            record,
+            [*observers, *progress_observers(self, progress)],
+            since,
         )
 
     def run_motion(
@@ -73,6 +81,7 @@ class Simulation(BuiltScene):
         record: Path | str | None = None,
         observers: Sequence[object] = (),
         since: RestartPoint | None = None,
+        progress: bool | None = None,
     ) -> Result:
         """Follow the motion to the end of the duration, even if the scene has [statics].
 
@@ -82,7 +91,7 @@ class Simulation(BuiltScene):
         return self._run_with(
             lambda listeners: run_motion(self, listeners, since, judge=soundness.judge),
             record,
-            [soundness, *observers],
+            [soundness, *observers, *progress_observers(self, progress)],
             since,
         )
 

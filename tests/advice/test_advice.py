@@ -98,7 +98,7 @@ def test_explain_and_run_say_it(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     (facts,) = json.loads(done.stdout)["scenes"].values()
     assert [one["name"] for one in facts["warnings"]] == ["sudden-load"]
-    done = solidsph("run", "blow.toml", "--quiet", cwd=tmp_path)
+    done = solidsph("run", "blow.toml", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "warning, sudden-load: 'traction top' loads a surface" in done.stderr
 

@@ -39,3 +39,42 @@ def test_nothing_is_cut_off(width: int, monkeypatch: pytest.MonkeyPatch) -> None
 def test_headings_are_whole_where_there_is_room(monkeypatch: pytest.MonkeyPatch) -> None:
     assert any("pair evaluations" in line for line in lines(POINTS, 170, monkeypatch))
     assert not any("pair evaluations" in line for line in lines(POINTS, 80, monkeypatch))
+
+
+CROWDED = Table(
+    "measurements",
+    ["quantity", "measured", "reference", "unit", "error", "verdict", "as expected"],
+    [
+        [
+            "largest relative change of angular momentum",
+            6.6613e-16,
+            0.0,
+            "1",
+            6.6613e-16,
+            None,
+            True,
+        ],
+        ["smallest distance of neighbours", 0.95618, None, "spacings", None, "apart", False],
+    ],
+)
+
+
+@pytest.mark.parametrize("table", [POINTS, CROWDED])
+def test_every_column_is_there_at_80(table: Table, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, top, *shown = lines(table, 80, monkeypatch)
+    assert max(map(len, shown)) <= 80
+    assert top[-1] == "┓"
+    heading = [line[1:-1].split("┃") for line in shown if line.startswith("┃")]
+    assert [" ".join(words).split() for words in zip(*heading, strict=True)] == [
+        name.split() for name in table.columns
+    ]
+    body = [line for line in shown if line.startswith("│")]
+    assert all(line.endswith("│") for line in body)
+    cells = [" ".join(column).split() for column in zip(*(x.split("│") for x in body), strict=True)]
+    assert cells[-2][-1] == console._text(table.rows[-1][-1])
+
+
+def test_a_column_of_numbers_may_have_gaps(monkeypatch: pytest.MonkeyPatch) -> None:
+    table = Table("gaps", ["number", "none"], [[1.5, None], [None, None], ["", ""]])
+    shown = lines(table, 80, monkeypatch)
+    assert "│    1.5 │      │" in shown  # right-aligned

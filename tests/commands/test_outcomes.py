@@ -78,8 +78,8 @@ def test_interrupted(said: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     ("words", "told"),
     [
         (("run", "missing.toml"), "cannot be read"),
-        (("run",), "Missing argument"),
-        (("run", "--bogus", "x"), "No such option"),
+        (("run",), "missing argument"),
+        (("run", "--bogus", "x"), "no such option"),
         (("explain", "missing.toml"), "cannot be read"),
         (("check", "cubic-splin"), "did you mean"),
         (("resume", "missing.h5"), "missing.h5"),

@@ -11,6 +11,7 @@ import pytest
 
 from solidsph import Scene, Simulation, solve
 from solidsph.registry import registry
+from tests.helpers.scenes import box
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "plugins/examples/solidsph-wendland"
@@ -37,7 +38,7 @@ def test_the_scenes_shown_can_be_built_and_the_static_one_run() -> None:
 
 
 def test_the_probes_shown_measure_what_is_said(tmp_path, monkeypatch) -> None:
-    (code,) = blocks("docs/scenes.md", "python")
+    _, code = blocks("docs/scenes.md", "python")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "cantilever.toml").write_text(blocks("docs/scenes.md", "toml")[-1])
     names: dict[str, Any] = {}
@@ -52,6 +53,18 @@ def test_the_probes_shown_measure_what_is_said(tmp_path, monkeypatch) -> None:
     # The profile is that of bending, and the values are those of the probe.
     assert names["profile"][[0, -1]] == pytest.approx([-150.0, 150.0], rel=0.01)
     assert names["values"].displacement[0, 1] == pytest.approx(final["tip displacement y [m]"])
+
+
+def test_the_particles_of_a_tag_are_found_as_is_said(tmp_path, monkeypatch) -> None:
+    code, _ = blocks("docs/scenes.md", "python")
+    monkeypatch.chdir(tmp_path)
+    built = box(2, tags={"near": "X < 0.3", "low": "Y < 0.4"}).build()
+    built.run(record="plate.vtkhdf")
+    names: dict[str, Any] = {}
+    exec(compile(code, "docs/scenes.md", "exec"), names)
+    X = built.particles.positions[built.particles.tags["low"]]
+    assert 0 < len(X) < built.particles.count
+    assert names["low"].points[:, :2] == pytest.approx(X)
 
 
 def test_the_scenes_shown_are_sound() -> None:

@@ -33,7 +33,7 @@ def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
 # What VTK needs to show particles as points, and nobody else reads.
 FOR_VTK = (
     *("Connectivity", "VTKHDF/Offsets", "VTKHDF/Types", "NumberOf", "PartOffsets", "CellOffsets"),
-    *("PointOffsets", "PointDataOffsets"),
+    *("PointOffsets", "PointDataOffsets", "FieldData"),
 )
 
 
@@ -194,7 +194,7 @@ def test_other_values_in_the_right_shape_are_noticed(original: Path, tmp_path: P
         names = file["solidsph/fields"][()].astype(str)
     evolving = ["VTKHDF/Points", *(f"VTKHDF/PointData/{name}" for name in names)]
     history = ["VTKHDF/Steps/Values", "solidsph/step", "solidsph/digests", "solidsph/history"]
-    reference = [f"VTKHDF/PointData/{name}" for name in ("volume", "cell", "tag left")]
+    reference = [f"VTKHDF/PointData/{name}" for name in ("volume", "cell", "tags")]
     reference += [f"solidsph/{name}" for name in ("scene", "plugins", "versions")]
     for place in (*reference, *evolving, *history):
         shutil.copyfile(original, path)

@@ -351,18 +351,18 @@ def test_run_asks_before_it_replaces_what_can_be_gone_on_with(
             record=path, observers=[Stop(4)]
         )
     before = path.read_bytes()
-    told = refusal(lambda: command("run", "scene.toml", "--quiet"))
+    told = refusal(lambda: command("run", "scene.toml"))
     assert "holds an interrupted run up to t = 0.00" in told
     assert f"solidsph resume {path.relative_to(folder)}" in told
     assert "--overwrite" in told
     assert path.read_bytes() == before
-    command("run", "scene.toml", "--quiet", "--json", "--overwrite")
+    command("run", "scene.toml", "--json", "--overwrite")
     out, err = capsys.readouterr()
     assert json.loads(out)["record"] == "results/scene/record.h5"
     assert "holds an interrupted run up to t = 0.00" in err
     assert earlier_run_at(path).outcome == "finished"
     # What is finished may be replaced, which is said.
-    command("run", "scene.toml", "--quiet", "--json")
+    command("run", "scene.toml", "--json")
     assert "holds a finished run up to t = 0.01 s; it is replaced" in capsys.readouterr().err
 
 
@@ -372,9 +372,9 @@ def test_scenes_of_one_name_in_two_folders_are_told_of(
     for name in ("a", "b"):
         (folder / name).mkdir()
         (folder / name / "scene.toml").write_text(SCENE_TOML)
-    command("run", "a/scene.toml", "--quiet")
+    command("run", "a/scene.toml")
     assert "replaced" not in capsys.readouterr().err
-    command("run", "b/scene.toml", "--quiet")
+    command("run", "b/scene.toml")
     assert "it is replaced" in capsys.readouterr().err
 
 

@@ -105,7 +105,7 @@ def test_the_dissipated_energy_keeps_its_column() -> None:
         ({"reports": ("sum [N]",)}, {"reports": ("sum [N]",)}, "column 'sum [N]'"),
         ({}, {"shows": ("velocity [m/s]",)}, "field 'velocity'"),
         ({}, {"shows": ("volume [m^2]",)}, "field 'volume'"),
-        ({}, {"shows": ("tag left [-]",)}, "field 'tag left'"),
+        ({}, {"shows": ("tags [-]",)}, "field 'tags'"),
         ({}, {"reports": ("kinetic energy [J]",)}, "column 'kinetic energy [J]'"),
         ({}, {"reports": ("work of one [J]",)}, "column 'work of one [J]'"),
     ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gzip
 import os
 import shutil
 import signal
@@ -18,6 +19,7 @@ import attrs
 import h5py
 import numpy as np
 import pytest
+import pyvista
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -25,7 +27,7 @@ from solidsph.errors import DivergedError, RecordError
 from solidsph.model.particles import Face, Particles
 from solidsph.results.contents import Output, Reference
 from solidsph.results.hdf5_source import _lookup3
-from solidsph.results.layout import FORMAT, Field, PluginUsed
+from solidsph.results.layout import FORMAT, MOST_TAGS, Field, PluginUsed
 from solidsph.results.record import Record
 from solidsph.results.record_writer import RecordWriter
 from solidsph.results.repair import repaired
@@ -342,14 +344,68 @@ def test_vtk_reads_every_number(tmp_path: Path, dimension: int, count: int) -> N
             "ghost": particles.ghosts,
             "image": in_three(particles.images),
             "body": np.repeat([0, 1], [3, 4]),
-            "tag left": particles.tags["left"],
-            "tag a%2Fb": particles.tags["a/b"],
-            "tag 100 %25": particles.tags["100 %"],
-            "tag a%252Fb": particles.tags["a%2Fb"],
+            "tags": sum(2**k * mask for k, mask in enumerate(particles.tags.values())),
         }
         assert set(arrays) == set(expected)
         for name, values in expected.items():
             np.testing.assert_array_equal(arrays[name], values, err_msg=name)
+
+
+NAMES = {"tag left": 1, "tag a%2Fb": 2, "tag 100 %25": 4, "tag a%252Fb": 8} | {
+    "body bar": 0,
+    "body the wall": 1,
+}
+
+
+@pytest.mark.parametrize("name", ["run.vtkhdf", "run.h5"])
+def test_pyvista_reads_it_with_the_names_of_tags_and_bodies(tmp_path: Path, name: str) -> None:
+    written(tmp_path / name, 7, 2, 3)
+    particles = some_particles(7, 2)
+    grid = pyvista.read(tmp_path / name, force_ext=".vtkhdf" if name.endswith("h5") else None)
+    np.testing.assert_array_equal(grid.points, in_three(some_step(0, particles).positions))
+    numbers = {key: int(grid.field_data[key][0]) for key in grid.field_data if key != "Time"}
+    assert numbers == NAMES
+    assert grid["tags"].dtype.kind == "i"
+    left = (grid["tags"] & grid.field_data["tag left"]) != 0
+    np.testing.assert_array_equal(left, particles.tags["left"])
+    wall = grid["body"] == grid.field_data["body the wall"]
+    np.testing.assert_array_equal(wall, np.arange(7) >= 3)
+
+
+def test_tags_are_bits_of_one_integer(tmp_path: Path) -> None:
+    """As many as it has, all of them on one particle and none on another."""
+    some = some_particles(3, 2)
+    tags = {f"t{k}": np.arange(3) == 1 for k in range(MOST_TAGS)}
+    tags |= {"bar": np.arange(3) < 1}  # the body, which takes no bit
+    with opened(tmp_path / "run", attrs.evolve(some, tags=tags)) as writer:
+        append(writer, some_step(0, some))
+    with Record(tmp_path / "run") as record:
+        assert list(record.particles.tags) == list(tags)
+        for name, mask in tags.items():
+            np.testing.assert_array_equal(record.particles.tags[name], mask)
+    tags["one more"] = tags["t0"]
+    with pytest.raises(
+        RecordError, match=f"at most {MOST_TAGS} tags besides those of bodies, and the scene has 63"
+    ):
+        opened(tmp_path / "run", attrs.evolve(some, tags=tags))
+
+
+def test_a_record_of_the_format_before_is_read(tmp_path: Path) -> None:
+    """Written by `written(path, 7, 2, 2)` while each tag was a field of its own."""
+    path = tmp_path / "run.h5"
+    path.write_bytes(
+        gzip.decompress((Path(__file__).parent / "earlier/format-2.h5.gz").read_bytes())
+    )
+    particles = some_particles(7, 2)
+    steps = [some_step(number, particles) for number in range(2)]
+    with Record(path) as record:
+        assert_holds(record, steps)
+        assert_same_particles(record.particles, particles)
+    assert repaired(path, tmp_path / "copy") == 2  # in the present format
+    with Record(tmp_path / "copy") as record:
+        assert_same_particles(record.particles, particles)
+    with h5py.File(tmp_path / "copy") as file:
+        assert file["solidsph"].attrs["format"] == FORMAT
 
 
 # Accidents while writing
@@ -647,7 +703,7 @@ def test_a_step_that_does_not_fit_is_refused_whole(
     "field",
     [
         Field("volume", (), "m"),
-        Field("tag left", (), "-"),
+        Field("tags", (), "-"),
         Field("a/b", (), "-"),
         Field("", (), "-"),
         Field("spin", (3,), "1/s"),
@@ -775,17 +831,15 @@ def test_a_newer_format_is_refused(tmp_path: Path) -> None:
     written(path, 3, 2, 1)
     with h5py.File(path, "r+") as file:
         file["solidsph"].attrs["format"] = FORMAT + 1
-    assert_refused(path, f"has format {FORMAT + 1}, this solidsph reads {FORMAT}; update")
+    assert_refused(path, f"has format {FORMAT + 1}, this solidsph reads 2 to {FORMAT}; update")
 
 
 def test_an_older_format_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "run"
     written(path, 3, 2, 1)
     with h5py.File(path, "r+") as file:
-        file["solidsph"].attrs["format"] = FORMAT - 1
-    assert_refused(
-        path, f"has format {FORMAT - 1}, this solidsph reads {FORMAT}; run its scene again"
-    )
+        file["solidsph"].attrs["format"] = 1
+    assert_refused(path, f"has format 1, this solidsph reads 2 to {FORMAT}; run its scene again")
 
 
 def test_a_truncated_record_is_refused(tmp_path: Path) -> None:

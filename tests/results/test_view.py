@@ -45,6 +45,19 @@ def test_the_command_draws_a_picture(path: Path, tmp_path: Path) -> None:
     assert np.abs(pixels(tmp_path / "more.png") - pixels(tmp_path / "body.png")).max() > 100.0
 
 
+def test_body_and_colour_bar_are_whole_and_apart(path: Path, tmp_path: Path) -> None:
+    """Nothing reaches the edge of the picture, and between body and bar there is white."""
+    with Record(path) as record:
+        record.view("velocity", factor=3.0, picture=tmp_path / "body.png")
+    white = pixels(tmp_path / "body.png").min(axis=-1) > 250.0
+    below_the_caption = white[30:]
+    height, width = white.shape
+    for edge in (below_the_caption[0], white[-1], white[:, -1], below_the_caption[:, 0]):
+        assert edge.all()
+    empty = np.flatnonzero(white[height // 4 : -height // 4].all(axis=0))
+    assert ((empty > 0.6 * width) & (empty < 0.85 * width)).any()
+
+
 def test_sliders_move_what_is_shown(path: Path) -> None:
     with Record(path) as record:
         X, d = record.particles.positions, record.dimension

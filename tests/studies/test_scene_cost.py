@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from solidsph import Record, Scene, SceneError, cli
+from solidsph.commands.limit_tables import limit_rows
 from solidsph.studies.cost import SweepSetup, find_best, frontier
 from solidsph.studies.limit import Limit
 from solidsph.studies.point import Point
@@ -255,12 +256,71 @@ def test_a_run_to_an_accuracy(tmp_path: Path) -> None:
         assert record.error_bars[name].bar == bar["+-"]
     drawn = solidsph("plot", told["record"], cwd=tmp_path)
     assert "record-probes.png" in drawn.stdout
-    missed = solidsph(
-        "run", "waves.toml", "--accuracy", "1e-9", "--of", STRESS, "--longest", "1ms", cwd=tmp_path
-    )
-    assert missed.returncode == 2
-    assert "needs 3 spacings" in missed.stderr
-    assert "0.001 s are allowed; allow more" in missed.stderr
+
+
+def test_a_search_that_cannot_tell_an_error_shows_what_it_ran(tmp_path: Path) -> None:
+    (tmp_path / "waves.toml").write_text(SCENE.to_toml())
+    asked = ("--accuracy", "1e-9", "--of", STRESS, "--longest", "1ms")
+    for verb in ("run", "cost"):
+        missed = solidsph(verb, "waves.toml", *asked, cwd=tmp_path)
+        assert missed.returncode == 1
+        assert "needs 3 spacings" in missed.stdout
+        assert "0.001 s are allowed; allow more" in missed.stdout
+        assert "spacing 0.125" in missed.stdout.split("needs 3 spacings")[0]
+        assert "inf" not in missed.stdout
+    assert not list(tmp_path.rglob("*.h5"))
+
+
+def test_a_sweep_that_cannot_tell_an_error_shows_what_it_ran(tmp_path: Path) -> None:
+    (tmp_path / "waves.toml").write_text(SCENE.to_toml())
+    asked = ("cost", "waves.toml", "--of", STRESS, "--axis", "spacing=3.0,2.5,0.125,0.0625")
+    done = solidsph(*asked, cwd=tmp_path)
+    assert done.returncode == 1
+    assert "an error bar needs 3 spacings with the same scheme that finish" in done.stdout
+    assert "failed: spacing 2.5: the simulation cannot be built: " in done.stdout
+    assert "spacing 0.0625: its error is not known" in done.stdout
+    told = json.loads(solidsph(*asked, "--json", cwd=tmp_path).stdout)
+    assert (told["outcome"], told["exit code"]) == ("failed", 1)
+    assert "needs 3 spacings" in told["sentence"]
+    rows = told["measured"]
+    assert [row["configuration"] for row in rows] == ["spacing 0.125", "spacing 0.0625"]
+    for row in rows:
+        assert row["value"] == pytest.approx(TRUTH, rel=0.05)
+    case = SceneCase.of(SCENE, [STRESS])
+    made = frontier(case, {"spacing": (3.0, 2.5, 0.125, 0.0625)}, inline(tmp_path / "again"))
+    assert made.front() == []
+    assert "spacing 0.125" in made._repr_html_()
+
+
+def test_without_a_limit_none_is_told(tmp_path: Path) -> None:
+    """The finest value stands for it in the error bar, and is no limit."""
+    points = [
+        Point({"spacing": h}, np.inf, spacing=h, values={"u": (-np.log(h), 1.0)})
+        for h in (0.4, 0.2, 0.1)
+    ]
+    known = limits(points, "spacing")
+    (row,) = limit_rows(known)
+    assert "no limit is in sight" in row["warning"]
+    assert row["tends to"] is None
+    assert row["finest"] == -np.log(0.1)
+    assert judged(points[0], known).reference is None
+
+
+def test_a_misspelt_reference_is_refused_before_anything_is_said_to_be_replaced(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "waves.toml"
+    path.write_text(SCENE.to_toml())
+    assert solidsph("run", "waves.toml", cwd=tmp_path).returncode == 0
+    record = tmp_path / "results/waves/record.h5"
+    before = record.read_bytes()
+    wrong = f'\n[[reference]]\nquantity = "{STRESS[:-1]}"\nvalue = 1.0\n'
+    path.write_text(SCENE.to_toml() + wrong)
+    done = solidsph("run", "waves.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert f"did you mean '{STRESS}'" in done.stderr
+    assert "replaced" not in done.stderr
+    assert record.read_bytes() == before
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import time as clock
 from typing import Generic, TypeVar, final
 
 from solidsph.assembly.assembler import Assembler
@@ -9,6 +11,8 @@ from solidsph.run.built_scene import BuiltScene
 from solidsph.run.hooks import load_hook_plugins
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_builder import SceneBuilder
+
+LOG = logging.getLogger(__name__)
 
 S = TypeVar("S", bound=BuiltScene)
 
@@ -30,4 +34,9 @@ class Builder(SceneBuilder, Generic[S]):
         """
         manager = load_hook_plugins()
         manager.hook.solidsph_configure(builder=self)
-        return Assembler(self.scene(), manager).assemble(self._kind)
+        begun = clock.perf_counter()
+        built = Assembler(self.scene(), manager).assemble(self._kind)
+        seconds, pairs = clock.perf_counter() - begun, built.dynamics.internal.pair_count
+        count = built.particles.count
+        LOG.info("built %d particles with %d pairs in %.3g s", count, pairs, seconds)
+        return built

@@ -10,7 +10,7 @@ import attrs
 
 from solidsph.commands.console import Table, sweep_progress
 from solidsph.commands.cost_options import goal_of, seconds
-from solidsph.commands.limit_tables import ESTIMATED, limit_rows, with_warnings
+from solidsph.commands.limit_tables import ESTIMATED, limit_rows, measured_table, with_warnings
 from solidsph.results.error_bars import ErrorBar, write_error_bars
 from solidsph.results.record import Record
 from solidsph.scene.scene import Scene
@@ -74,11 +74,16 @@ class Accurate:
 
     def text(self) -> Iterator[Table | str]:
         """For people, where nothing was found."""
-        rows = [[p.label(), 100.0 * p.error, p.time, p.outcome] for p in self.tried]
-        yield Table("tried", ["configuration", "error [%]", "time [s]", "outcome"], rows)
+        judged = any(point.finished for point in self.tried)
+        if judged:
+            rows = [[p.label(), 100.0 * p.error, p.time, p.outcome] for p in self.tried]
+            yield Table("tried", ["configuration", "error [%]", "time [s]", "outcome"], rows)
+        else:
+            yield from measured_table(self.tried)
         yield from with_warnings(ESTIMATED, limit_rows(self.result.limits))
         yield self.sentence
-        yield "the scene itself was not run; ask for less, or give it more time by --longest"
+        remedy = "; ask for less, or give it more time by --longest" if judged else ""
+        yield f"the scene itself was not run{remedy}"
 
     def write_bars(self, path: Path) -> Sequence[Mapping[str, Any]]:
         """Write the error bars into the record of the run, and give them as rows of a table."""
@@ -128,7 +133,7 @@ def accurate(
         shown: whether progress is.
 
     Raises:
-        SceneError: a text cannot be read, or fewer than three spacings have finished.
+        SceneError: a text cannot be read.
     """
     goal = goal_of(wanted, None)
     assert goal is not None

@@ -26,8 +26,10 @@ from rich.table import Table as RichTable
 
 from solidsph.interfaces.terms import Observation
 from solidsph.run.hooks import implementation
+from solidsph.run.progress import part_done
 from solidsph.simulation import Simulation
 from solidsph.studies.sweep import StatusCallback, SweepStatus
+from solidsph.system.progress_display import time_left
 
 
 class _Console(Console):
@@ -45,8 +47,10 @@ def _discard_output(stream: IO[str]) -> None:
         os.close(null)
 
 
-# Files and pipes have no width of their own; this one fits the widest table.
-out = _Console(highlight=False, width=None if sys.stdout.isatty() else 170)
+# Files and pipes have no width of their own; this one fits the widest table. COLUMNS sets another.
+_WIDE = None if sys.stdout.isatty() or "COLUMNS" in os.environ else 170
+
+out = _Console(highlight=False, width=_WIDE)
 err = _Console(stderr=True, highlight=False)
 
 
@@ -84,22 +88,37 @@ class Table:
         cells = [[_text(cell) for cell in row] for row in self.rows]
         columns = [[row[index] for row in cells] for index in range(len(self.columns))]
         wide = sum(_longest([name, *columns[i]]) + 3 for i, name in enumerate(self.columns))
-        table = RichTable(title=escape(self.title), title_justify="left", header_style="bold")
-        for index, name in enumerate(self.columns):
-            values = [row[index] for row in self.rows]
-            numeric = bool(values) and all(_is_number(cell) or cell == "" for cell in values)
-            # Numbers are never cut to fit, their headings break between words; words wrap.
-            heading = name.replace(" ", "\n") if numeric and wide >= out.width else name
+        numeric = [self._is_numeric(index) for index in range(len(self.columns))]
+        # Numbers are never cut to fit, their headings break between words; words wrap.
+        least = [
+            _longest([*name.split(), *cells])
+            if numbers
+            else min(_LEAST, _longest([word for text in (name, *cells) for word in text.split()]))
+            for name, cells, numbers in zip(self.columns, columns, numeric, strict=True)
+        ]
+        crowded = sum(least) + 3 * len(least) + 1 > out.width
+        table = RichTable(
+            title=escape(self.title),
+            title_justify="left",
+            header_style="bold",
+            padding=(0, 0) if crowded else (0, 1),
+        )
+        for name, numbers, width in zip(self.columns, numeric, least, strict=True):
             table.add_column(
-                escape(heading),
-                justify="right" if numeric else "left",
-                no_wrap=numeric,
+                escape(name.replace(" ", "\n") if numbers and wide >= out.width else name),
+                justify="right" if numbers else "left",
+                no_wrap=numbers,
                 overflow="fold",
-                min_width=None if numeric else min(_LEAST, _longest([name, *columns[index]])),
+                min_width=width,
             )
         for row in cells:
             table.add_row(*map(escape, row))
         out.print(table)
+
+    def _is_numeric(self, index: int) -> bool:
+        """Whether a column holds numbers, and at least one."""
+        values = [row[index] for row in self.rows if row[index] not in ("", None)]
+        return bool(values) and all(map(_is_number, values))
 
 
 def present(
@@ -130,11 +149,6 @@ def say(text: str) -> None:
     On a terminal lines break between words; in files and pipes they are whole.
     """
     out.print(escape(text), soft_wrap=not out.is_terminal)
-
-
-def remark(text: str) -> None:
-    """Print plain text on the standard error."""
-    err.print(escape(text), soft_wrap=True)
 
 
 def show_json(data: Mapping[str, Any]) -> None:
@@ -188,10 +202,7 @@ class ProgressObserver:
 
     @implementation
     def solidsph_step_end(self, simulation: Simulation, observation: Observation) -> None:
-        # By time, not by counting: load steps are halved and doubled on the way.
-        moves = simulation.scene.statics is None
-        end = simulation.steps * simulation.step_size if moves else simulation.scene.duration
-        part = observation.state.time / end
+        part = part_done(simulation, observation)
         self._display.update(self._task, completed=round(part * self._steps))
 
 
@@ -211,8 +222,8 @@ class SweepObserver:
 
     def __call__(self, status: SweepStatus) -> None:
         point = status.point
-        if point is not None and not point.finished:
-            self._display.console.print(escape(f"{point.label()}: {point.outcome}"))
+        if point is not None and not point.ran:
+            self._display.console.print(escape(f"{point.label()}: {point.failure}"))
         kept = f", {status.kept} from before" if status.kept else ""
         self._display.update(
             self._task,
@@ -222,19 +233,8 @@ class SweepObserver:
         )
 
 
-def time_left(seconds: float | None) -> str:
-    """Estimated remaining time in words."""
-    if seconds is None:
-        return "time left not known yet"
-    if seconds < 90.0:
-        return f"about {seconds:.0f} s left"
-    if seconds < 5400.0:
-        return f"about {seconds / 60.0:.0f} min left"
-    return f"about {seconds / 3600.0:.1f} h left"
-
-
 def _longest(texts: Iterable[str]) -> int:
-    return max(map(len, texts))
+    return max(map(len, texts), default=0)
 
 
 def _is_number(cell: Any) -> bool:

@@ -13,15 +13,16 @@ import click
 
 from solidsph.commands.console import Table, present, sweep_progress
 from solidsph.commands.cost_options import axes_of, case_of, goal_of, seconds
-from solidsph.commands.limit_tables import ESTIMATED, limit_rows, with_warnings
+from solidsph.commands.limit_tables import ESTIMATED, limit_rows, measured_table, with_warnings
 from solidsph.commands.options import (
-    ProgressOutput,
+    Output,
+    SearchOptions,
     flag,
     option,
+    option_group,
     options,
     output_option,
     set_option,
-    verbose_option,
 )
 from solidsph.commands.target import name_of, resolve, target_argument
 from solidsph.errors import SceneError
@@ -30,7 +31,7 @@ from solidsph.studies.cluster import Cluster
 from solidsph.studies.cost import Axes, SweepSetup, default_settings, find_best, frontier
 from solidsph.studies.frontier import Frontier
 from solidsph.studies.larger_step import ERROR, TIME, at_largest_step, larger_step_sentence
-from solidsph.studies.point import Point
+from solidsph.studies.point import Point, measured
 from solidsph.studies.processes import Processes
 from solidsph.studies.report import write_report
 from solidsph.studies.report_figures import library
@@ -41,15 +42,8 @@ from solidsph.studies.variant import with_settings
 
 
 @attrs.frozen
-class _Options(ProgressOutput):
-    settings: tuple[str, ...] = set_option("the case, or a word or key of the scene")
-    of: tuple[str, ...] = option(
-        "For a scene: be accurate in this column of its history, or this probe; before it may "
-        "stand final, peak or mean.  [default: all probes]",
-        "--of",
-        multiple=True,
-        metavar="[peak] NAME",
-    )
+class _Options(Output):
+    settings: tuple[str, ...] = set_option()
     references: tuple[str, ...] = option(
         "For a scene: what a column should be, a number, a formula of t, or a file of times and "
         "values.  [default: errors are estimated by refinement]",
@@ -70,6 +64,7 @@ class _Options(ProgressOutput):
     time: str | None = option(
         "Find the most accurate configuration in this time, such as 60s.", metavar="TIME"
     )
+    search: SearchOptions = option_group(SearchOptions)
     repeats: int = option(
         "Number of runs of every configuration.",
         type=click.IntRange(1),
@@ -83,19 +78,12 @@ class _Options(ProgressOutput):
         show_default=True,
     )
     scheduler: str | None = option("Run on the Dask cluster at this address.", metavar="ADDRESS")
-    longest: str = option(
-        "A search runs nothing that is expected to take longer.",
-        default="10min",
-        show_default=True,
-        metavar="TIME",
-    )
     output: Path | None = output_option(
         "Folder for points, picture and scenes.  [default: results/cost/NAME]"
     )
     report: bool = flag(
         "Also write an HTML page with interactive plots and the scene of every point."
     )
-    verbose: bool = verbose_option()
 
     def folder(self, target: str) -> Path:
         """Folder of the results."""
@@ -113,7 +101,7 @@ def cost(target: str, options: _Options) -> None:
     sweep.
     """
     goal = goal_of(options.accuracy, options.time)
-    case = case_of(resolve(target, options.settings), target, options.of, options.references)
+    case = case_of(resolve(target, options.settings), target, options.search.of, options.references)
     target = name_of(target)
     if options.accuracy is not None and options.time is not None:
         raise SceneError("--accuracy and --time are two questions; ask one at a time")
@@ -181,6 +169,7 @@ def _sweep(
             for orders in result.orders()
         ],
         "without a reference": _extrapolations(result),
+        "measured": measured(result.points) if result.unjudged else [],
         "time for the next digit": result.next_digit(),
         "default": None
         if default is None
@@ -217,13 +206,17 @@ def _sweep_text(
         yield from with_warnings(ESTIMATED, facts["without a reference"])
     elif bars := facts["without a reference"]:
         yield Table.of("without the reference: extrapolation", bars, list(bars[0]))
+    if result.unjudged:
+        yield from measured_table(result.points)
     for point in result.points:
-        if not point.finished:
-            yield f"failed: {point.label()}: {point.outcome.splitlines()[0]}"
+        if not point.ran:
+            yield f"failed: {point.label()}: {point.failure}"
     if default is not None:
         excess = result.excess(default)
         place = f"{default.brief()}: on the front"
-        if not isfinite(excess):
+        if default.ran and not default.finished:
+            place = f"{default.label()}: its error is not known"
+        elif not isfinite(excess):
             place = f"{default.label()}: failed"
         elif excess != 1.0:
             more = f"{excess:.2g} times the time of an equally accurate one on the front"
@@ -270,7 +263,7 @@ def _extrapolations(result: Frontier) -> Sequence[Mapping[str, Any]]:
 def _search(
     target: str, options: _Options, case: Case, axes: Axes, setup: SweepSetup, goal: Goal
 ) -> Presentation:
-    longest = seconds(options.longest, "--longest")
+    longest = seconds(options.search.longest, "--longest")
     result = find_best(case, goal, axes, setup, longest=longest)
     best = result.point
     scenes = list(_write_scenes(target, options.folder(target), case, result))
@@ -278,6 +271,7 @@ def _search(
         "case": target,
         "found": None if best is None else _facts(best),
         "tried": [_facts(point) for point in result.tried],
+        "measured": [] if result.limits else measured(result.tried),
         "spent [s]": result.spent,
         "sure": result.sure,
         "estimated": limit_rows(result.limits),
@@ -289,11 +283,17 @@ def _search(
 def _search_text(
     facts: Mapping[str, Any], result: SearchResult, verbose: bool
 ) -> Iterator[Table | str]:
-    yield _points_table(f"{facts['case']}: configurations tried", result.tried, verbose)
+    judged = [point for point in result.tried if point.finished]
+    if judged:
+        yield _points_table(f"{facts['case']}: configurations tried", result.tried, verbose)
+    else:
+        yield from measured_table(result.tried)
     yield from with_warnings(ESTIMATED, facts["estimated"])
     yield f"{result.sure}; the search took {result.spent:.3g} s of runs"
     yield from (f"scene: {path}" for path in facts["scenes"])
-    if result.point is None:
+    if result.point is None and not judged:
+        yield "found: nothing"
+    elif result.point is None:
         yield "found: nothing; give finer values by --axis, or a longer time by --longest"
     else:
         yield f"found: {result.point.brief()}"

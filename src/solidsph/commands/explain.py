@@ -10,7 +10,7 @@ import click
 
 from solidsph.advice import advise
 from solidsph.commands.console import Table, present
-from solidsph.commands.options import Output, flag, option, options, set_option, verbose_option
+from solidsph.commands.options import Output, flag, option, options, set_option
 from solidsph.commands.prediction import (
     INTERNALS,
     Row,
@@ -49,7 +49,7 @@ Facts = dict[str, Any]
 
 @attrs.frozen
 class _Options(Output):
-    settings: tuple[str, ...] = set_option("the case, or a word or key of the scene")
+    settings: tuple[str, ...] = set_option()
     cluster: tuple[str, ...] = option(
         "Assumption about the cluster on which a scene larger than this machine is priced: "
         "cores, memory [GiB], bandwidth [GB/s], network [GB/s], latency [us], storage [GB/s], "
@@ -61,7 +61,6 @@ class _Options(Output):
         "Build the scene, however long that takes, to count its work and find its warnings.  "
         "[default: build what takes seconds, and price what is larger on paper]"
     )
-    verbose: bool = verbose_option()
 
 
 @click.command()

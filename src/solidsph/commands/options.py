@@ -10,6 +10,8 @@ from typing import Any
 import attrs
 import click
 
+from solidsph.commands.verbosity import say_from
+
 FILE = click.Path(path_type=Path, dir_okay=False)
 
 
@@ -30,7 +32,7 @@ def flag(text: str, *names: str) -> Any:
     return option(text, *names, is_flag=True, default=False)
 
 
-def set_option(of: str) -> Any:
+def set_option(of: str = "the case, or a word or key of the scene") -> Any:
     """Field for `--set NAME=VALUE`, of a case, a scene or a part."""
     return option(f"Set a parameter of {of}.", "--set", multiple=True, metavar="NAME=VALUE")
 
@@ -41,28 +43,48 @@ def output_option(text: str, default: Path | None = None) -> Any:
     return option(text, "--output", type=path, default=default, show_default=default is not None)
 
 
-def verbose_option() -> Any:
-    """Field for `--verbose`."""
-    return flag("Also show internals, such as the engine and memory traffic.")
-
-
 @attrs.frozen
 class Output:
     """Options of every verb."""
 
     as_json: bool = flag("Print one JSON object instead of text.", "--json")
+    verbosity: int = option(
+        "Say what is done, and show internals in tables, such as the engine and memory traffic; "
+        "-vv says every detail.",
+        *("-v", "--verbose"),
+        count=True,
+        default=0,
+    )
+    quiet: bool = flag("Show results and errors only: no progress, no warnings.", "-q", "--quiet")
 
-
-@attrs.frozen
-class ProgressOutput(Output):
-    """Options of every verb that shows its progress."""
-
-    quiet: bool = flag("Show no progress.")
+    @property
+    def verbose(self) -> bool:
+        """Whether internals are shown."""
+        return self.verbosity > 0
 
     @property
     def progress(self) -> bool:
         """Whether progress is shown."""
         return not (self.as_json or self.quiet)
+
+
+@attrs.frozen
+class SearchOptions:
+    """Options of every verb that searches for an accuracy."""
+
+    of: tuple[str, ...] = option(
+        "Be accurate in this column of a scene's history, or this probe; before it may stand "
+        "final, peak or mean.  [default: all probes]",
+        "--of",
+        multiple=True,
+        metavar="[peak] NAME",
+    )
+    longest: str = option(
+        "A search runs nothing that is expected to take longer.",
+        default="10min",
+        show_default=True,
+        metavar="TIME",
+    )
 
 
 def option_group(cls: type[Any]) -> Any:
@@ -71,11 +93,15 @@ def option_group(cls: type[Any]) -> Any:
 
 
 def options(cls: type[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Decorator of a verb that adds the options of a class, and passes an object of it."""
+    """Decorator of a verb that adds the options of a subclass of `Output`, and passes an object."""
 
     def decorate(function: Callable[..., None]) -> Callable[..., None]:
         @wraps(function)
         def command(**values: Any) -> None:
+            before = click.get_current_context().find_root().params  # solidsph -q VERB
+            values["verbosity"] += before.get("verbosity", 0)
+            values["quiet"] |= before.get("quiet", False)
+            say_from(values["verbosity"], values["quiet"])
             function(options=_collected(cls, values), **values)
 
         for field in reversed(list(_fields(cls))):  # click lists the last one applied first

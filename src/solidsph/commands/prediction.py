@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import subprocess
 import time as clock
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import attrs
-import click
 
 from solidsph.costs import calibration
 from solidsph.costs.calibration import Calibration
@@ -23,6 +23,8 @@ from solidsph.run.outcome import FINISHED
 from solidsph.scene.scene import Scene
 from solidsph.simulation import Simulation
 from solidsph.studies.case_run import SceneRun
+
+LOG = logging.getLogger(__name__)
 
 LONG = 5.0
 """Runs predicted to take longer are announced [s]."""
@@ -59,7 +61,7 @@ def this_machine() -> Calibration:
     try:
         return calibration.this_machine()
     except (OSError, ValueError, subprocess.SubprocessError) as cause:
-        click.echo(f"this machine could not be calibrated ({cause}): a reference is used", err=True)
+        LOG.warning("this machine could not be calibrated (%s): a reference is used", cause)
         return REFERENCE
 
 

@@ -12,12 +12,12 @@ import attrs
 import click
 
 from solidsph.commands.console import Table, present, progress, progress_observers
-from solidsph.commands.options import FILE, ProgressOutput, flag, option, options, output_option
+from solidsph.commands.options import FILE, Output, flag, option, options, output_option
 from solidsph.registry import registry
 
 
 @attrs.frozen
-class _Options(ProgressOutput):
+class _Options(Output):
     listed: bool = flag("List figures and passages with their cases.", "--list")
     output: Path = output_option(
         "Folder for pictures, data and records.", Path("results/reproduce")

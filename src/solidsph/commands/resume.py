@@ -9,7 +9,7 @@ import attrs
 import click
 
 from solidsph.commands.console import present, progress, progress_observers, say
-from solidsph.commands.options import ProgressOutput, flag, option, options
+from solidsph.commands.options import Output, flag, option, options
 from solidsph.errors import RecordError
 from solidsph.results.layout import RECORD_SUFFIXES
 from solidsph.results.record import Record
@@ -18,7 +18,7 @@ from solidsph.run.outcome import UNSOUND
 
 
 @attrs.frozen
-class _Options(ProgressOutput):
+class _Options(Output):
     until: float | None = option("Extend the run to this time [s].", type=float, metavar="T")
     force: bool = flag("Resume even if versions, plugins or threads have changed.")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,19 +19,19 @@ from solidsph.commands.console import (
     present,
     progress,
     progress_observers,
-    remark,
     say,
 )
 from solidsph.commands.limit_tables import with_warnings
 from solidsph.commands.options import (
     FILE,
-    ProgressOutput,
+    Output,
+    SearchOptions,
     flag,
     option,
+    option_group,
     options,
     output_option,
     set_option,
-    verbose_option,
 )
 from solidsph.commands.receipt_tables import case_receipts, case_receipts_text, receipts_text
 from solidsph.commands.target import name_of, resolve, target_argument
@@ -51,10 +52,12 @@ from solidsph.studies.receipts import quantity, receipts
 from solidsph.studies.scene_case import references_of
 from solidsph.watch import Finding, run_watched
 
+LOG = logging.getLogger(__name__)
+
 
 @attrs.frozen
-class _Options(ProgressOutput):
-    settings: tuple[str, ...] = set_option("the case, or a word or key of the scene")
+class _Options(Output):
+    settings: tuple[str, ...] = set_option()
     output: Path | None = output_option(
         "Folder for records and pictures, or for a scene the file of its record (.h5 or .vtkhdf).  "
         "[default: results/NAME]"
@@ -77,19 +80,7 @@ class _Options(ProgressOutput):
         "probe with its error bar.",
         metavar="PERCENT",
     )
-    of: tuple[str, ...] = option(
-        "With --accuracy: of this column of the history or this probe only; before it may stand "
-        "final, peak or mean.",
-        "--of",
-        multiple=True,
-        metavar="[peak] NAME",
-    )
-    longest: str = option(
-        "With --accuracy: run nothing that is expected to take longer.",
-        default="10min",
-        show_default=True,
-        metavar="TIME",
-    )
+    search: SearchOptions = option_group(SearchOptions)
     receipts: bool = flag(
         "Then report what each effect cost and changed, by runs without it at reduced size."
     )
@@ -99,19 +90,19 @@ class _Options(ProgressOutput):
         metavar="NAME=x@[X,Y]",
     )
     beyond_memory: bool = flag("Run even if more memory is predicted than is free.")
-    verbose: bool = verbose_option()
 
     def check_memory(self, scene: Scene) -> None:
         """Refuse a scene that needs more memory than is free, unless that is wanted."""
         if not self.beyond_memory:
             check_memory(scene)
 
-    def check_record(self, path: Path) -> None:
-        """Refuse to replace a record that must stay; print which one is replaced."""
+    def check_record(self, path: Path) -> str:
+        """Refuse to replace a record that must stay; tell which one is replaced, if any."""
         check_no_writer(path)
         earlier = check_replaceable(path, overwrite=self.overwrite)
-        if earlier is not None and earlier.count:
-            remark(f"{path} holds {earlier.description}; it is replaced")
+        if earlier is None or not earlier.count:
+            return ""
+        return f"{path} holds {earlier.description}; it is replaced"
 
 
 @click.command()
@@ -130,7 +121,7 @@ def run(target: str, options: _Options) -> None:
     folder = options.output or Path("results") / name_of(target)
     watch = options.watch or options.roll_back
     if isinstance(wanted, Case):
-        if options.accuracy is not None or options.of:
+        if options.accuracy is not None or options.search.of:
             raise SceneError(
                 "--accuracy is for a scene; of a case ask: solidsph cost CASE --accuracy"
             )
@@ -147,7 +138,7 @@ def run(target: str, options: _Options) -> None:
         raise SceneError("--watch is for motions; an equilibrium is tested by itself")
     path = folder if folder.suffix in RECORD_SUFFIXES else folder / "record.h5"
     if options.accuracy is None:
-        if options.of:
+        if options.search.of:
             raise SceneError("--of says what --accuracy is of; add --accuracy, such as 1%")
         _run_scene(target, wanted, path, options)
         return
@@ -156,8 +147,8 @@ def run(target: str, options: _Options) -> None:
         name_of(target),
         wanted,
         options.accuracy,
-        of=options.of,
-        longest=options.longest,
+        of=options.search.of,
+        longest=options.search.longest,
         folder=path.parent / "search",
         shown=options.progress,
     )
@@ -182,13 +173,15 @@ def _run_scene(
     target: str, scene: Scene, path: Path, options: _Options, found: Accurate | None = None
 ) -> None:
     options.check_memory(scene)
-    options.check_record(path)
+    replaced = options.check_record(path)
     known = known_facts()
     known |= {"scene": target, "record": str(path), "warnings": []}
     simulation, build = predictions.build_timed(scene)
     references = references_of(scene, columns_of(simulation)) if scene.references else ()
     advice = advise(simulation)
     known["warnings"] += [warning.line for warning in advice]
+    if replaced:  # said when nothing in the scene is refused any more
+        LOG.warning(replaced)
     if not options.as_json:
         _warn(advice)
     predicted = predictions.try_prediction(simulation, build)
@@ -264,10 +257,9 @@ def _run_scene(
 def _warn(advice: Sequence[Advice], scene: str = "") -> None:
     """Print warnings ahead of a run on the standard error."""
     where = f"{scene}, " if scene else ""
-    for warning in advice:
-        remark(f"warning, {where}{warning.name}: {warning.finding}. Remedy: {warning.remedy}")
-    if advice:
-        remark('(more: solidsph explain; to silence: silence = ["NAME"])')
+    lines = [f"warning, {where}{a.name}: {a.finding}. Remedy: {a.remedy}" for a in advice]
+    if lines:
+        LOG.warning("\n".join([*lines, '(more: solidsph explain; to silence: silence = ["NAME"])']))
 
 
 @attrs.frozen
@@ -286,12 +278,13 @@ class _Watchdog:
             f"particle {finding.particle}; try {finding.remedy}"
         )
         self.warnings.append(text)
-        remark(text)
+        LOG.warning(text)
 
 
 def _run_case(target: str, case: Case, folder: Path, options: _Options) -> None:
     for name in case.scenes():
-        options.check_record(folder / f"{name}.h5")
+        if replaced := options.check_record(folder / f"{name}.h5"):
+            LOG.warning(replaced)
     known = known_facts()
     known |= {"case": target, "warnings": {}}
     predicted: dict[str, Prediction | None] = {}

@@ -12,7 +12,7 @@ import click
 
 from solidsph.commands.console import Table, present, progress
 from solidsph.commands.options import (
-    ProgressOutput,
+    Output,
     flag,
     option,
     option_group,
@@ -20,12 +20,13 @@ from solidsph.commands.options import (
     output_option,
 )
 from solidsph.commands.scheme_options import SchemeOptions
+from solidsph.commands.target import STANDARD_INPUT
 from solidsph.errors import SceneError
 from solidsph.studies.suite import Verdict, run_trial, trials
 
 
 @attrs.frozen
-class _Options(ProgressOutput):
+class _Options(Output):
     listed: bool = flag("List the trials without running them.", "--list")
     brief: bool = flag("Run the short form of each trial.")
     map: bool = flag("Draw a stability map of a scheme instead.")
@@ -49,6 +50,12 @@ def stability(cases: tuple[str, ...], options: _Options) -> None:
     All cases or those named run with their own scheme, or with the parts given. Some trials must
     fail: a suite in which nothing can fail proves nothing.
     """
+    for name in cases:
+        if name == STANDARD_INPUT or name.endswith(".toml"):
+            raise SceneError(
+                f"stability runs cases, and {name!r} is a scene; look for failure in it with: "
+                f"solidsph run {name} --watch"
+            )
     if options.map:
         if cases:
             raise SceneError(f"a map is of a scheme, not of cases; leave out {', '.join(cases)}")

@@ -41,9 +41,9 @@ def view(result: Path, options: _Options) -> None:
     """Show a record in 3D, with sliders for time and deformation."""
     from solidsph.results.view import view as show
 
-    if options.picture is None and not _has_display():
-        raise RecordError("there is no display to open a window on; draw a file, with --picture")
     with Record(result) as record:
+        if options.picture is None and not _has_display():
+            raise RecordError("there is no display to open a window on; draw a file: --picture")
         show(
             record,
             field=options.field,

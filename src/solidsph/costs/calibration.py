@@ -7,6 +7,7 @@ and so that imports and the first compilation are cold.
 from __future__ import annotations
 
 import json
+import logging
 import os
 import platform
 import subprocess
@@ -21,6 +22,8 @@ from typing import Any
 import attrs
 
 from solidsph.system.cache import cache_folder, write_whole
+
+LOG = logging.getLogger(__name__)
 
 # Lifetime of a cached calibration [s]: the load and the cooling of a machine change.
 _STALE = 86400.0
@@ -69,6 +72,7 @@ def this_machine() -> Calibration:
     """Calibration of this machine: from this process, from the cache file, or measured."""
     calibration = cached_calibration()
     if calibration is None:
+        LOG.info("calibrating this machine, for predictions of time")
         calibration = measure_calibration()
         write_whole(cache_file(), calibration.to_json().encode())
     return calibration

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import time as clock
 from collections.abc import Mapping
@@ -18,6 +19,8 @@ from solidsph.results.recorder import scene_text
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.hooks import implementation
 from solidsph.run.outcome import is_over
+
+LOG = logging.getLogger(__name__)
 
 # Share of a run's time that checkpoints may take.
 SHARE = 0.01
@@ -114,6 +117,7 @@ class Checkpointer:
         write_checkpoint(self._path, checkpoint)
         self._last = clock.perf_counter()
         self._cost, self._is_written = self._last - begun, True
+        LOG.debug("checkpoint of t = %.6g s in %.3g s", self._state.time, self._cost)
 
 
 def _size(state: State) -> int:

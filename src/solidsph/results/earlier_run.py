@@ -8,8 +8,9 @@ import attrs
 
 from solidsph.errors import RecordError
 from solidsph.results.layout import RUNNING
-from solidsph.results.record import NotARecordError, Record, check_is_record
+from solidsph.results.record import Record
 from solidsph.results.record_file import check_writable
+from solidsph.results.record_kind import NotARecordError, check_is_record
 from solidsph.run.outcome import FINISHED, INTERRUPTED, is_over
 
 # Outcomes of runs that would come to the same end again.

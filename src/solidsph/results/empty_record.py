@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -14,14 +14,18 @@ from solidsph.model.particles import Particles
 from solidsph.results.contents import BYTES, Reference
 from solidsph.results.layout import (
     FORMAT,
+    MOST_TAGS,
     OUTCOME_BYTES,
     PARTICLE_ARRAYS,
     RUNNING,
+    TAGS,
     VTKHDF_VERSION,
     Field,
     PluginUsed,
+    body_name,
     padded,
     static_fields,
+    tag_bits,
     tag_name,
 )
 
@@ -33,7 +37,13 @@ _LARGEST_CHUNK = 2**30  # bytes; HDF5 allows just under 4 GiB
 def check_fields(fields: Sequence[Field], particles: Particles) -> None:
     """Raise RecordError unless a record of these particles can hold these fields."""
     d = particles.dimension
-    taken = {field.name for field in static_fields(d)} | {tag_name(tag) for tag in particles.tags}
+    tags = _own_tags(particles)
+    if len(tags) > MOST_TAGS:
+        raise RecordError(
+            f"a record holds at most {MOST_TAGS} tags besides those of bodies, and the scene has "
+            f"{len(tags)}; leave some out"
+        )
+    taken = {field.name for field in static_fields(d)}
     for field in fields:
         if field.name in taken or not field.name.strip(".") or "/" in field.name:
             raise RecordError(
@@ -51,8 +61,8 @@ def check_fields(fields: Sequence[Field], particles: Particles) -> None:
 def reference_bytes(reference: Reference) -> int:
     """Size of the reference data in a file [bytes]."""
     particles = reference.particles
-    cells, tags, vector = 17, len(particles.tags), 24
-    each = cells + tags + 3 * vector + 3 * 8 + 5
+    cells, vector = 17, 24
+    each = cells + 3 * vector + 4 * 8 + 5
     faces = sum(
         face.particles.nbytes + face.area_vectors.nbytes + face.areas.nbytes
         for face in particles.faces.values()
@@ -97,12 +107,42 @@ def _write_grid(file: Any, particles: Particles, fields: Sequence[Field]) -> Non
     arrays["body"] = np.full(n, -1, dtype=np.int32)
     for number, extent in enumerate(particles.bodies.values()):
         arrays["body"][extent] = number
-    static = [(field, arrays[field.name]) for field in static_fields(particles.dimension)]
-    static += [(Field(tag_name(tag), (), "-"), mask) for tag, mask in particles.tags.items()]
-    for field, rows in static:
+    bits = tag_bits(_own_tags(particles))
+    arrays[TAGS] = np.zeros(n, dtype=np.int64)
+    for tag, bit in bits.items():
+        arrays[TAGS][particles.tags[tag]] |= bit
+    for field in static_fields(particles.dimension):
+        rows = arrays[field.name]
         values = rows.astype(np.uint8) if rows.dtype == np.bool_ else rows
         _describe(data.create_dataset(field.name, data=padded(values, field.components)), field)
         offsets[field.name] = shared
+    names = {tag_name(tag): bit for tag, bit in bits.items()}
+    names |= {body_name(body): number for number, body in enumerate(particles.bodies)}
+    _write_names(grid, names, shared)
+
+
+def _own_tags(particles: Particles) -> Sequence[str]:
+    """The tags that say more than the numbers of bodies, each of which is a tag, too."""
+
+    def is_body(tag: str) -> bool:
+        place = particles.bodies.get(tag)
+        if place is None:
+            return False
+        mask = particles.tags[tag]
+        return bool(mask[place].all()) and int(mask.sum()) == len(mask[place])
+
+    return [tag for tag in particles.tags if not is_body(tag)]
+
+
+def _write_names(grid: Any, names: Mapping[str, int], shared: Any) -> None:
+    """What the integers of `tags` and `body` stand for.
+
+    Numbers that have the names, since VTK crashes on texts in a file with times.
+    """
+    data, offsets = grid.create_group("FieldData"), grid["Steps"].create_group("FieldDataOffsets")
+    for name, number in names.items():
+        data[name] = np.array([number])
+        offsets[name] = shared
 
 
 def _write_run(file: Any, reference: Reference) -> None:
@@ -125,6 +165,7 @@ def _write_run(file: Any, reference: Reference) -> None:
     run["versions"] = _texts([f"{name} {version}" for name, version in reference.versions.items()])
     run["fields"] = _texts([field.name for field in reference.fields])
     run["tags"] = _texts(list(particles.tags))
+    run["bits"] = _texts(_own_tags(particles))
     run["bodies"] = _texts(list(particles.bodies))
     ranges = [rows.indices(particles.count)[:2] for rows in particles.bodies.values()]
     run["body_ranges"] = np.array(ranges, dtype=np.int64).reshape(-1, 2)

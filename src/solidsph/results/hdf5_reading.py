@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
+from solidsph.maths.arrays import Mask
 from solidsph.model.particles import Face, Particles
-from solidsph.results.layout import PARTICLE_ARRAYS, static_fields, tag_name, unpadded
+from solidsph.results.layout import (
+    FORMAT,
+    PARTICLE_ARRAYS,
+    TAGS,
+    static_fields,
+    tag_bits,
+    tag_name,
+    unpadded,
+)
 
 
 def lines(group: Any, name: str) -> tuple[str, ...]:
@@ -41,17 +51,35 @@ def read_particles(run: Any, data: Any, dimension: int) -> Particles:
         if field.name in PARTICLE_ARRAYS
     }
     arrays["ghosts"] = arrays["ghosts"].astype(np.bool_)
+    bodies = {
+        name: slice(int(start), int(stop))
+        for name, (start, stop) in zip(lines(run, "bodies"), run["body_ranges"][()], strict=True)
+    }
     return Particles(
         **arrays,
-        tags={tag: data[tag_name(tag)][()].astype(np.bool_) for tag in lines(run, "tags")},
-        bodies={
-            name: slice(int(start), int(stop))
-            for name, (start, stop) in zip(
-                lines(run, "bodies"), run["body_ranges"][()], strict=True
-            )
-        },
+        tags=dict(_tags(run, data, bodies)),
+        bodies=bodies,
         faces=dict(_face(run[f"faces/{number}"]) for number in range(len(run.get("faces", ())))),
     )
+
+
+def _tags(run: Any, data: Any, bodies: Mapping[str, slice]) -> Iterator[tuple[str, Mask]]:
+    """Every tag and its mask."""
+    names = lines(run, "tags")
+    if int(run.attrs["format"]) < FORMAT:
+        for name in names:
+            yield name, data[tag_name(name)][()].astype(np.bool_)
+        return
+    rows, bits = data[TAGS][()], tag_bits(lines(run, "bits"))
+    if (rows >> len(bits)).any():
+        raise ValueError(f"{data[TAGS].name} has bits of no tag")
+    for name in names:
+        if name in bits:
+            mask = (rows & bits[name]).astype(np.bool_)
+        else:
+            mask = np.zeros(len(rows), dtype=np.bool_)
+            mask[bodies[name]] = True
+        yield name, mask
 
 
 def _face(group: Any) -> tuple[str, Face]:

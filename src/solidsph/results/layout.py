@@ -10,15 +10,19 @@ dimensions only, so a vector is padded with zeros to 3 components and a tensor t
 | `/VTKHDF/PointData/<other>` | n | reference data, shared by all steps |
 | `/VTKHDF/Steps` | 1 every step | times, and the first row of each step in the above |
 | `/VTKHDF/Steps`, attribute `NSteps` | | how many steps are complete: written last |
+| `/VTKHDF/FieldData/tag <name>` | 1 | the bit of a tag in the integers of `PointData/tags` |
+| `/VTKHDF/FieldData/body <name>` | 1 | the number of a body in `PointData/body` |
 | `/solidsph/step`, `/solidsph/history` | 1 every step | step numbers; named columns |
 | `/solidsph/error_bars` | 1 every quantity | numbers and their estimated errors, if any |
 | `/solidsph/digests` | 1 every step | digest of everything in the step |
-| the rest of `/solidsph` | | scene, plugins, versions, bodies, tags, faces, outcome; a digest |
+| `/solidsph/tags`, `/solidsph/bits` | 1 every tag | names; those that have a bit, from the lowest |
+| the rest of `/solidsph` | | scene, plugins, versions, bodies, faces, outcome; a digest |
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 import attrs
 import numpy as np
@@ -26,7 +30,9 @@ import numpy as np
 from solidsph.maths.arrays import Array
 from solidsph.registry.registry import Entry
 
-FORMAT = 2  # a reader refuses any other
+FORMAT = 3  # that is written
+READABLE = (2, FORMAT)  # a reader refuses any other; in 2, each tag is a field of its own
+MOST_TAGS = 62  # bits of a signed integer
 VTKHDF_VERSION = (2, 0)  # the first with time; higher ones add nothing that is used here
 RECORD_SUFFIXES = (".h5", ".vtkhdf")  # `.vtkhdf` is what VTK and PyVista know it by
 RUNNING = "running"  # the outcome until the writer is closed
@@ -76,6 +82,10 @@ PARTICLE_ARRAYS = {
 """Arrays of reference data: name in a record -> attribute of `Particles`."""
 
 
+TAGS = "tags"
+"""The field of integers that hold the tags of each particle."""
+
+
 def static_fields(dimension: int) -> tuple[Field, ...]:
     """Names, shapes and units of the particles' reference data in a record."""
     d = dimension
@@ -88,12 +98,23 @@ def static_fields(dimension: int) -> tuple[Field, ...]:
         Field("ghost", (), "-"),  # 1 for a ghost
         Field("image", (d,), "m"),
         Field("body", (), "-"),  # number of the body, -1 outside all
+        Field(TAGS, (), "-"),  # the sum of the bits of its tags, but for that of the body
     )
 
 
 def tag_name(tag: str) -> str:
-    """Name of the array that marks a tag's particles."""
+    """Name of the number that is the bit of a tag; in format 2, of the array that marks it."""
     return "tag " + field_name(tag)
+
+
+def body_name(body: str) -> str:
+    """Name of the number of a body."""
+    return "body " + field_name(body)
+
+
+def tag_bits(tags: Iterable[str]) -> dict[str, int]:
+    """Bit of each tag: 1, 2, 4 and so on."""
+    return {tag: 1 << place for place, tag in enumerate(tags)}
 
 
 def field_name(quantity: str) -> str:

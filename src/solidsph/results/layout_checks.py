@@ -15,7 +15,7 @@ import numpy as np
 
 from solidsph.model.particles import Particles
 from solidsph.results.contents import BYTES
-from solidsph.results.layout import HDF5_ERRORS, static_fields, tag_name
+from solidsph.results.layout import FORMAT, HDF5_ERRORS, TAGS, static_fields, tag_name
 
 ANY = "any"  # size
 
@@ -98,11 +98,16 @@ def _rest(tree: Tree, steps: int, fields: Sequence[str], tags: Sequence[str]) ->
     yield _growing("VTKHDF/Steps/Values", _FLOAT, (steps,))
     yield _growing("solidsph/step", _WHOLE, (steps,))
     yield _growing("solidsph/digests", _WHOLE, (steps, BYTES))
+    old = tree.item("solidsph").attrs["format"] < FORMAT
     for field in static_fields(d):
-        kind = _WHOLE if field.name in ("ghost", "body") else _FLOAT
+        if old and field.name == TAGS:
+            continue
+        kind = _WHOLE if field.name in ("ghost", "body", TAGS) else _FLOAT
         yield Entry(f"{data}/{field.name}", kind, (n, *_width(field.components)))
-    for tag in tags:
-        yield Entry(f"{data}/{tag_name(tag)}", _WHOLE, (n,))
+    if old:
+        yield from (Entry(f"{data}/{tag_name(tag)}", _WHOLE, (n,)) for tag in tags)
+    else:
+        yield Entry("solidsph/bits", _TEXT, (ANY,))
     for path in ("VTKHDF/Points", *(f"{data}/{name}" for name in fields)):
         yield Entry(path, _WHOLE, (ANY,), "components")
         yield Entry(path, _TEXT, (), "units")

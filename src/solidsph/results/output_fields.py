@@ -10,7 +10,7 @@ import numpy as np
 from solidsph.errors import PluginError, RecordError
 from solidsph.interfaces.terms import EnergyTerm, FieldTerm, Observation, Term
 from solidsph.maths.arrays import Array
-from solidsph.results.layout import Field, field_name, static_fields, tag_name
+from solidsph.results.layout import Field, field_name, static_fields
 from solidsph.run.energy import BY_BODY, ledger
 from solidsph.scene.checks import returned
 
@@ -84,7 +84,6 @@ def name_clashes(at_rest: Observation, terms: Sequence[Term]) -> Iterator[str]:
     d = at_rest.particles.dimension
     static = (field.name for field in static_fields(d))
     taken = dict.fromkeys((*BASIC_FIELDS, *static), "every record")
-    taken |= {tag_name(tag): f"tag {tag!r}" for tag in at_rest.particles.tags}
     for term in terms:
         owner = repr(term.label)
         if isinstance(term, EnergyTerm) and term.label in BY_BODY:

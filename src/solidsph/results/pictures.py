@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from solidsph.errors import RecordError
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import largest_principal
+from solidsph.results.picture import Picture
 from solidsph.results.probe_picture import draw_probes, probe_columns
 from solidsph.results.recorded import Recorded
 
@@ -85,7 +86,7 @@ def _draw_histories(record: Recorded, field: str) -> Figure:
     real = np.flatnonzero(~particles.ghosts)
     order = real[np.argsort(particles.positions[real, 0])]
     X = particles.positions[order, 0]
-    drawn = Figure(figsize=(10.0, 4.5), layout="constrained")
+    drawn = Picture(figsize=(10.0, 4.5), layout="constrained")
     left, right = drawn.subplots(1, 2)
     left.plot(record.times, record.positions[:][:, order, 0] - X, color="0.4", linewidth=0.6)
     left.set(xlabel="time [s]", ylabel="displacement [m]")
@@ -103,25 +104,32 @@ def _draw_bodies(record: Recorded, field: str) -> Figure:
     real = ~particles.ghosts
     spans = [np.ptp(record.positions[k][real], axis=0) for k in (0, -1)]
     extent = float(np.max(spans)) or 1.0
-    height = 1.5 + 4.0 * min(1.2, max(0.4, float(max(span[1] for span in spans)) / extent))
-    drawn = Figure(figsize=(11.0, height), layout="constrained")
-    solid = {"projection": "3d"} if record.dimension == 3 else {}
-    axes = drawn.subplots(1, 2, subplot_kw=solid)
+    solid = record.dimension == 3
+    tallest = 1.0 if solid else float(max(span[1] for span in spans)) / extent
+    height = 1.5 + 4.0 * min(1.2, max(0.4, tallest))
+    drawn = Picture(figsize=(11.0, height), layout="constrained")
+    axes = drawn.subplots(1, 2, subplot_kw={"projection": "3d"} if solid else {})
     values = [magnitudes(record.field(field)[k][real]) for k in (0, -1)]
     low, high = min(v.min() for v in values), max(v.max() for v in values)
     # Size of a marker that about fills a spacing, on an axis some 300 points wide.
     size = max(1.0, (280.0 * float(particles.spacings[0]) / extent) ** 2)
     for axis, k, colours in zip(axes, (0, -1), values, strict=True):
         x = record.positions[k][real]
-        dots = axis.scatter(*x.T, c=colours, s=size, cmap="cividis", vmin=low, vmax=high)
+        shades = {"depthshade": False} if solid else {}  # colours as in the bar
+        dots = axis.scatter(*x.T, c=colours, s=size, cmap="cividis", vmin=low, vmax=high, **shades)
         axis.set_title(f"t = {record.times[k]:.4g} s", fontsize=10)
         axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+        if solid:  # few ticks and room for labels, which a slender body leaves little of
+            axis.set(zlabel="z [m]")
+            axis.locator_params(nbins=3)
+            limits = (axis.get_xlim(), axis.get_ylim(), axis.get_zlim())
+            axis.set_box_aspect(np.ptp(limits, axis=1), zoom=0.75)
     drawn.colorbar(dots, ax=axes, shrink=0.8, label=colour_label(record, field))
     return drawn
 
 
 def _draw_energies(times: Array, history: Mapping[str, Array]) -> Figure:
-    drawn = Figure(figsize=(9.0, 4.5), layout="constrained")
+    drawn = Picture(figsize=(9.0, 4.5), layout="constrained")
     axis = drawn.subplots()
     styles = ("-", "--", "-.", ":")
     energies = {name: values for name, values in history.items() if name.endswith("[J]")}

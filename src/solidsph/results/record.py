@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
@@ -19,16 +18,18 @@ from solidsph.maths.arrays import Array
 from solidsph.results.contents import Output, Reference
 from solidsph.results.error_bars import read_error_bars
 from solidsph.results.hdf5_reading import check_rows, first_rows, lines, read_particles, word
-from solidsph.results.hdf5_source import SIGNATURE, HDF5Source, is_unclosed
+from solidsph.results.hdf5_source import HDF5Source, is_unclosed
 from solidsph.results.layout import (
     FORMAT,
     HDF5_ERRORS,
+    READABLE,
     Field,
     PluginUsed,
     reason,
     unpadded,
 )
 from solidsph.results.layout_checks import Tree, check_first, check_rest, check_values
+from solidsph.results.record_kind import group_of_run, head_of, may_change
 from solidsph.results.recorded import DISPLACEMENT
 from solidsph.results.time_series import TimeSeries
 
@@ -46,10 +47,6 @@ ALL = slice(None)
 # While the run goes on, a block of the file may be read half written, or the file be replaced.
 _ATTEMPTS = 4
 _PAUSE = 0.02  # s
-
-
-class NotARecordError(RecordError):
-    """The file is something else."""
 
 
 class Record:
@@ -93,7 +90,7 @@ class Record:
 
     def _open(self) -> None:
         self.close()
-        self.is_closed_by_writer = not is_unclosed(_head(self.path))
+        self.is_closed_by_writer = not is_unclosed(head_of(self.path))
         try:
             # Not by its name: HDF5 does not open a file twice in one process in different ways, so
             # this reader and a user's own `h5py.File` would keep each other out.
@@ -105,13 +102,13 @@ class Record:
             raise
 
     def _read_all(self) -> None:
-        run = _run(self._file, self.path)
+        run = group_of_run(self._file, self.path)
         written = int(run.attrs["format"])
-        if written != FORMAT:  # older formats were never published, so none is translated
+        if written not in READABLE:
             remedy = "update solidsph" if written > FORMAT else "run its scene again"
             raise RecordError(
-                f"the record {self.path} has format {written}, this solidsph reads {FORMAT}; "
-                f"{remedy}"
+                f"the record {self.path} has format {written}, this solidsph reads "
+                f"{READABLE[0]} to {FORMAT}; {remedy}"
             )
         tree = Tree(self._file)
         check_first(tree)
@@ -200,7 +197,7 @@ class Record:
         if name not in self._fields:
             near = get_close_matches(name, self.field_names, n=1)
             hint = f"did you mean {near[0]!r}? " if near else ""
-            known = ", ".join(self.field_names) or "none"
+            known = ", ".join(dict.fromkeys([*self.field_names, DISPLACEMENT]))
             raise RecordError(f"no field {name!r} in {self.path}; {hint}fields: {known}")
         return self._fields[name]
 
@@ -252,7 +249,7 @@ class Record:
         *,
         time: float | None = None,
         factor: float = 1.0,
-        picture: Path | None = None,
+        picture: Path | str | None = None,
     ) -> None:
         """Show the run in 3D, or draw a picture of it; see `solidsph.results.view.view`.
 
@@ -262,6 +259,10 @@ class Record:
         from solidsph.results.view import view  # imports the graphics library
 
         view(self, field=field, time=time, factor=factor, picture=picture)
+
+    def __repr__(self) -> str:
+        outputs = f"{self.count} outputs of {self.particles.count} particles"
+        return f"Record({str(self.path)!r}: {self.outcome}, {outputs})"
 
     def _repr_html_(self) -> str:
         """Table for notebooks."""
@@ -353,7 +354,7 @@ class Record:
                 failure = reason(error)
             if self._is_complete and self._file is None:
                 raise RecordError(f"the record {self.path} is closed; open it again")
-            if not _may_change(self.path):
+            if not may_change(self.path):
                 break
             time.sleep(_PAUSE)
         raise RecordError(
@@ -362,45 +363,7 @@ class Record:
         ) from None
 
 
-def _head(path: Path) -> bytes:
-    """The first bytes of an HDF5 file."""
-    if path.is_dir():
-        raise RecordError(f"{path} is a folder, not a record; name the file in it")
-    if not path.exists():
-        raise RecordError(f"there is no record {path}; check the path, or run the scene first")
-    if not path.is_file():  # a pipe would keep `open` waiting
-        raise RecordError(f"{path} is not a regular file, so no record of solidsph")
-    with path.open("rb") as file:
-        head = file.read(64)
-    if not head.startswith(SIGNATURE):
-        raise NotARecordError(f"{path} is not an HDF5 file, so no record of solidsph")
-    return head
-
-
-def _run(file: Any, path: Path) -> Any:
-    """The group that VTK ignores."""
-    link = file.get("solidsph", getlink=True)
-    run = file["solidsph"] if isinstance(link, h5py.HardLink) else None
-    if run is None or "format" not in run.attrs:
-        raise NotARecordError(f"{path} is an HDF5 file, but not a record of solidsph")
-    return run
-
-
 def plotted(path: Path, what: str, field: str) -> Figure:
     """A picture of the record in a file; see `Record.plot`."""
     with Record(path) as record:
         return record.plot(what, field)
-
-
-def check_is_record(path: Path) -> None:
-    """Raise NotARecordError unless a file is a record, damaged or not; little of it is read."""
-    _head(path)
-    with suppress(*HDF5_ERRORS), HDF5Source(path) as opened, h5py.File(opened, "r") as file:
-        _run(file, path)
-
-
-def _may_change(path: Path) -> bool:
-    try:
-        return is_unclosed(_head(path))
-    except (OSError, RecordError):
-        return False

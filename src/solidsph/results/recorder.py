@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -21,6 +22,8 @@ from solidsph.run.energy import KINETIC, STRAIN, kinetic_energy, strain_energy
 from solidsph.run.hooks import implementation
 from solidsph.run.restart_point import RestartPoint
 from solidsph.system.files import working_folder
+
+LOG = logging.getLogger(__name__)
 
 COMPOSED = "# this scene was composed in Python"
 """Beginning of the text of a scene that has no file form."""
@@ -91,6 +94,7 @@ class Recorder:
             folder=str(working_folder()) if self._folder is None else self._folder,
         )
         outputs = () if earlier is None else _outputs(earlier, self._kept_until)
+        LOG.info("recording into %s", self._path)
         writer = RecordWriter(self._path, reference, earlier=outputs)
         if earlier is not None and observation.state.time <= writer.last_time:
             self._recorded = Record(self._path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from math import isfinite
 from pathlib import Path
+from textwrap import fill
 from typing import Any, final
 
 import attrs
@@ -16,6 +17,13 @@ from solidsph.results.pictures import colour_label, magnitudes
 from solidsph.results.recorded import Recorded
 
 _SIZE = (1024, 768)  # of the window [pixels]
+
+# The body takes this part of what it would fill, with its middle there, from -1 to 1.
+_ZOOM, _CENTRE = 0.85, (0.15, -0.1)
+
+_AXES = (0.0, 0.14, 0.16, 0.3)  # place of the small axes in the window, above the sliders
+
+_TITLE = 18  # letters of the colour bar's title in a line
 
 _PICTURES = (".png", ".jpeg", ".jpg", ".bmp", ".tif", ".tiff")
 
@@ -63,16 +71,16 @@ class View:
         plotter = self._scene(off_screen=False)
         plotter.add_slider_widget(
             self.to_time,
-            self._span(),
-            self._time(),
+            rng=self._span(),
+            value=self._time(),
             title="time [s]",
             pointa=_TIME[0],
             pointb=_TIME[1],
         )
         plotter.add_slider_widget(
             self.to_factor,
-            (0.0, max(2.0, 2.0 * self.factor)),
-            self.factor,
+            rng=(0.0, max(2.0, 2.0 * self.factor)),
+            value=self.factor,
             title="deformation",
             pointa=_DEFORMATION[0],
             pointb=_DEFORMATION[1],
@@ -92,7 +100,10 @@ class View:
             render_points_as_spheres=True,
             ambient=0.5,  # colours are to be read beside the bar
             scalar_bar_args={
-                "title": colour_label(self.record, self.field) + "\n",
+                "title": fill(colour_label(self.record, self.field), _TITLE) + "\n",
+                "title_font_size": 16,
+                "label_font_size": 16,
+                "n_labels": 5,
                 "color": "black",
                 "fmt": "%.3g",
                 "vertical": True,
@@ -101,12 +112,23 @@ class View:
                 "height": 0.5,
             },
         )
-        # Spheres that touch each other, in metres.
-        actor.mapper.scale_factor = 0.9 * float(self.record.particles.spacings.max())
+        # The radius of spheres, in metres: a little more than that of touching ones, to hide gaps.
+        radius = 0.6 * float(self.record.particles.spacings.max())
+        actor.mapper.scale_factor = radius
         plotter.add_text(self._caption(), font_size=10, color="black", name="caption")
-        plotter.add_axes(color="black")
+        plotter.add_axes(color="black", viewport=_AXES)
         if self.record.dimension < 3:
             plotter.view_xy()
+        else:
+            plotter.view_isometric()
+        # Spheres reach beyond their centres; bar and sliders need room.
+        points = self.cloud.points
+        ends = np.stack([points.min(axis=0) - radius, points.max(axis=0) + radius], axis=1)
+        camera = plotter.camera  # which PyVista resets when it is asked for the first time
+        plotter.renderer.ResetCamera(*ends.ravel().tolist())
+        camera.zoom(_ZOOM)
+        camera.SetWindowCenter(*_CENTRE)
+        camera.is_set = True
         self._plotter = plotter
         return plotter
 
@@ -162,7 +184,7 @@ def view(
     field: str = "cauchy_stress",
     time: float | None = None,
     factor: float = 1.0,
-    picture: Path | None = None,
+    picture: Path | str | None = None,
 ) -> None:
     """Show a record in a window with sliders for time and deformation, or draw a picture.
 
@@ -183,7 +205,7 @@ def view(
     if not record.count:
         raise RecordError("the record holds no output yet, so there is nothing to show")
     output = record.count - 1 if time is None else int(np.abs(record.times - time).argmin())
-    View(record, field, output, factor).show(picture)
+    View(record, field, output, factor).show(None if picture is None else Path(picture))
 
 
 def _library() -> Any:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from solidsph.probes.values import Values
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class BuiltScene(ABC):
     """Everything that a run needs. A run does not change it, so it can be repeated."""
 
@@ -61,6 +61,7 @@ class BuiltScene(ABC):
         record: Path | str | None = None,
         observers: Sequence[object] = (),
         since: RestartPoint | None = None,
+        progress: bool | None = None,
     ) -> Result:
         """Find the equilibrium if the scene has [statics], else follow the motion."""
 
@@ -156,6 +157,11 @@ class BuiltScene(ABC):
             velocities=state.velocities,
             stress=lambda chosen: cauchy_stress(self.dynamics.observe(state), chosen),
         )
+
+    def __repr__(self) -> str:
+        title = f"{self.scene.title!r}: " if self.scene.title else ""
+        steps = "an equilibrium" if self.scene.statics else f"{self.steps} steps"
+        return f"{type(self).__name__}({title}{self.particles.count} particles, {steps})"
 
     def _repr_html_(self) -> str:
         """Table for notebooks."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time as clock
 from collections.abc import Callable, Sequence
 
@@ -15,6 +16,8 @@ from solidsph.run.restart_point import RestartPoint
 from solidsph.run.session import session
 from solidsph.run.step_by_step import steps_of
 from solidsph.run.step_follower import StepFollower
+
+LOG = logging.getLogger(__name__)
 
 
 def time_loop(simulation: BuiltScene) -> TimeLoop:
@@ -96,6 +99,7 @@ def run_motion(
                     observation = simulation.dynamics.observe(state)
                     continue
                 observation = simulation.observe(state)
+                LOG.debug("output at t = %.6g s, step %d", state.time, state.step)
                 hook.solidsph_step_end(simulation=simulation, observation=observation)
             simulation.dynamics.internal.note(simulation.plan.compilations)
             judge(simulation)

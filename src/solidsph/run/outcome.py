@@ -28,7 +28,7 @@ def is_over(outcome: str) -> bool:
     return outcome == FINISHED or outcome.startswith(UNSOUND)
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class Result:
     """Result of a run."""
 
@@ -70,6 +70,10 @@ class Result:
         if self._plot is None:
             raise SceneError("this run has no record to plot; run it with record = ...")
         return self._plot(what, field)
+
+    def __repr__(self) -> str:
+        where = "" if self.record is None else f", record {str(self.record)!r}"
+        return f"Result(t = {self.state.time:.6g} s after {self.seconds:.3g} s{where})"
 
     def _repr_html_(self) -> str:
         """Table for notebooks."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from threading import Lock
@@ -9,6 +10,8 @@ from threading import Lock
 from solidsph.errors import BusyError, DivergedError, UnsoundError
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.outcome import FINISHED, INTERRUPTED, UNSOUND
+
+LOG = logging.getLogger(__name__)
 
 
 @contextmanager
@@ -27,12 +30,14 @@ def session(simulation: BuiltScene, listeners: Sequence[object]) -> Iterator[Non
         for listener in listeners:
             manager.register(listener)
         hook.solidsph_setup(simulation=simulation)
+        LOG.info("the run begins: %r", simulation)
         yield
         outcome = FINISHED
     except BaseException as cause:
         outcome = _outcome(cause)
         raise
     finally:
+        LOG.info("the run has ended: %s", outcome)
         try:
             hook.solidsph_finish(simulation=simulation, outcome=outcome)
         finally:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from typing import TypeVar
 
@@ -15,6 +16,8 @@ from solidsph.model.particles import State
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.hooks import implementation
 from solidsph.run.safe_step import safe_step
+
+LOG = logging.getLogger(__name__)
 
 S = TypeVar("S", bound=BuiltScene)
 
@@ -106,6 +109,7 @@ class StepFollower:
             f"the step was cut to {simulation.step_size:.6g} s at t = {state.time:.6g} s: the "
             f"critical step of the deformed bodies is {safe.step:.6g} s"
         )
+        LOG.info(self.cuts[-1])
         return simulation, restarted(simulation, state, before.halvings)
 
     def repeated(self, simulation: S, state: State, cause: str) -> tuple[S, State] | None:
@@ -121,6 +125,7 @@ class StepFollower:
             f"the step was cut to {shorter.step_size:.6g} s at t = {state.time:.6g} s: with a "
             f"longer one {cause}"
         )
+        LOG.info(self.cuts[-1])
         return shorter, restarted(shorter, state, simulation.halvings)
 
     def _is_due(self, simulation: BuiltScene, state: State, observation: Observation) -> bool:

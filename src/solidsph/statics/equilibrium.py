@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time as clock
 from collections.abc import Callable
 
@@ -20,6 +21,8 @@ from solidsph.statics.linearised import Linearised, LinearSolver, UnsolvedError
 from solidsph.statics.load_path import Forces, LoadPath
 from solidsph.statics.solvers import linear_system
 from solidsph.statics.tangent import Tangent
+
+LOG = logging.getLogger(__name__)
 
 # Shorter fractions of a Newton step are not worth their cost.
 _SHORTEST_STEP = 2.0**-8
@@ -150,11 +153,13 @@ def equilibrium(
             displacements, residuals = newton.solve(displacements, target)
         except _LoadStepError as failure:
             step *= 0.5
+            LOG.info("load factor %.4g failed, and is halved: %s", target, failure.cause)
             hopeless = newton.hopeless_at_rest or step < _SHORTEST_LOAD_STEP / load_steps
             if hopeless:
                 raise newton.error(failure, factor, target) from None
             continue
         steps.append(LoadStep(target, residuals))
+        LOG.info("load factor %.4g reached; iterations: %d", target, len(residuals) - 1)
         state = newton.state(state, displacements, target)
         observer(state)
         factor = target
@@ -241,6 +246,7 @@ class _Newton:
             missing = self.path.placed(u, factor) - u
             forces = self.path.forces(u, factor)
             residuals.append(self._relative(forces))
+            LOG.debug("load factor %.4g: imbalance %.3g", factor, residuals[-1])
             if not missing.any() and self._converged(forces):
                 return u, tuple(residuals)
         if not missing.any() and self._rounded(forces):

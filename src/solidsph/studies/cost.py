@@ -21,12 +21,13 @@ from solidsph.studies.part_values import check_parts
 from solidsph.studies.point import Point
 from solidsph.studies.processes import Processes
 from solidsph.studies.refine import refine
-from solidsph.studies.refinement import LEAST, judged, limits, needs_estimate
+from solidsph.studies.refinement import LEAST, TooFewError, judged, limits, needs_estimate
 from solidsph.studies.runner import Runner
 from solidsph.studies.scene_case import SPACING, SceneCase
 from solidsph.studies.scene_words import is_of_the_scheme
 from solidsph.studies.search import Goal, SearchResult, Settings, own_scheme, search
-from solidsph.studies.sweep import StatusCallback, ignore_status, sweep
+from solidsph.studies.sweep import StatusCallback, sweep
+from solidsph.studies.sweep_progress import default_watch
 from solidsph.studies.task import Task
 from solidsph.studies.variant import setting_of, with_settings
 
@@ -42,7 +43,7 @@ class SweepSetup:
     runner: Runner = attrs.field(factory=lambda: Processes(1))
     folder: Path | None = None  # of the journal; None keeps nothing
     repeats: int = 1  # of every configuration; times are medians
-    watch: StatusCallback = ignore_status
+    watch: StatusCallback = attrs.field(factory=default_watch)  # in notebooks a display
 
     def points(self, case: Case, grid: Sequence[Settings]) -> Sequence[Point]:
         """Points of `case` with each of these settings; from the journal if it has them."""
@@ -68,7 +69,7 @@ def frontier(
 
     Raises:
         SceneError: there is no such axis, or nothing to sweep; or an error is to be estimated and
-            fewer than three spacings have finished.
+            fewer than three spacings are given.
     """
     priced, axes = _priced(case, axes)
     refining = next(iter(axes))
@@ -87,7 +88,10 @@ def frontier(
     points = (setup or SweepSetup()).points(priced, grid)
     if not needs_estimate(points):
         return Frontier(points, refining)
-    known = limits(points, refining)
+    try:
+        known = limits(points, refining)
+    except TooFewError as cause:
+        return Frontier(points, refining, unjudged=str(cause))
     return Frontier([judged(point, known) for point in points], refining, known)
 
 
@@ -105,7 +109,7 @@ def find_best(
     small enough to tell; what it tends to then stands for the reference.
 
     Raises:
-        SceneError: there is no such axis, or fewer than three spacings have finished.
+        SceneError: there is no such axis.
     """
     priced, axes = _priced(case, axes)
     how = setup or SweepSetup()
@@ -136,7 +140,10 @@ def _find_without_reference(
             kept[key] = run(settings)
         return kept[key]
 
-    refined = refine(axes[refining], scheme, goal, run_once, longest=longest)
+    try:
+        refined = refine(axes[refining], scheme, goal, run_once, longest=longest)
+    except TooFewError as cause:
+        return SearchResult(None, list(kept.values()), str(cause))
     levels = refined.spacings if axes[refining] == case.sweep[refining] else axes[refining]
     found = search(
         case,

@@ -12,7 +12,7 @@ import attrs
 import numpy as np
 
 from solidsph.studies.limit import Limit
-from solidsph.studies.point import Point, label, percent
+from solidsph.studies.point import Point, label, measured, percent
 from solidsph.system import html
 
 # Factor in time for a tenth of the error, beyond which it is no price but says that nothing helps.
@@ -40,13 +40,14 @@ class Orders:
 
 
 @final
-@attrs.frozen(slots=False)
+@attrs.frozen(slots=False, repr=False)
 class Frontier:
     """Points of a sweep over one case. Iteration gives a row for each, for example for pandas."""
 
     points: Sequence[Point]
     refining: str  # the setting that refines
     limits: Sequence[Limit] = ()  # what errors are of where there is no reference
+    unjudged: str = ""  # why no error could be estimated, though some have run
 
     @cached_property
     def _trusted(self) -> Mapping[int, float]:
@@ -182,6 +183,9 @@ class Frontier:
         coarse, fine, least = max(spacings), min(spacings), 0.7 * min(errors)
         return (coarse, fine), (least * (coarse / fine) ** 2, least)
 
+    def __repr__(self) -> str:
+        return f"Frontier({len(self)} configurations: {self.sentence()})"
+
     def _repr_html_(self) -> str:
         """Table for notebooks."""
         front = [
@@ -194,12 +198,15 @@ class Frontier:
             for point in self.front()
         ]
         title = f"The front, of {len(self)} configurations"
-        return html.heading(title, self.sentence()) + html.of_rows(front)
+        rows = front or measured(self.points)
+        return html.heading(title, self.sentence()) + html.of_rows(rows)
 
     def sentence(self) -> str:
         """Summary in words."""
         front = self.front()
         if not front:
+            if self.unjudged:
+                return self.unjudged
             failed = self.points[0].outcome if self.points else "there is no point"
             return f"no configuration finished: {failed}"
         parts = []

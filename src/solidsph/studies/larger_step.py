@@ -84,7 +84,7 @@ def larger_step_sentence(made: Sequence[LargerStep]) -> str:
     found = (
         f"{100.0 * last.point.error:.3g} % in {last.point.time:.3g} s"
         if last.point.finished
-        else f"no result ({last.point.outcome.splitlines()[0]})"
+        else f"no result ({last.point.failure})"
     )
     return (
         f"with {LARGEST:g} of the critical step in place of {last.factor:g}, {last.usual.label()} "

@@ -22,6 +22,7 @@ class Limit:
     scheme: Mapping[str, Any]  # settings of the points that it is from, but for their spacing
     finest: float  # value of the finest of those points
     warning: str  # why it is not to be relied on; empty if it is
+    in_sight: bool = True  # whether the values tend to it; else it is the finest one
 
     @property
     def bar(self) -> float:

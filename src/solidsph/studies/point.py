@@ -68,6 +68,12 @@ class Point:
         """Whether the run finished with a finite error."""
         return self.ran and isfinite(self.error)
 
+    @property
+    def failure(self) -> str:
+        """Why the run failed, in one line: of several problems the first."""
+        first, *others = self.outcome.splitlines()
+        return f"{first} {others[0].strip(' -')}" if first.endswith(":") and others else first
+
     def label(self) -> str:
         """Settings in one line."""
         return label(self.settings)
@@ -80,6 +86,21 @@ class Point:
 def percent(error: float) -> str:
     """An error in per cent, to two digits."""
     return f"{100.0 * error:.{2 if error < 0.995 else 4}g} %"
+
+
+def measured(points: Sequence[Point]) -> Sequence[Mapping[str, Any]]:
+    """Rows of a table: what runs without a reference have measured, those that finished."""
+    return [
+        {
+            "configuration": point.label(),
+            "time [s]": point.time,
+            "quantity": quantity,
+            "value": value,
+        }
+        for point in points
+        if point.ran
+        for quantity, (value, _) in point.values.items()
+    ]
 
 
 def run_point(case: Case, settings: Mapping[str, Any]) -> Point:

@@ -9,10 +9,9 @@ from typing import final
 
 import attrs
 
-from solidsph.errors import SceneError
 from solidsph.studies.limit import Limit
 from solidsph.studies.point import Point
-from solidsph.studies.refinement import LEAST, judged, limits
+from solidsph.studies.refinement import LEAST, TooFewError, judged, limits
 from solidsph.studies.scene_case import SPACING
 from solidsph.studies.search import Goal, Settings
 
@@ -57,7 +56,7 @@ def refine(
         longest: predicted wall time above which nothing is run [s].
 
     Raises:
-        SceneError: fewer than three spacings have finished.
+        TooFewError: fewer than three spacings have finished.
     """
     points: list[Point] = []
     tried: list[float] = []
@@ -65,8 +64,8 @@ def refine(
         expected = _predicted(points, spacing)
         if expected > min(longest, goal.time):
             if sum(point.ran for point in points) < LEAST:
-                raise SceneError(
-                    f"an error bar needs {LEAST} spacings, and {len(points)} were run: the next, "
+                raise TooFewError(
+                    f"an error bar needs {LEAST} spacings, and {len(points)} ran: the next, "
                     f"{spacing:.4g} m, is expected to take {expected:.2g} s, and "
                     f"{min(longest, goal.time):.2g} s are allowed; allow more, or begin with "
                     "coarser ones: --axis spacing=..."

@@ -26,11 +26,15 @@ LEAST = 3
 _EXACT = 1e-8
 
 
+class TooFewError(SceneError):
+    """Too few spacings have finished for an error bar."""
+
+
 def limits(points: Sequence[Point], refining: str) -> Sequence[Limit]:
     """Limits of all quantities of `points`, each from the scheme that tells it best.
 
     Raises:
-        SceneError: no scheme has finished at three spacings.
+        TooFewError: no scheme has finished at three spacings.
     """
     ran = [attrs.evolve(point, error=0.0) for point in points if point.ran]
     found: dict[str, Limit] = {}
@@ -44,8 +48,8 @@ def limits(points: Sequence[Point], refining: str) -> Sequence[Limit]:
                 found[name] = limit
     if not found:
         failed = next((point for point in points if not point.ran), None)
-        why = f" ({failed.label()}: {failed.outcome.splitlines()[0]})" if failed else ""
-        raise SceneError(
+        why = f" ({failed.label()}: {failed.failure})" if failed else ""
+        raise TooFewError(
             f"an error bar needs {LEAST} spacings with the same scheme that finish, and there are "
             f"fewer{why}; give finer ones by --axis spacing=..., or a --reference"
         )
@@ -69,6 +73,7 @@ def _limit(name: str, levels: Sequence[Point], refining: str) -> Limit:
         scheme=scheme,
         finest=values[-1],
         warning=found.warning,
+        in_sight=found.in_sight,
     )
 
 
@@ -95,5 +100,5 @@ def judged(point: Point, known: Sequence[Limit]) -> Point:
         error=errors[worst.quantity],
         quantity=worst.quantity,
         value=point.values[worst.quantity][0],
-        reference=worst.value,
+        reference=worst.value if worst.in_sight else None,
     )

@@ -45,6 +45,7 @@ class Extrapolation:
     uncertainty: float  # of the limit, in its unit
     finest: float  # result at the finest spacing
     warning: str  # reason not to trust it; empty if there is none
+    in_sight: bool = True  # whether the results tend to it; else it is the finest one
 
     @property
     def bar(self) -> float:
@@ -95,6 +96,7 @@ def extrapolate(spacings: Sequence[float], values: Sequence[float]) -> Extrapola
             finest=float(f[-1]),
             warning="no limit is in sight: each refinement changes the value by no less than the "
             "one before, as at a sharp corner or under a point load",
+            in_sight=False,
         )
     is_regular = scatter < _REGULAR * change
     beyond = (_SAFETY if is_regular else _CAUTION) - 1.0

@@ -82,7 +82,7 @@ class Goal:
         return error <= self.error if isfinite(self.error) else time > self.time
 
 
-@attrs.frozen
+@attrs.frozen(repr=False)
 class SearchResult:
     """Result of a search."""
 
@@ -95,6 +95,10 @@ class SearchResult:
     def spent(self) -> float:
         """Wall time of all runs [s]."""
         return sum(sum(point.seconds) for point in self.tried if isfinite(point.time))
+
+    def __repr__(self) -> str:
+        found = "nothing" if self.point is None else self.point.brief()
+        return f"SearchResult({found}, by {len(self.tried)} configurations: {self.sure})"
 
     def _repr_html_(self) -> str:
         """Table for notebooks."""

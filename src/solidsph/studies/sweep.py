@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time as clock
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -9,10 +10,12 @@ from contextlib import closing
 import attrs
 
 from solidsph.studies.journal import Journal
-from solidsph.studies.point import Point, merge_repeats
+from solidsph.studies.point import Point, label, merge_repeats
 from solidsph.studies.remaining_time import RemainingTime
 from solidsph.studies.runner import Lost, Runner
 from solidsph.studies.task import Task
+
+LOG = logging.getLogger(__name__)
 
 
 @attrs.frozen
@@ -71,6 +74,7 @@ def sweep(
         estimate = RemainingTime.of(tasks)
         for key, point in points.items():
             estimate.learn(wanted[key], point)
+        LOG.info("%d configurations, of which %d are in the journal", len(wanted), kept)
         done: list[Task] = []
         watch(SweepStatus(len(wanted), kept, 0, estimate.left(0.0, done, list(remaining.values()))))
         begun = clock.perf_counter()
@@ -86,6 +90,8 @@ def sweep(
                 del remaining[task.key]
                 elapsed = clock.perf_counter() - begun
                 left = estimate.left(elapsed, done, list(remaining.values()))
+                count = kept + len(done)
+                LOG.info("%d of %d has ended: %s", count, len(wanted), label(task.settings))
                 watch(SweepStatus(len(wanted), kept, len(done), left, task, outcome))
     return _merged(list(wanted.values()), points, lost)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from math import inf
 from pathlib import Path
@@ -15,6 +16,8 @@ from solidsph.run.restart_point import RestartPoint
 from solidsph.run.step_follower import restarted
 from solidsph.watch.symptom import Finding, Symptom
 from solidsph.watch.watchdog import SYMPTOMS, Watchdog
+
+LOG = logging.getLogger(__name__)
 
 
 def run_watched(
@@ -62,6 +65,7 @@ def run_watched(
                 f"t = {0.0 if sound is None else sound.state.time:.9g} s, step halved to "
                 f"{simulation.step_size:.9g} s: {_reason(error)}"
             )
+            LOG.info(notes[-1])
             since = RestartPoint(until=-inf, notes=tuple(notes))
             if sound is not None:
                 state = restarted(simulation, sound.state, sound.halvings)

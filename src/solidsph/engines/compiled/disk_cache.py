@@ -7,6 +7,7 @@ differs in every process: it misses wherever functions are composed.
 
 from __future__ import annotations
 
+import logging
 import pickle
 from typing import Any, final
 
@@ -18,6 +19,8 @@ from numba.core.sigutils import normalize_signature
 from solidsph.engines.compiled.content import UnknownContentError, content
 from solidsph.engines.compiled.environment import environment
 from solidsph.system.cache import COMPILED
+
+LOG = logging.getLogger(__name__)
 
 
 @final
@@ -37,6 +40,7 @@ class DiskCache:
         key = self._key(signature, target_context.codegen())
         payload = None if key is None else COMPILED.read(key)
         if payload is None:
+            LOG.debug("compiling %s", self._function.py_func.__name__)
             return None
         target_context.refresh()
         try:
