@@ -150,7 +150,7 @@ class Assembler:
         problems.add(check_constraints(constraints, model.particles))
         problems.add(check_loads(loads, model.particles, formulation))
         problems.add(check_stresses(_stresses(terms), formulation))
-        problems.add(check_history(model.bodies, scene, self._placed.labels))
+        problems.add(check_history(model.bodies, self._placed.labels))
         initial = problems.attempt(initial_state, scene, model.particles)
         self._placed.stop_if_any()
         return problems.settled(initial), problems.settled(steps)

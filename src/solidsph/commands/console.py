@@ -196,8 +196,8 @@ class ProgressObserver:
 
     def __init__(self, display: Progress, description: str, simulation: Simulation) -> None:
         self._display = display
-        statics = simulation.scene.statics
-        self._steps = simulation.steps if statics is None else statics.load_steps
+        moves = simulation.scene.statics is None
+        self._steps = simulation.steps if moves else simulation.load_steps
         self._task = display.add_task(description, total=self._steps)
 
     @implementation

@@ -354,7 +354,8 @@ def _of_statics(simulation: Simulation) -> Iterator[tuple[str, Any, str]]:
         ITERATIVE if iterated else DIRECT,
         "of its linear systems; direct in any case with ghosts, or without an energy",
     )
-    yield "load steps", statics.load_steps, "at first: halved on failure, doubled on success"
+    doubled = "" if simulation.remembers else ", doubled on success"
+    yield "load steps", simulation.load_steps, f"at first: halved on failure{doubled}"
     yield "tolerance", statics.tolerance, "imbalance of forces over loads and reactions"
 
 

@@ -71,9 +71,10 @@ def _static_work(simulation: Simulation, wanted: StaticsScene) -> StaticWork:
     bodies, d = simulation.model.bodies, simulation.particles.dimension
     linear = all(not body.material.objective for body in bodies)
     unknowns = int(simulation.dynamics.free.sum())
-    iterations = wanted.load_steps * (1 if linear else ITERATIONS)
+    load_steps = simulation.load_steps
+    iterations = load_steps * (1 if linear else ITERATIONS)
     if iterates(wanted.solver, d, unknowns):
-        return iterated_work(wanted, iterations, unknowns)
+        return iterated_work(load_steps, iterations, unknowns)
     factors = [
         estimate_factorisation(
             _cells(body), 2.0 * body.smoothing.support_radius / _spacing(body), d
@@ -81,7 +82,7 @@ def _static_work(simulation: Simulation, wanted: StaticsScene) -> StaticWork:
         for body in bodies
     ]
     return StaticWork(
-        load_steps=wanted.load_steps,
+        load_steps=load_steps,
         iterations=iterations,
         freedoms=unknowns,
         entries=sum(_coupled(body) for body in bodies) * d * d,
@@ -90,16 +91,16 @@ def _static_work(simulation: Simulation, wanted: StaticsScene) -> StaticWork:
     )
 
 
-def iterated_work(wanted: StaticsScene, iterations: int, unknowns: int) -> StaticWork:
+def iterated_work(load_steps: int, iterations: int, unknowns: int) -> StaticWork:
     """Work of an equilibrium by iteration, which assembles and factorises nothing large."""
     return StaticWork(
-        load_steps=wanted.load_steps,
+        load_steps=load_steps,
         iterations=iterations,
         freedoms=unknowns,
         entries=0,
         fill=0,
         multiplications=0,
-        products=wanted.load_steps * PRODUCTS,
+        products=load_steps * PRODUCTS,
     )
 
 

@@ -22,6 +22,7 @@ from solidsph.costs.work import Loop, StaticWork, Work
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.engine import Engine
 from solidsph.interfaces.formulation import Configuration, Formulation
+from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.material import Material
 from solidsph.interfaces.plan import BodySize, Operations, SumMethod
@@ -32,7 +33,7 @@ from solidsph.scene.default_cover import cover_of
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import BodyScene, PartLike
 from solidsph.scene.scheme import SCHEMES, completed
-from solidsph.scene.static_solver import iterates
+from solidsph.scene.static_solver import iterates, load_steps
 
 # Random points to estimate the volume of a shape that has no formula for it.
 _POINTS = 1 << 15
@@ -50,6 +51,7 @@ class BodyEstimate:
     wave_time: float  # time of a wave across one spacing [s]
     cells: tuple[float, ...]  # particles along each axis of its box
     lattice: bool  # whether it has the default discretisation
+    remembers: bool  # whether its material has internal variables
 
 
 def estimate_work(scene: Scene) -> Work:
@@ -122,6 +124,7 @@ def _body(scene: Scene, body: BodyScene, cover: float) -> BodyEstimate:
         wave_time=h / material.wave_speed,
         cells=full_box(sides, particles),
         lattice=lattice,
+        remembers=isinstance(material, HistoryMaterial),
     )
 
 
@@ -173,13 +176,15 @@ def _sampled_volume(shape: Shape) -> float:
 def _statics(scene: Scene, bodies: Sequence[BodyEstimate], d: int, cover: float) -> StaticWork:
     assert scene.statics is not None
     unknowns = round(sum(body.particles for body in bodies) * d)
+    remembers = any(body.remembers for body in bodies)
+    steps = load_steps(scene.statics.load_steps, remembers=remembers)
     if iterates(scene.statics.solver, d, unknowns):
-        return iterated_work(scene.statics, scene.statics.load_steps * ITERATIONS, unknowns)
+        return iterated_work(steps, steps * ITERATIONS, unknowns)
     reach = 2.0 * cover
     factors = [estimate_factorisation(body.cells, reach, d) for body in bodies]
     return StaticWork(
-        load_steps=scene.statics.load_steps,
-        iterations=scene.statics.load_steps * ITERATIONS,
+        load_steps=steps,
+        iterations=steps * ITERATIONS,
         freedoms=unknowns,
         entries=round(sum(b.particles for b in bodies) * ball(reach, d) * d * d),
         fill=sum(part.fill for part in factors),

@@ -17,6 +17,7 @@ from solidsph.errors import BuildError, DivergedError, SceneError
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.engine import Engine
+from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.plan import Plan
 from solidsph.interfaces.terms import Load, Observation, Term
@@ -29,6 +30,7 @@ from solidsph.run.safe_step import SafeStep
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import PartLike
 from solidsph.scene.scheme import completed
+from solidsph.scene.static_solver import load_steps
 from solidsph.system import html
 
 if TYPE_CHECKING:
@@ -80,6 +82,17 @@ class BuiltScene(ABC):
     def step_size(self) -> float:
         """Time step [s]."""
         return self.dynamics.step_size
+
+    @property
+    def remembers(self) -> bool:
+        """True if a material has internal variables."""
+        return any(isinstance(body.material, HistoryMaterial) for body in self.model.bodies)
+
+    @property
+    def load_steps(self) -> int:
+        """Load steps that an equilibrium begins with."""
+        statics = self.scene.statics
+        return load_steps(statics.load_steps if statics else None, remembers=self.remembers)
 
     def start(self) -> State:
         """Initial state with imposed motions, accelerations and accounts."""
@@ -183,7 +196,7 @@ class BuiltScene(ABC):
             known |= {"duration [s]": scene.duration, "steps": self.steps}
             known |= {"step size [s]": self.step_size, "outputs": len(self.output_steps())}
         else:
-            known |= {"load steps": statics.load_steps}
+            known |= {"load steps": self.load_steps}
         bodies = [
             {
                 "body": name,

@@ -85,7 +85,7 @@ class PartMaker:
         engine = self._engine()
         handlers = self._labelled("boundaries", scene.boundaries)
         effects = self._labelled("effects", scene.effects)
-        problems.add(check_effects(effects))
+        problems.add(check_effects(effects, scene))
         bodies, probes = self._body_parts(), self._probes()
         return Parts(
             kernel, cover, formulation, integrator, engine, handlers, effects, *bodies, probes

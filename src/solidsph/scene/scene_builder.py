@@ -126,7 +126,7 @@ class SceneBuilder(ABC):
     def statics(
         self,
         *,
-        load_steps: int = 1,
+        load_steps: int | None = None,
         tolerance: float = 1e-9,
         max_iterations: int = 25,
         solver: str = AUTOMATIC,

@@ -87,7 +87,7 @@ class ReferenceScene:
 class StaticsScene:
     """Parameters of an equilibrium; see `statics.equilibrium`."""
 
-    load_steps: int = 1  # initial number
+    load_steps: int | None = None  # initial number; if None, as `static_solver.load_steps` says
     tolerance: float = 1e-9  # imbalance over loads and reactions [-]
     max_iterations: int = 25  # of Newton's method per load step
     solver: str = AUTOMATIC  # of its linear systems, one of `static_solver.SOLVERS`

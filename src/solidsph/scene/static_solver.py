@@ -15,6 +15,16 @@ _MANY = {1: 10**9, 2: 60_000, 3: 1_500}
 PRODUCTS = 400
 
 
+# Load steps of bodies that remember: what flows does so in each of them along a straight path. Of
+# a bar drawn to ten times the strain of first yield the force is then right to a thousandth.
+_REMEMBERING = 20
+
+
+def load_steps(wanted: int | None, *, remembers: bool) -> int:
+    """Initial number of load steps of a scene that wants so many, or says nothing."""
+    return wanted if wanted is not None else _REMEMBERING if remembers else 1
+
+
 def iterates(solver: str, dimension: int, unknowns: int) -> bool:
     """Whether `solver` is to iterate for this number of unknowns, where the scene allows it."""
     return solver == ITERATIVE or (solver == AUTOMATIC and unknowns > _MANY[dimension])

@@ -12,6 +12,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from solidsph.maths.arrays import Array
 from solidsph.statics.factors import Factors, SingularError, factorise
 from solidsph.statics.freedoms import Freedoms
+from solidsph.statics.increment import Increment
 from solidsph.statics.lead import Lead
 from solidsph.statics.linearised import Linearised, LinearSolver
 from solidsph.statics.tangent import Tangent
@@ -30,8 +31,10 @@ class DirectSolver(LinearSolver):
     freedoms: Freedoms
     symmetric: bool
 
-    def linearised(self, displacements: Array, lead: Lead | None, time: float) -> Linearised:
-        matrix = self.tangent.matrix(displacements, lead, time)
+    def linearised(
+        self, displacements: Array, lead: Lead | None, increment: Increment
+    ) -> Linearised:
+        matrix = self.tangent.during(increment).matrix(displacements, lead, increment.time)
         reduced = self.freedoms.reduced(matrix)
         factors = factorise(reduced, symmetric=self.symmetric)
         return _Factorised(matrix, self.freedoms, reduced.diagonal(), factors)

@@ -16,6 +16,7 @@ from solidsph.run.built_scene import BuiltScene
 from solidsph.scene.static_solver import AUTOMATIC, SOLVERS
 from solidsph.statics.factors import SingularError
 from solidsph.statics.freedoms import Freedoms
+from solidsph.statics.increment import AT_REST, Increment
 from solidsph.statics.lead import Lead
 from solidsph.statics.linearised import Linearised, LinearSolver, UnsolvedError
 from solidsph.statics.load_path import Forces, LoadPath
@@ -95,7 +96,7 @@ class _LoadStepError(PortableError):
 def equilibrium(
     simulation: BuiltScene,
     *,
-    load_steps: int = 1,
+    load_steps: int | None = None,
     tolerance: float = 1e-9,
     max_iterations: int = 25,
     solver: str = AUTOMATIC,
@@ -105,7 +106,9 @@ def equilibrium(
 
     The load path (`LoadPath`) begins at the reference configuration without loads; the initial
     state of the scene plays no part. Formulas of t are followed over the duration, constants grow
-    in proportion. A load step that fails is halved, and doubled after quick convergence.
+    in proportion. A load step that fails is halved, and doubled after quick convergence, but not
+    beyond the initial ones if a material remembers: its internal variables advance once a load
+    step, over the time that it takes of the duration.
 
     Newton steps stretch a slender body that rotates, and plain iteration spends many steps on
     spurious membrane forces. Stresses are therefore treated like unknowns: the geometric stiffness
@@ -120,7 +123,7 @@ def equilibrium(
 
     Args:
         simulation: a built scene in the total Lagrangian form.
-        load_steps: initial number of equal load steps.
+        load_steps: initial number of equal load steps; by default `BuiltScene.load_steps`.
         tolerance: imbalance over the norm of loads and reactions [-].
         max_iterations: of Newton's method per load step.
         solver: of its linear systems. "direct" factorises the tangent; "iterative" takes conjugate
@@ -132,6 +135,7 @@ def equilibrium(
         SceneError: an argument is out of range.
         SolidsphError: the formulation or a motion has no constant linear operator.
     """
+    load_steps = simulation.load_steps if load_steps is None else load_steps
     for name, value in (("load_steps", load_steps), ("max_iterations", max_iterations)):
         if value < 1:
             raise SceneError(f"equilibrium: {name} must be at least 1, got {value}")
@@ -141,7 +145,7 @@ def equilibrium(
         raise SceneError(f"equilibrium: tolerance must lie between 0 and 1, got {tolerance}")
     start = clock.perf_counter()
     newton = _Newton.of(simulation, tolerance, max_iterations, solver)
-    state = newton.state(None, np.zeros_like(simulation.particles.positions), 0.0)
+    state = newton.state(None, np.zeros_like(simulation.particles.positions), AT_REST)
     observer(state)
     displacements = np.zeros_like(state.positions)
     steps: list[LoadStep] = []
@@ -149,21 +153,22 @@ def equilibrium(
     while factor < 1.0:
         # Rounding must not leave a tiny last step.
         target = 1.0 if factor + step > 1.0 - 1e-9 else factor + step
+        increment = newton.path.increment(factor, target, state.memory)
         try:
-            displacements, residuals = newton.solve(displacements, target)
+            displacements, residuals = newton.solve(displacements, increment)
         except _LoadStepError as failure:
             step *= 0.5
             LOG.info("load factor %.4g failed, and is halved: %s", target, failure.cause)
             hopeless = newton.hopeless_at_rest or step < _SHORTEST_LOAD_STEP / load_steps
             if hopeless:
-                raise newton.error(failure, factor, target) from None
+                raise newton.error(failure, factor, increment) from None
             continue
         steps.append(LoadStep(target, residuals))
         LOG.info("load factor %.4g reached; iterations: %d", target, len(residuals) - 1)
-        state = newton.state(state, displacements, target)
+        state = newton.state(state, displacements, increment)
         observer(state)
         factor = target
-        if len(residuals) <= _QUICK + 1:
+        if len(residuals) <= _QUICK + 1 and not (simulation.remembers and step >= 1.0 / load_steps):
             step *= 2.0
     return EquilibriumResult(
         state=state,
@@ -223,28 +228,28 @@ class _Newton:
             max_iterations=max_iterations,
         )
 
-    def solve(self, start: Array, factor: float) -> tuple[Array, tuple[float, ...]]:
-        """Displacements (n, d) in equilibrium at `factor`, and the residuals of all iterations.
+    def solve(self, start: Array, increment: Increment) -> tuple[Array, tuple[float, ...]]:
+        """Displacements (n, d) in equilibrium after a load step, and the residuals of iterations.
 
         Each step applies the same fraction of the missing imposed motion and of the change of the
         free displacements, so that a large imposed motion does not crush the particles beside it.
         """
-        u, lead = start, None
+        u, lead, factor = start, None, increment.factor
         missing = self.path.placed(u, factor) - u
-        forces = self.path.forces(u, factor)
+        forces = self.path.forces(u, increment)
         residuals = [self._relative(forces)]
         if not (missing.any() or self._imbalance(forces).any()):
             return u, tuple(residuals)
         for _ in range(self.max_iterations):
-            correction = self._correction(u, lead, missing, forces, self.path.time(factor))
+            correction = self._correction(u, lead, missing, forces, increment)
             try:
-                u, lead = self._advanced(u, missing, factor, correction)
+                u, lead = self._advanced(u, missing, increment, correction)
             except _LoadStepError:
                 if missing.any() or not self._rounded(forces):
                     raise
                 return u, tuple(residuals)
             missing = self.path.placed(u, factor) - u
-            forces = self.path.forces(u, factor)
+            forces = self.path.forces(u, increment)
             residuals.append(self._relative(forces))
             LOG.debug("load factor %.4g: imbalance %.3g", factor, residuals[-1])
             if not missing.any() and self._converged(forces):
@@ -259,12 +264,17 @@ class _Newton:
         )
 
     def _correction(
-        self, u: Array, lead: Lead | None, missing: Array, forces: Forces, time: float
+        self,
+        u: Array,
+        lead: Lead | None,
+        missing: Array,
+        forces: Forces,
+        increment: Increment,
     ) -> _Correction:
         """Change of the free displacements if all of `missing` (n, d) is imposed."""
         self.iterations += 1
         try:
-            tangent = self.solver.linearised(u, lead, time)
+            tangent = self.solver.linearised(u, lead, increment)
             pull = tangent.pull(missing)
             left = self._imbalance(forces) - pull
             values = tangent.solve(left, self._accuracy(left, forces))
@@ -287,18 +297,19 @@ class _Newton:
         return min(max(enough, _LEAST_LEFT), _MOST_LEFT)
 
     def _advanced(
-        self, u: Array, missing: Array, factor: float, newton: _Correction
+        self, u: Array, missing: Array, increment: Increment, newton: _Correction
     ) -> tuple[Array, Lead]:
         """Displacements after the largest acceptable fraction of a step, and its lead."""
+        laws = self.tangent.during(increment)
         direction = self.freedoms.expanded(newton.values) + missing
         length = 1.0
         while length >= _SHORTEST_STEP:
             trial = u + length * direction
             if length == 1.0:
-                trial = self.path.placed(trial, factor)  # removes rounding
+                trial = self.path.placed(trial, increment.factor)  # removes rounding
             if np.all(self.path.volume_ratios(trial) > 0.0):
-                lead = self.tangent.lead(u, length * direction, trial)
-                forces = self.path.forces(trial, factor)
+                lead = laws.lead(u, length * direction, trial)
+                forces = self.path.forces(trial, increment)
                 predicted = self.tangent.forces_ahead(trial, lead).ravel()
                 missed = self._imbalance(forces) - (1.0 - length) * newton.pull
                 # With the stress that is there, and with the one that the step predicted.
@@ -309,7 +320,7 @@ class _Newton:
                     return trial, lead
             length *= 0.5
         cause = "no fraction of the Newton step reduces the imbalance"
-        raise _LoadStepError(cause, self._remedy(self.path.forces(u, factor)), u)
+        raise _LoadStepError(cause, self._remedy(self.path.forces(u, increment)), u)
 
     def stable(self) -> bool | None:
         """Whether the last tangent resists every motion; None if the forces have no energy.
@@ -356,11 +367,12 @@ class _Newton:
             return imbalance / scale
         return 0.0 if imbalance == 0.0 else float("inf")
 
-    def state(self, before: State | None, displacements: Array, factor: float) -> State:
-        """State at rest, with the work since `before`."""
+    def state(self, before: State | None, displacements: Array, increment: Increment) -> State:
+        """State at rest after a load step, with the work since `before`."""
         positions = self.path.simulation.particles.positions + displacements
         rest = np.zeros_like(positions)
-        applied = self.path.forces(displacements, factor).applied
+        forces = self.path.forces(displacements, increment)
+        applied = forces.applied
         if before is None:
             return State(
                 time=0.0,
@@ -370,24 +382,25 @@ class _Newton:
                 accelerations=rest,
                 applied=applied,
                 work=dict.fromkeys(applied, 0.0),
+                memory=forces.remembered,
             )
         return before.advanced(
-            time=self.path.time(factor),
+            time=increment.time,
             positions=positions,
             velocities=rest,
             accelerations=rest,
             applied=applied,
-            memory={},
+            memory=forces.remembered,
         )
 
-    def error(self, failure: _LoadStepError, reached: float, tried: float) -> ConvergenceError:
+    def error(self, failure: _LoadStepError, reached: float, tried: Increment) -> ConvergenceError:
         """Error of a load step that cannot be shortened any further."""
         forces = self.path.forces(failure.displacements, tried)
         free_force = np.where(self.freedoms.free, forces.total, 0.0)
         worst = int(np.argmax(np.linalg.norm(free_force, axis=1)))
         return ConvergenceError(
             load_factor=reached,
-            tried=tried,
+            tried=tried.factor,
             residual=self._relative(forces),
             particle=worst,
             volume_ratio=float(self.path.volume_ratios(failure.displacements)[worst]),

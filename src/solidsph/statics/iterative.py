@@ -17,6 +17,7 @@ from solidsph.statics.alternation import alternating_signs
 from solidsph.statics.coarse_space import CoarseSpace, Fineness
 from solidsph.statics.factors import Factors, SingularError, factorise
 from solidsph.statics.freedoms import Freedoms
+from solidsph.statics.increment import Increment
 from solidsph.statics.lead import Lead
 from solidsph.statics.linearised import Linearised, LinearSolver, UnsolvedError
 from solidsph.statics.lowest import lowest_modes
@@ -99,9 +100,12 @@ class IterativeSolver(LinearSolver):
             space(signs, _ALTERNATING) if signs else None,
         )
 
-    def linearised(self, displacements: Array, lead: Lead | None, time: float) -> Linearised:
-        moduli = self.tangent.moduli(displacements, lead)
-        return self._linearised(moduli, _symmetric(self.tangent.of_loads(displacements, time)))
+    def linearised(
+        self, displacements: Array, lead: Lead | None, increment: Increment
+    ) -> Linearised:
+        moduli = self.tangent.during(increment).moduli(displacements, lead)
+        of_loads = self.tangent.of_loads(displacements, increment.time)
+        return self._linearised(moduli, _symmetric(of_loads))
 
     def lowest_modes(
         self, displacements: Array, masses: Array, shift: float, count: int

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 
 from solidsph.errors import PortableError
 from solidsph.maths.arrays import Array
+from solidsph.statics.increment import Increment
 from solidsph.statics.lead import Lead
 
 
@@ -78,13 +79,15 @@ class LinearSolver(ABC):
         """
 
     @abstractmethod
-    def linearised(self, displacements: Array, lead: Lead | None, time: float) -> Linearised:
+    def linearised(
+        self, displacements: Array, lead: Lead | None, increment: Increment
+    ) -> Linearised:
         """The tangent at displacements (n, d) [m].
 
         Args:
             displacements: u = x - X of all particles.
             lead: of the step that led there, whose prediction the moduli are taken at.
-            time: time of the loads [s].
+            increment: the load step.
 
         Raises:
             SingularError: some motion has no stiffness.

@@ -8,9 +8,11 @@ import attrs
 import numpy as np
 
 from solidsph.interfaces.engine import InternalForces
+from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.terms import GhostConstraint
 from solidsph.maths.arrays import Array, Mask
 from solidsph.run.built_scene import BuiltScene
+from solidsph.statics.increment import Increment
 
 
 @attrs.frozen(eq=False)
@@ -19,6 +21,7 @@ class Forces:
 
     total: Array  # (n, d) [N], those on ghosts returned to the particles that they follow
     applied: Mapping[str, Array]  # by account, reactions included, (n, d) [N]
+    remembered: Memory  # at the end of the load step
 
     @property
     def scale(self) -> float:
@@ -71,18 +74,26 @@ class LoadPath:
             motion.impose(self.time(factor), 0, placed)
         return placed - (1.0 - factor) * self.offset
 
-    def forces(self, displacements: Array, factor: float) -> Forces:
-        """Forces at displacements (n, d) with the loads of a load factor."""
-        dynamics, time = self.simulation.dynamics, self.time(factor)
+    def increment(self, since: float, factor: float, memory: Memory) -> Increment:
+        """The load step to a factor, from what bodies remember at the factor `since`."""
+        time = self.time(factor)
+        return Increment(factor, time, time - self.time(since), memory)
+
+    def forces(self, displacements: Array, increment: Increment) -> Forces:
+        """Forces at displacements (n, d) at the end of a load step."""
+        dynamics, time, factor = self.simulation.dynamics, increment.time, increment.factor
         positions = dynamics.particles.positions + displacements
         rest = np.zeros_like(positions)
-        total = self.internal.forces(time, displacements)
+        total, changed = self.internal.advance(
+            time, increment.step, displacements, increment.memory
+        )
+        remembered = dict(changed)
         applied: dict[str, Array] = {}
         for load in dynamics.loads:
+            own, changed = load.advance(time, increment.step, positions, rest, increment.memory)
+            remembered |= changed
             force = np.zeros_like(positions)
-            force[load.particles] = (
-                load.forces(time, positions, rest) - (1.0 - factor) * self.initial_loads[load.label]
-            )
+            force[load.particles] = own - (1.0 - factor) * self.initial_loads[load.label]
             applied[load.label] = force
             total = total + force
         for motion in dynamics.constraints:
@@ -90,11 +101,11 @@ class LoadPath:
                 motion.return_forces(total)
         for motion in dynamics.constraints:
             applied[motion.label] = np.where(motion.held & self.held, -total, 0.0)
-        return Forces(total, applied)
+        return Forces(total, applied, remembered)
 
     def volume_ratios(self, displacements: Array) -> Array:
         """J of every particle, (n,); 1 for ghosts."""
         with np.errstate(all="ignore"):  # trial displacements may be absurd
-            F = self.internal.fields(displacements).deformation_gradients
-            ratios: Array = np.linalg.det(F)
-        return ratios
+            H = self.internal.gradients(displacements)
+            ratios = np.linalg.det(np.eye(displacements.shape[1]) + H)
+        return np.where(self.simulation.particles.ghosts, 1.0, ratios)

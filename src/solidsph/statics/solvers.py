@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import attrs
 
+from solidsph.engines.history import with_histories
 from solidsph.errors import SceneError
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.terms import StressTerm
@@ -20,7 +21,7 @@ from solidsph.statics.tangent import Tangent, is_symmetric
 class LinearSystem:
     """The tangent of a scene, its free displacements, and a solver for them."""
 
-    internal: InternalForces  # in double precision
+    internal: InternalForces  # in double precision, with what the bodies remember
     tangent: Tangent
     freedoms: Freedoms
     symmetric: bool  # forces derive from an energy
@@ -42,16 +43,21 @@ def linear_system(simulation: BuiltScene, solver: str) -> LinearSystem:
             f"statics: solver {ITERATIVE!r} is given, but {hindrance}; use 'direct', or none"
         )
     if hindrance or not iterates(solver, simulation.particles.dimension, free.count):
-        internal: InternalForces = sums_by_matrices(simulation)
-        tangent = Tangent.of(simulation, internal)
+        sums: InternalForces = sums_by_matrices(simulation)
+        tangent = Tangent.of(simulation, sums)
         direct = DirectSolver(tangent, free, symmetric)
-        return LinearSystem(internal, tangent, free, symmetric, direct)
+        return LinearSystem(_whole(simulation, sums), tangent, free, symmetric, direct)
     from solidsph.statics.iterative import IterativeSolver  # brings the compiler with it
 
-    internal = sums_of_engine(simulation)
-    tangent = Tangent.of(simulation, internal)
+    sums = sums_of_engine(simulation)
+    tangent = Tangent.of(simulation, sums)
     iterative = IterativeSolver.of(simulation, tangent, free)
-    return LinearSystem(internal, tangent, free, symmetric, iterative)
+    return LinearSystem(_whole(simulation, sums), tangent, free, symmetric, iterative)
+
+
+def _whole(simulation: BuiltScene, sums: InternalForces) -> InternalForces:
+    conditions = [term for term in simulation.terms if isinstance(term, StressTerm)]
+    return with_histories(sums, simulation.model.bodies, conditions)
 
 
 def _hindrance(simulation: BuiltScene, free: Freedoms, symmetric: bool) -> str | None:

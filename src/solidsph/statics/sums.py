@@ -1,4 +1,4 @@
-"""Internal forces of a scene in double precision, whatever its engine."""
+"""Sums of a scene in double precision, whatever its engine."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 
+from solidsph.engines.history import HistoryForces
 from solidsph.engines.matrix import MatrixEngine, MatrixForces
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.terms import StressTerm
@@ -14,7 +15,7 @@ from solidsph.run.built_scene import BuiltScene
 
 def sums_by_matrices(simulation: BuiltScene) -> MatrixForces:
     """The internal forces by sparse matrices, from which a tangent can be assembled."""
-    internal = simulation.dynamics.internal
+    internal = _own_sums(simulation)
     if isinstance(internal, MatrixForces):
         return internal
     conditions = [term for term in simulation.terms if isinstance(term, StressTerm)]
@@ -28,9 +29,15 @@ def sums_of_engine(simulation: BuiltScene) -> InternalForces:
 
     It must also tell the stiffness of every particle alone.
     """
-    internal = simulation.dynamics.internal
+    internal = _own_sums(simulation)
     if internal.precision > sys.float_info.epsilon:
         return sums_by_matrices(simulation)
     n, d = simulation.particles.positions.shape
     tells = internal.own_stiffness(np.zeros((n, d * d, d * d))) is not None
     return internal if tells else sums_by_matrices(simulation)
+
+
+def _own_sums(simulation: BuiltScene) -> InternalForces:
+    """The scene's own internal forces, without the internal variables that they advance."""
+    internal = simulation.dynamics.internal
+    return internal.sums if isinstance(internal, HistoryForces) else internal

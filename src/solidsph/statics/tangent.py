@@ -16,10 +16,12 @@ from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.formulation import Configuration, Formulation
 from solidsph.interfaces.terms import Load, StressTerm
 from solidsph.maths.arrays import Array
-from solidsph.maths.tensors import components_first, particles_first
+from solidsph.maths.tensors import components_first
 from solidsph.run.built_scene import BuiltScene
+from solidsph.statics.increment import Increment
 from solidsph.statics.lead import Lead
 from solidsph.statics.linear_part import linear_part
+from solidsph.statics.local_law import LocalLaw, local_law
 from solidsph.statics.stiff import is_stiff
 from solidsph.statics.sums import sums_by_matrices
 
@@ -32,17 +34,20 @@ class _BodyTangent:
     """What the tangent of one body needs besides its sums."""
 
     body: Body
+    law: LocalLaw
     stresses: csr_array | None  # (d d n, d d n) extends stresses of real particles to ghosts
 
     def moduli(self, F: Array, lead: Lead | None) -> Array:
         """dT_ik / dF_jl of all particles, (n, d, d, d, d) [Pa], at F (n, d, d)."""
-        if lead is None or not self.body.material.objective:
-            return _moduli(self.body, F)
         F = self._real(F)
-        stretched = F * lead.stretch[:, None, None]
-        A = _moduli(self.body, stretched)
-        S = lead.stress + _second_piola(self.body, F) - _second_piola(self.body, stretched)
-        A += np.einsum("ij,pkl->pikjl", np.eye(F.shape[1]), S)
+        if lead is None or not self._leads:
+            A = self.law.moduli(F)
+        else:
+            stretched = F * lead.stretch[:, None, None]
+            A = self.law.moduli(stretched)
+            S = lead.stress + self._second_piola(F) - self._second_piola(stretched)
+            A += np.einsum("ij,pkl->pikjl", np.eye(F.shape[1]), S)
+        A[self.body.particles.ghosts] = 0.0
         return A
 
     def matrix(self, constant: Operators, A: Array) -> csr_array:
@@ -67,21 +72,31 @@ class _BodyTangent:
     def lead(self, before: Array, dF: Array, after: Array) -> Lead:
         """`Tangent.lead` from F before (n, d, d), its linear change and F after the step."""
         n, d = before.shape[:2]
-        ghosts, material = self.body.particles.ghosts, self.body.material
-        if not material.objective:  # linear forces have no geometric stiffness
+        ghosts = self.body.particles.ghosts
+        if not self._leads:
             return Lead(np.zeros((n, d, d)), np.ones(n))
         before, after = self._real(before), self._real(after)
-        dP = particles_first(
-            material.tangent(components_first(before), components_first(dF), material.params), n
-        )
-        S = _second_piola(self.body, before)
-        predicted = S + np.linalg.solve(before, dP - dF @ S)
-        stress = predicted - _second_piola(self.body, after)
+        S = self._second_piola(before)
+        predicted = S + np.linalg.solve(before, self.law.change(before, dF) - dF @ S)
+        stress = predicted - self._second_piola(after)
         growth = 1.0 + np.trace(np.linalg.solve(before, dF), axis1=1, axis2=2)
         volumes = growth * np.linalg.det(before) / np.linalg.det(after)
         stretch = np.clip(volumes, 1.0 / _MOST_GROWTH, _MOST_GROWTH) ** (1.0 / d)
         stress[ghosts], stretch[ghosts] = 0.0, 1.0
         return Lead(stress, stretch)
+
+    @property
+    def _leads(self) -> bool:
+        """Whether a linear prediction of the stress is better than the actual one.
+
+        Linear forces have no geometric stiffness; and beyond first yield the prediction is far from
+        what a metal bears.
+        """
+        return self.body.material.objective and self.law.smooth
+
+    def _second_piola(self, F: Array) -> Array:
+        """Second Piola-Kirchhoff stress S = F^-1 P, (n, d, d) [Pa]."""
+        return np.asarray(np.linalg.solve(F, self.law.stress(F)), dtype=np.float64)
 
     def _real(self, F: Array) -> Array:
         """F (n, d, d) with that of ghosts replaced by the identity."""
@@ -107,7 +122,7 @@ class Tangent:
     """Tangent of a scene, by the sums of its internal forces."""
 
     bodies: Sequence[_BodyTangent]
-    internal: InternalForces  # in double precision
+    internal: InternalForces  # the sums, in double precision
     loads: Sequence[Load]
 
     @classmethod
@@ -123,12 +138,21 @@ class Tangent:
         conditions = [c for c in simulation.terms if isinstance(c, StressTerm)]
         return cls(
             [
-                _BodyTangent(body, _stress_extension(body, simulation, conditions))
+                _BodyTangent(
+                    body,
+                    local_law(body, internal),
+                    _stress_extension(body, simulation, conditions),
+                )
                 for body in bodies
             ],
             internal,
             simulation.dynamics.loads,
         )
+
+    def during(self, increment: Increment) -> Tangent:
+        """The tangent in a load step, of the stress at its end."""
+        bodies = [attrs.evolve(b, law=b.law.during(increment)) for b in self.bodies]
+        return attrs.evolve(self, bodies=bodies)
 
     def moduli(self, displacements: Array, lead: Lead | None = None) -> Array:
         """dT_ik / dF_jl of all particles, (n, d, d, d, d) [Pa], at displacements (n, d).
@@ -231,29 +255,6 @@ def tangent(simulation: BuiltScene, displacements: Array) -> csr_array:
 def is_symmetric(simulation: BuiltScene) -> bool:
     """Whether the internal forces derive from an energy, so that K is symmetric."""
     return all(body.formulation.divergence.adjoint for body in simulation.model.bodies)
-
-
-def _moduli(body: Body, F: Array) -> Array:
-    """Moduli dT_ik / dF_jl of all particles, (n, d, d, d, d) [Pa]; zero for ghosts."""
-    n, d = F.shape[:2]
-    moduli = np.empty((n, d, d, d, d))
-    ghosts = body.particles.ghosts
-    at = components_first(np.where(ghosts[:, None, None], np.eye(d), F))
-    for j in range(d):
-        for k in range(d):
-            change = np.zeros((d, d))
-            change[j, k] = 1.0
-            dP = body.material.tangent(at, change, body.material.params)
-            moduli[..., j, k] = particles_first(dP, n)
-    moduli[ghosts] = 0.0
-    return moduli
-
-
-def _second_piola(body: Body, F: Array) -> Array:
-    """Second Piola-Kirchhoff stress S = F^-1 P, (n, d, d) [Pa]."""
-    P = body.material.first_piola(components_first(F), body.material.params)
-    S = np.linalg.solve(F, particles_first(P, len(F)))
-    return np.asarray(S, dtype=np.float64)
 
 
 def _check_form(formulation: Formulation, d: int) -> None:

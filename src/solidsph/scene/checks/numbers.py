@@ -58,7 +58,8 @@ def _motion(scene: SceneData) -> Iterator[str]:
 
 def _statics(wanted: StaticsScene, scene: SceneData) -> Iterator[str]:
     for name in ("load_steps", "max_iterations"):
-        yield from _whole_number(f"statics: {name}", getattr(wanted, name), 1)
+        if getattr(wanted, name) is not None:
+            yield from _whole_number(f"statics: {name}", getattr(wanted, name), 1)
     yield from _fraction("statics: tolerance", wanted.tolerance)
     if wanted.solver not in SOLVERS:
         known = ", ".join(map(repr, SOLVERS))

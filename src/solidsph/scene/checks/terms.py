@@ -16,9 +16,14 @@ from solidsph.model.particles import Particles
 from solidsph.scene.scene_data import SceneData
 
 
-def check_effects(effects: Mapping[str, Effect]) -> Iterator[str]:
-    """Yield an effect on initial pairs beside one that breaks them."""
+def check_effects(effects: Mapping[str, Effect], scene: SceneData) -> Iterator[str]:
+    """Yield effects that break bonds, beside others on initial pairs or in [statics]."""
     breaking = [label for label, effect in effects.items() if effect.breaks_bonds]
+    if breaking and scene.statics is not None:
+        yield (
+            f"{breaking[0]!r} breaks bonds one after the other, but [statics] finds equilibria "
+            "between which none breaks; leave out [statics], load slowly and add 'mass-damping'"
+        )
     bound = [label for label, effect in effects.items() if effect.uses_initial_pairs]
     if breaking and bound:
         yield (
@@ -27,21 +32,10 @@ def check_effects(effects: Mapping[str, Effect]) -> Iterator[str]:
         )
 
 
-def check_history(
-    bodies: Sequence[Body], scene: SceneData, labels: Collection[str]
-) -> Iterator[str]:
-    """Yield history materials in [statics], and labels that hide their account."""
-    for body in bodies:
-        if not isinstance(body.material, HistoryMaterial):
-            continue
-        if scene.statics is not None:
-            yield (
-                f"body {body.name!r}: {type(body.material).__name__} depends on the history of "
-                "deformation, but [statics] finds equilibria without one; leave out [statics], "
-                "load slowly and add 'mass-damping'"
-            )
-        if "history" in labels:
-            yield "the label 'history' is used for history materials; choose another"
+def check_history(bodies: Sequence[Body], labels: Collection[str]) -> Iterator[str]:
+    """Yield labels that hide the account of history materials."""
+    if "history" in labels and any(isinstance(b.material, HistoryMaterial) for b in bodies):
+        yield "the label 'history' is used for history materials; choose another"
 
 
 def check_constraints(constraints: Sequence[Constraint], particles: Particles) -> Iterator[str]:
