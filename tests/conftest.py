@@ -46,6 +46,10 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+# The width of tables in what tests read is not that of the terminal, which pytest-xdist hands on.
+os.environ.pop("COLUMNS", None)
+
+
 # Rooms whose files take longest.
 LONG = ("bare", "engines", "results", "studies", "testing", "cases")
 

@@ -78,6 +78,8 @@ def test_what_cannot_be_shown_is_told(path: Path, monkeypatch: pytest.MonkeyPatc
     done = solidsph("view", str(path), cwd=path.parent)
     assert done.returncode == 2
     assert "no display" in done.stderr
+    with Record(path) as record, pytest.raises(RecordError, match="no display to open a window on"):
+        record.view()
     done = solidsph("view", str(path), "--field", "colour", "--picture", "a.png", cwd=path.parent)
     assert done.returncode == 2
     assert "no field 'colour'" in done.stderr

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from pathlib import Path
 
 import attrs
@@ -11,7 +9,6 @@ import click
 
 from solidsph.commands.console import present
 from solidsph.commands.options import FILE, Output, option, options
-from solidsph.errors import RecordError
 from solidsph.results.record import Record
 
 
@@ -42,8 +39,6 @@ def view(result: Path, options: _Options) -> None:
     from solidsph.results.view import view as show
 
     with Record(result) as record:
-        if options.picture is None and not _has_display():
-            raise RecordError("there is no display to open a window on; draw a file: --picture")
         show(
             record,
             field=options.field,
@@ -54,9 +49,3 @@ def view(result: Path, options: _Options) -> None:
     facts = {"record": str(result), "picture": options.picture and str(options.picture)}
     text = [] if options.picture is None else [f"picture: {options.picture}"]
     present(facts, text, as_json=options.as_json)
-
-
-def _has_display() -> bool:
-    if sys.platform in ("win32", "darwin"):
-        return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from importlib import import_module
 from math import isfinite
 from pathlib import Path
@@ -15,6 +17,7 @@ from solidsph.errors import RecordError
 from solidsph.maths.arrays import Array
 from solidsph.results.pictures import colour_label, magnitudes
 from solidsph.results.recorded import Recorded
+from solidsph.system.progress_display import in_notebook
 
 _SIZE = (1024, 768)  # of the window [pixels]
 
@@ -68,6 +71,12 @@ class View:
             plotter.screenshot(str(picture))
             plotter.close()
             return
+        if in_notebook():  # PyVista shows what it can there, without a display a picture
+            _hush()
+        elif not _has_display():
+            raise RecordError(
+                "there is no display to open a window on; draw a file: --picture or picture=..."
+            )
         plotter = self._scene(off_screen=False)
         plotter.add_slider_widget(
             self.to_time,
@@ -197,8 +206,8 @@ def view(
         picture: a file to draw instead of opening a window.
 
     Raises:
-        RecordError: PyVista is not installed, the factor is no number, or the record has no output
-            or no such field.
+        RecordError: PyVista is not installed, there is no display to open a window on, the factor
+            is no number, or the record has no output or no such field.
     """
     if not isfinite(factor):
         raise RecordError(f"displacements cannot be shown times {factor}; give a number such as 10")
@@ -213,6 +222,12 @@ def _library() -> Any:
         return import_module("pyvista")
     except ImportError:
         raise RecordError("PyVista is not installed; run: pip install 'solidsph[view]'") from None
+
+
+def _has_display() -> bool:
+    if sys.platform in ("win32", "darwin"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def _hush() -> None:
