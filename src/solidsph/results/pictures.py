@@ -14,6 +14,7 @@ from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import largest_principal
 from solidsph.results.probe_picture import draw_probes, probe_columns
 from solidsph.results.recorded import Recorded
+from solidsph.results.shown_figure import ShownFigure
 
 STRESS = "cauchy_stress"
 
@@ -85,7 +86,7 @@ def _draw_histories(record: Recorded, field: str) -> Figure:
     real = np.flatnonzero(~particles.ghosts)
     order = real[np.argsort(particles.positions[real, 0])]
     X = particles.positions[order, 0]
-    drawn = Figure(figsize=(10.0, 4.5), layout="constrained")
+    drawn = ShownFigure(figsize=(10.0, 4.5), layout="constrained")
     left, right = drawn.subplots(1, 2)
     left.plot(record.times, record.positions[:][:, order, 0] - X, color="0.4", linewidth=0.6)
     left.set(xlabel="time [s]", ylabel="displacement [m]")
@@ -104,7 +105,7 @@ def _draw_bodies(record: Recorded, field: str) -> Figure:
     spans = [np.ptp(record.positions[k][real], axis=0) for k in (0, -1)]
     extent = float(np.max(spans)) or 1.0
     height = 1.5 + 4.0 * min(1.2, max(0.4, float(max(span[1] for span in spans)) / extent))
-    drawn = Figure(figsize=(11.0, height), layout="constrained")
+    drawn = ShownFigure(figsize=(11.0, height), layout="constrained")
     solid = {"projection": "3d"} if record.dimension == 3 else {}
     axes = drawn.subplots(1, 2, subplot_kw=solid)
     values = [magnitudes(record.field(field)[k][real]) for k in (0, -1)]
@@ -121,7 +122,7 @@ def _draw_bodies(record: Recorded, field: str) -> Figure:
 
 
 def _draw_energies(times: Array, history: Mapping[str, Array]) -> Figure:
-    drawn = Figure(figsize=(9.0, 4.5), layout="constrained")
+    drawn = ShownFigure(figsize=(9.0, 4.5), layout="constrained")
     axis = drawn.subplots()
     styles = ("-", "--", "-.", ":")
     energies = {name: values for name, values in history.items() if name.endswith("[J]")}

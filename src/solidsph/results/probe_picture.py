@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from solidsph.errors import RecordError
 from solidsph.results.output_fields import of_probe
 from solidsph.results.recorded import Recorded
+from solidsph.results.shown_figure import ShownFigure
 
 _STYLES = ("-", "--", "-.", ":")
 
@@ -21,7 +22,7 @@ def draw_probes(record: Recorded) -> Figure:
     columns = probe_columns(record)
     if not columns:
         raise RecordError("the scene of this record has no probe; add [[probe]], and run it again")
-    figure = Figure(figsize=(9.0, 1.0 + 3.2 * len(columns)), layout="constrained")
+    figure = ShownFigure(figsize=(9.0, 1.0 + 3.2 * len(columns)), layout="constrained")
     panels = figure.subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (unit, names) in zip(panels, columns.items(), strict=True):
         for number, name in enumerate(names):
