@@ -16,7 +16,7 @@ TWO := -n 2 --dist loadfile --no-loadscope-reorder
 # Some hundred processes import the package: each would compile its modules anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-SPHINX := $(BIN)/sphinx-build -W --keep-going --quiet
+SPHINX := $(BIN)/sphinx-build --quiet
 DOCS_STAMP := $(VENV)/.docs
 
 .PHONY: demo test validate bare gallery frontiers bench bench-page docs docs-links lint format clean
@@ -49,7 +49,7 @@ frontiers: $(STAMP)  ## error against time of the documented cases, written to t
 	$(BIN)/python benchmarks/frontiers.py --write docs/what-accuracy-costs.md
 
 docs: $(DOCS_STAMP)  ## the documentation as a site, in build/site; runs the tutorials
-	$(SPHINX) -b html docs build/site
+	$(SPHINX) -W --keep-going -E -b html docs build/site
 
 docs-links: $(DOCS_STAMP)  ## whether links to other sites lead somewhere
 	$(SPHINX) -b linkcheck -D nb_execution_mode=off docs build/links

@@ -21,10 +21,10 @@ version = release = installed("solidsph")
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
-    "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx_copybutton",
-    "mathml",
+    "drawn_math",
+    "plain_docstrings",
     "registered_parts",
     "command_line",
 ]
@@ -73,14 +73,13 @@ autodoc_type_aliases = {
 }
 python_use_unqualified_type_names = True
 maximum_signature_line_length = 88
-napoleon_numpy_docstring = False
 default_role = "code"  # single backticks in docstrings
 # A type of another library, or one that only the core handles, has no page here.
 nitpick_ignore_regex = [(r"py:.*", r"(?!solidsph)[\s\S]*"), (r"py:class", INTERNAL)]
 
 # The look.
 html_theme = "furo"
-html_math_renderer = "mathml"
+html_math_renderer = "drawn"
 html_title = f"solidsph {version}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
@@ -99,17 +98,5 @@ def _link_pages(app: Sphinx, docname: str, source: list[str]) -> None:
     )
 
 
-def _quote(
-    app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
-) -> None:
-    """Keep formulas of docstrings, which are plain text, from being read as mark-up."""
-    for number, line in enumerate(lines):
-        start, rest = re.match(r"(\s*(?:\* )?)(.*)", line).groups()
-        pieces = re.split(r"(`+[^`]*`+)", rest)
-        pieces[::2] = [re.sub(r"[*|]|_(?!\w)", r"\\\g<0>", piece) for piece in pieces[::2]]
-        lines[number] = start + "".join(pieces)
-
-
 def setup(app: Sphinx) -> None:
-    app.connect("autodoc-process-docstring", _quote, priority=100)  # before Napoleon
     app.connect("source-read", _link_pages)
