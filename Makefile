@@ -28,7 +28,7 @@ test: $(STAMP) lint  ## lint, types and every test but the slow physics
 	$(if $(WITHOUT),@echo "no $(WITHOUT): tests in a browser are left out; apt-get install chromium chromium-driver")
 	$(BIN)/pytest $(TWO) -m "not validation$(if $(WITHOUT), and not browser)"
 
-validate: $(STAMP)  ## the slow physics, every combination, and many more examples of properties
+validate: $(STAMP) docs  ## the slow physics, every combination, many more examples, the built site
 	$(BIN)/pytest $(TWO) -m "validation or examples" --hypothesis-profile thorough -rP
 
 bare: $(STAMP)  ## scenes that name nothing of the scheme: their errors as a table, and plots over spacing

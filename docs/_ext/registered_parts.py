@@ -23,13 +23,15 @@ class RegisteredParts(SphinxDirective):
         for entry in registry.available(kind):
             if entry.distribution == OWN:
                 lines += [*self._described(entry), ""]
-        return self.parse_text_to_nodes(StringList(lines, source=self.env.docname))
+        return self.parse_text_to_nodes(
+            StringList(lines, source=self.env.docname), allow_section_headings=True
+        )
 
     def _described(self, entry: registry.Entry) -> list[str]:
         """In the language of the page: MyST."""
         target = entry.target.replace(":", ".")
         return [
-            f"**{entry.name}**",
+            f"### {entry.name}",
             "",
             "```{eval-rst}",
             f".. autoclass:: {target}",

@@ -53,10 +53,6 @@ def cells(page: Path) -> Sequence[str]:
     """The Python of a tutorial, without what only a notebook understands."""
     text = page.read_text(encoding="utf-8")
     found = re.findall(r"```\{code-cell\} python\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
-    python = [cell for cell in found if not cell.startswith("%%writefile pyproject")]
-    return [re.sub(r"^(%%|!).*$", "", cell, flags=re.MULTILINE) for cell in python]
-
-
-def prose(page: Path) -> str:
-    """The text of a page without code and tables."""
-    return re.sub(r"^\|.*$", "", text_of(page), flags=re.MULTILINE)
+    other = ("%%bash", "%%writefile pyproject")
+    python = [cell for cell in found if not cell.startswith(other)]
+    return [re.sub(r"^%%.*$", "", cell, flags=re.MULTILINE) for cell in python]

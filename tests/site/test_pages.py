@@ -23,7 +23,6 @@ from tests.site.contents import (
     anchors,
     cells,
     links,
-    prose,
     reached,
 )
 
@@ -138,8 +137,3 @@ def test_the_readme_shows_a_picture_at_once() -> None:
     first = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()[:12]
     (picture,) = re.findall(r"!\[[^]]+\]\(([^)]+)\)", "\n".join(first))
     assert (ROOT / picture).stat().st_size <= 150_000
-
-
-def test_prose_does_not_grow() -> None:
-    """What people wrote; what commands write, and code, is not counted."""
-    assert sum(len(prose(page).split()) for page in DOCS.rglob("*.md")) < 30_000
