@@ -50,6 +50,7 @@ frontiers: $(STAMP)  ## error against time of the documented cases, written to t
 
 docs: $(DOCS_STAMP)  ## the documentation as a site, in build/site; runs the tutorials
 	$(SPHINX) -W --keep-going -E -b html docs build/site
+	@echo "open build/site/index.html"
 
 docs-links: $(DOCS_STAMP)  ## whether links to other sites lead somewhere
 	$(SPHINX) -b linkcheck -D nb_execution_mode=off docs build/links
