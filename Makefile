@@ -16,7 +16,10 @@ TWO := -n 2 --dist loadfile --no-loadscope-reorder
 # Some hundred processes import the package: each would compile its modules anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test validate bare gallery frontiers bench bench-page lint format clean
+SPHINX := $(BIN)/sphinx-build --quiet
+DOCS_STAMP := $(VENV)/.docs
+
+.PHONY: demo test validate bare gallery frontiers bench bench-page docs docs-links lint format clean
 
 demo: $(STAMP)  ## the paper's headline experiment: table, record and picture
 	$(BIN)/solidsph run tensile-instability
@@ -25,7 +28,7 @@ test: $(STAMP) lint  ## lint, types and every test but the slow physics
 	$(if $(WITHOUT),@echo "no $(WITHOUT): tests in a browser are left out; apt-get install chromium chromium-driver")
 	$(BIN)/pytest $(TWO) -m "not validation$(if $(WITHOUT), and not browser)"
 
-validate: $(STAMP)  ## the slow physics, every combination, and many more examples of properties
+validate: $(STAMP) docs  ## the slow physics, every combination, many more examples, the built site
 	$(BIN)/pytest $(TWO) -m "validation or examples" --hypothesis-profile thorough -rP
 
 bare: $(STAMP)  ## scenes that name nothing of the scheme: their errors as a table, and plots over spacing
@@ -45,6 +48,13 @@ gallery: $(STAMP)  ## the figures of the paper, written to the documentation
 frontiers: $(STAMP)  ## error against time of the documented cases, written to the documentation
 	$(BIN)/python benchmarks/frontiers.py --write docs/what-accuracy-costs.md
 
+docs: $(DOCS_STAMP)  ## the documentation as a site, in build/site; runs the tutorials
+	$(SPHINX) -W --keep-going -E -b html docs build/site
+	@echo "open build/site/index.html"
+
+docs-links: $(DOCS_STAMP)  ## whether links to other sites lead somewhere
+	$(SPHINX) -b linkcheck -D nb_execution_mode=off docs build/links
+
 lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -62,6 +72,10 @@ $(STAMP): pyproject.toml $(EXAMPLE)/pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable ".[test,dev]"
 	$(BIN)/python -m pip install --quiet --editable $(EXAMPLE)
 	touch $(STAMP)
+
+$(DOCS_STAMP): $(STAMP)
+	$(BIN)/python -m pip install --quiet --editable ".[docs]"
+	touch $(DOCS_STAMP)
 
 clean:
 	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import final
+from typing import Any, final
 
 import attrs
 
 from solidsph.assembly.builder import Builder
 from solidsph.errors import UnsoundError
 from solidsph.interfaces.time_loop import TimeLoop
+from solidsph.results.last_row import LastRow
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.motion import run_motion, time_loop
 from solidsph.run.outcome import Result
@@ -106,7 +107,8 @@ class Simulation(BuiltScene):
         with ExitStack() as stack:
             stack.enter_context(exclusive(self))
             if record is None:
-                return run(observers)
+                last = LastRow()
+                return _with(run, [*observers, last], lambda: {"final": last.columns()})
             # They import the file library.
             from solidsph.results.record import plotted
             from solidsph.results.recording import recording
@@ -114,16 +116,24 @@ class Simulation(BuiltScene):
             path = Path(record)
             checkpointer, recorder = stack.enter_context(recording(path, since))
 
-            def recorded(result: Result) -> Result:
-                return attrs.evolve(
-                    result, record=path, final=recorder.final, plot=partial(plotted, path)
-                )
+            return _with(
+                run,
+                [*observers, checkpointer, recorder],
+                lambda: {"record": path, "final": recorder.final, "plot": partial(plotted, path)},
+            )
 
-            try:
-                return recorded(run([*observers, checkpointer, recorder]))
-            except UnsoundError as unsound:
-                unsound.result = recorded(unsound.result)
-                raise
+
+def _with(
+    run: Callable[[Sequence[object]], Result],
+    observers: Sequence[object],
+    made: Callable[[], Mapping[str, Any]],
+) -> Result:
+    """The result of a run, also of an unsound one, with what its observers have made."""
+    try:
+        return attrs.evolve(run(observers), **made())
+    except UnsoundError as unsound:
+        unsound.result = attrs.evolve(unsound.result, **made())
+        raise
 
 
 solve = Simulation.run

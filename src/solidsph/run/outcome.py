@@ -36,7 +36,7 @@ class Result:
     record: Path | None  # the file written, if any
     seconds: float  # wall time, compilation and record included [s]
     effort: Mapping[str, Any]  # further costs: "quantity [unit]" -> number or bool
-    final: Mapping[str, float] = attrs.field(factory=dict)  # last row of the record's history
+    final: Mapping[str, float] = attrs.field(factory=dict)  # columns of the last output
     notes: Sequence[str] = ()  # events of the run, as in the record
     _values_at: Callable[[State, ArrayLike, str | None], Values] | None = None
     _plot: Callable[[str, str], Any] | None = None  # of its record
