@@ -266,6 +266,7 @@ _READERS: Mapping[Any, Callable[[Any, str], Any]] = {
     float: _number,
     float | None: _number,
     int: _whole_number,
+    int | None: _whole_number,
     str: _text,
     Sequence[str]: _names,
 }
