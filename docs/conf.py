@@ -45,6 +45,7 @@ INTERNAL = "|".join(
         r"model\.surface\.Pieces",
         r"scene\.scene_data\.\w+",
         r"studies\.(reference\.Reference|quantity\.Quantity|case\.Picture)",
+        r"studies\.(runner\.Runner|sweep\.SweepStatus)",
     )
 )
 

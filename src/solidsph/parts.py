@@ -39,6 +39,7 @@ from solidsph.interfaces.plan import (
     Plan,
     SumMethod,
 )
+from solidsph.interfaces.row_weights import RowWeights
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel, smoothing_kernel
 from solidsph.interfaces.subset import Subset
@@ -152,6 +153,7 @@ __all__ = [
     "PointwiseLoad",
     "Record",
     "Response",
+    "RowWeights",
     "Scalar",
     "Scene",
     "SceneBuilder",
