@@ -14,7 +14,7 @@ import pytest
 
 from solidsph.cli import main
 from solidsph.registry import registry
-from tests.helpers.scenes import SCENE_TOML
+from tests.helpers.scenes import SCENE_TOML, box
 
 
 def solidsph(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -286,3 +286,17 @@ def test_the_shell_completes_verbs_options_and_cases(
     assert completed("co") == ["cost"]
     assert completed("run", "--acc") == ["--accuracy"]
     assert completed("cost", "csm") == ["csm1", "csm3", "csm"]  # the last: files of that name
+
+
+def test_plot_and_view_take_the_folder_of_a_record(tmp_path: Path) -> None:
+    folder = tmp_path / "one"
+    box(2).build().run(record=folder / "record.h5")
+    assert solidsph("plot", "one", cwd=tmp_path).returncode == 0
+    assert (folder / "record-motion.png").is_file()
+    box(2).build().run(record=folder / "other.h5")
+    several = solidsph("view", "one", cwd=tmp_path)
+    assert several.returncode == 2
+    assert "several records (other.h5, record.h5)" in several.stderr
+    nothing = solidsph("plot", ".", cwd=tmp_path)
+    assert nothing.returncode == 2
+    assert "there is no record" in nothing.stderr

@@ -9,6 +9,7 @@ import click
 
 from solidsph.commands.console import present
 from solidsph.commands.options import Output, option, options, output_option
+from solidsph.commands.records import records_in
 from solidsph.results.record import Record
 
 
@@ -21,18 +22,20 @@ class _Options(Output):
 
 
 @click.command()
-@click.argument("result", metavar="RECORD", type=click.Path(path_type=Path))
+@click.argument("result", metavar="RECORD|FOLDER", type=click.Path(path_type=Path))
 @options(_Options)
 def plot(result: Path, options: _Options) -> None:
-    """Draw the pictures of a record.
+    """Draw the pictures of a record, or of all in a FOLDER.
 
     They show the deformed body, coloured by a field, the energies, and what the probes measured.
     """
     from solidsph.results.pictures import draw
 
-    folder = options.output or result.parent
-    with Record(result) as record:
-        chosen = {} if options.field is None else {"field": options.field}
-        paths = [str(path) for path in draw(record, folder, result.stem, **chosen)]
+    chosen = {} if options.field is None else {"field": options.field}
+    paths: list[str] = []
+    for path in records_in(result):
+        with Record(path) as record:
+            folder = options.output or path.parent
+            paths += [str(picture) for picture in draw(record, folder, path.stem, **chosen)]
     facts = {"record": str(result), "pictures": paths}
     present(facts, [f"picture: {path}" for path in paths], as_json=options.as_json)

@@ -10,8 +10,7 @@ import click
 
 from solidsph.commands.console import present, progress, progress_observers, say
 from solidsph.commands.options import Output, flag, option, options
-from solidsph.errors import RecordError
-from solidsph.results.layout import RECORD_SUFFIXES
+from solidsph.commands.records import records_in
 from solidsph.results.record import Record
 from solidsph.resumption import Pending, pending
 from solidsph.run.outcome import UNSOUND
@@ -32,7 +31,7 @@ def resume(result: Path, options: _Options) -> None:
     A FOLDER continues every run in it.
     """
     facts = []
-    for path in _records(result):
+    for path in records_in(result):
         run = pending(path, until=options.until, force=options.force)
         if run is None:
             facts.append({"record": str(path), "outcome": f"{_outcome(path)} before"})
@@ -53,15 +52,6 @@ def resume(result: Path, options: _Options) -> None:
 def _outcome(path: Path) -> str:
     with Record(path) as record:
         return record.outcome.partition(":")[0]
-
-
-def _records(result: Path) -> list[Path]:
-    if not result.is_dir():
-        return [result]
-    records = sorted(path for suffix in RECORD_SUFFIXES for path in result.glob(f"*{suffix}"))
-    if not records:
-        raise RecordError(f"there is no record (*.h5) in the folder {result}; check the path")
-    return records
 
 
 def _resumed(run: Pending, *, shown: bool) -> dict[str, Any]:

@@ -55,6 +55,12 @@ from solidsph.watch import Finding, run_watched
 LOG = logging.getLogger(__name__)
 
 
+_SUMMED = (
+    "note: work is summed up by the trapezoidal rule over the load steps; the energy residual is "
+    "the error of that sum, and falls with the square of their number (statics.load_steps)"
+)
+
+
 @attrs.frozen
 class _Options(Output):
     settings: tuple[str, ...] = set_option()
@@ -242,6 +248,8 @@ def _run_scene(
             yield "verdict: " + ("as expected" if passed else "NOT as expected")
         if found is not None:
             yield found.sentence
+        if scene.statics is not None:
+            yield _SUMMED
         yield from (f"note: {note}" for note in result.notes)
         yield f"record: {path} (open it in ParaView, or with: solidsph plot {path})"
         if effects is not None:

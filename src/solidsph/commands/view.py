@@ -9,6 +9,8 @@ import click
 
 from solidsph.commands.console import present
 from solidsph.commands.options import FILE, Output, option, options
+from solidsph.commands.records import records_in
+from solidsph.errors import RecordError
 from solidsph.results.record import Record
 
 
@@ -32,13 +34,17 @@ class _Options(Output):
 
 
 @click.command()
-@click.argument("result", metavar="RECORD", type=click.Path(path_type=Path))
+@click.argument("result", metavar="RECORD|FOLDER", type=click.Path(path_type=Path))
 @options(_Options)
 def view(result: Path, options: _Options) -> None:
-    """Show a record in 3D, with sliders for time and deformation."""
+    """Show a record in 3D, with sliders for time and deformation: the only one of a FOLDER."""
     from solidsph.results.view import view as show
 
-    with Record(result) as record:
+    several = records_in(result)
+    if len(several) > 1:
+        names = ", ".join(path.name for path in several)
+        raise RecordError(f"the folder {result} has several records ({names}); name one of them")
+    with Record(several[0]) as record:
         show(
             record,
             field=options.field,
