@@ -29,7 +29,7 @@ CASES = {
     ("view", "none.h5"): "there is no record none.h5; check the path, or run the scene first",
     ("resume", "none.h5"): "there is no record none.h5; check the path, or run the scene first",
     ("plot", "s.toml"): "s.toml is not an HDF5 file, so no record of solidsph",
-    ("plot", "."): "is a folder, not a record; name the file in it",
+    ("plot", "folder.toml"): "there is no record (*.h5) in the folder folder.toml; check the path",
     ("run", "s.toml", "-q", "--output", "note.h5"): "it is not replaced: choose another place",
     ("run", "s.toml", "-q", "--output", "s.toml/x"): "choose a path in a folder that you may write",
     ("run", "s.toml", "--write", "s.toml/x"): "check the path, its permissions and the disk",

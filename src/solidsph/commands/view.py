@@ -37,7 +37,10 @@ class _Options(Output):
 @click.argument("result", metavar="RECORD|FOLDER", type=click.Path(path_type=Path))
 @options(_Options)
 def view(result: Path, options: _Options) -> None:
-    """Show a record in 3D, with sliders for time and deformation: the only one of a FOLDER."""
+    """Show a record in 3D, with sliders for time and deformation.
+
+    A FOLDER must hold one record only.
+    """
     from solidsph.results.view import view as show
 
     several = records_in(result)
