@@ -18,6 +18,7 @@ from solidsph.scene.scene_builder import SceneBuilder
 from solidsph.statics import equilibrium, tangent
 from solidsph.statics.alternation import alternating_signs
 from solidsph.statics.coarse_space import CoarseSpace, Fineness
+from solidsph.statics.increment import AT_REST
 from solidsph.statics.iterative import IterativeSolver
 from solidsph.statics.solvers import linear_system
 from tests.helpers.scenes import SOFT, box, touching
@@ -134,7 +135,7 @@ def products(d: int, across: int, *, grids: bool = True) -> int:
     before = system.solver.products
     u = np.zeros_like(simulation.particles.positions)
     forces = np.random.default_rng(0).standard_normal(system.freedoms.count)
-    system.solver.linearised(u, None, 0.0).solve(forces, 1e-3)
+    system.solver.linearised(u, None, AT_REST).solve(forces, 1e-3)
     return system.solver.products - before
 
 
