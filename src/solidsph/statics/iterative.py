@@ -101,11 +101,11 @@ class IterativeSolver(LinearSolver):
         )
 
     def linearised(
-        self, displacements: Array, lead: Lead | None, increment: Increment
+        self, displacements: Array, lead: Lead | None, increment: Increment, support: float = 0.0
     ) -> Linearised:
         moduli = self.tangent.during(increment).moduli(displacements, lead)
         of_loads = self.tangent.of_loads(displacements, increment.time)
-        return self._linearised(moduli, _symmetric(of_loads))
+        return self._linearised(moduli, _symmetric(of_loads), support)
 
     def lowest_modes(
         self, displacements: Array, masses: Array, shift: float, count: int
@@ -123,16 +123,24 @@ class IterativeSolver(LinearSolver):
         squares, modes = lowest_modes(shifted.product, shifted.roughly, masses, count)
         return squares - shift, modes
 
-    def _linearised(self, moduli: Array, of_loads: csr_array | None) -> _Iterated:
+    def _linearised(
+        self, moduli: Array, of_loads: csr_array | None, support: float = 0.0
+    ) -> _Iterated:
         blocks = self.tangent.own_stiffness(moduli)
         if of_loads is not None:
             blocks += _blocks(of_loads, blocks.shape[1])
+        added = support * np.abs(np.einsum("pii->pi", blocks))
+        if support:
+            blocks += added[:, :, None] * np.eye(blocks.shape[1])
+            supporting = csr_array(diags_array(added.ravel(), format="csr"))
+            of_loads = supporting if of_loads is None else csr_array(of_loads + supporting)
         smooth, rises = self._smooth_correction(moduli, of_loads)
         alternating = self._alternating_correction()
         return _Iterated(
             solver=self,
             whole_product=self.product(moduli, of_loads),
             own_diagonal=np.einsum("pii->pi", blocks)[self.freedoms.free],
+            added=added[self.freedoms.free],
             alone=_inverted(blocks, self.freedoms.free),
             corrections=[own for own in (smooth, alternating) if own is not None],
             rises=rises,
@@ -240,9 +248,14 @@ class _Iterated(Linearised):
     solver: IterativeSolver
     whole_product: Callable[[Array], Array]  # with motions (n, d) of all particles
     own_diagonal: Array  # (k,)
+    added: Array  # (k,)
     alone: Array  # (n, d, d) inverse stiffness of every particle alone [m/N]
     corrections: Sequence[_Correction]
     rises: bool  # False if their own stiffness is not positive
+
+    @property
+    def support(self) -> Array:
+        return self.added
 
     @property
     def diagonal(self) -> Array:

@@ -9,10 +9,11 @@ import numpy as np
 
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.memory import Memory
-from solidsph.interfaces.terms import GhostConstraint
+from solidsph.interfaces.terms import EnergyTerm, GhostConstraint
 from solidsph.maths.arrays import Array, Mask
 from solidsph.run.built_scene import BuiltScene
 from solidsph.statics.increment import Increment
+from solidsph.statics.stiff import is_stiff
 
 
 @attrs.frozen(eq=False)
@@ -62,6 +63,20 @@ class LoadPath:
             },
             held=held & ~particles.ghosts[:, None],
         )
+
+    @property
+    def may_meet(self) -> bool:
+        """Whether a body may come to something that holds it, such as another body or a wall."""
+        return any(
+            isinstance(load, EnergyTerm) and is_stiff(load) and not load.acts_always
+            for load in self.simulation.dynamics.loads
+        )
+
+    @property
+    def spacing(self) -> float:
+        """Of the finest particles [m]."""
+        particles = self.simulation.particles
+        return float(particles.spacings[~particles.ghosts].min())
 
     def time(self, factor: float) -> float:
         """Time of a load factor [s]."""
