@@ -115,9 +115,7 @@ class IterativeSolver(LinearSolver):
         shifts[free] = shift * masses
         added = csr_array(diags_array(shifts, format="csr"))
         of_loads = _symmetric(self.tangent.of_loads(displacements, 0.0))
-        if of_loads is not None:
-            added = csr_array(added + of_loads)
-        shifted = self._linearised(self.tangent.moduli(displacements), added)
+        shifted = self._linearised(self.tangent.moduli(displacements), _sum(of_loads, added))
         if not shifted.positive():
             raise SingularError(None)
         squares, modes = lowest_modes(shifted.product, shifted.roughly, masses, count)
@@ -130,11 +128,12 @@ class IterativeSolver(LinearSolver):
         if of_loads is not None:
             blocks += _blocks(of_loads, blocks.shape[1])
         added = support * np.abs(np.einsum("pii->pi", blocks))
+        supporting = None
         if support:
             blocks += added[:, :, None] * np.eye(blocks.shape[1])
             supporting = csr_array(diags_array(added.ravel(), format="csr"))
-            of_loads = supporting if of_loads is None else csr_array(of_loads + supporting)
-        smooth, rises = self._smooth_correction(moduli, of_loads)
+            of_loads = _sum(of_loads, supporting)
+        smooth, rises = self._smooth_correction(moduli, of_loads, supporting)
         alternating = self._alternating_correction()
         return _Iterated(
             solver=self,
@@ -159,7 +158,7 @@ class IterativeSolver(LinearSolver):
         return product
 
     def _smooth_correction(
-        self, moduli: Array, of_loads: csr_array | None
+        self, moduli: Array, of_loads: csr_array | None, supporting: csr_array | None
     ) -> tuple[_Correction | None, bool]:
         """The correction by smooth functions, of a positive stiffness, and whether it is that here.
 
@@ -175,6 +174,10 @@ class IterativeSolver(LinearSolver):
                 return _Correction(space, [factors], [1.0]), True
         except SingularError:
             pass
+        if supporting is not None:  # nothing may hold the body at rest
+            at_rest, own = self._at_rest()
+            factors = self._factorised(space, 0, at_rest, _sum(own, supporting))
+            return _Correction(space, [factors], [1.0]), False
         if self.smooth_at_rest is None:
             factors = self._factorised(space, 0, *self._at_rest())
             self.smooth_at_rest = _Correction(space, [factors], [1.0])
@@ -351,6 +354,10 @@ def _inverted(blocks: Array, free: Mask) -> Array:
         values = np.maximum(values, _LEAST * np.median(values[:, -1]))
         return np.asarray((vectors / values[:, None, :]) @ vectors.transpose(0, 2, 1))
     return np.linalg.inv(kept)
+
+
+def _sum(one: csr_array | None, other: csr_array) -> csr_array:
+    return other if one is None else csr_array(one + other)
 
 
 def _symmetric(matrix: csr_array | None) -> csr_array | None:
