@@ -20,7 +20,7 @@ from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.interfaces.terms import EnergyTerm, FieldTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.registry.parameters import check_positive, number
-from solidsph_builtin.effects._contact_stiffness import normal_stiffness, spread
+from solidsph_builtin.effects._contact_stiffness import friction_stiffness, normal_stiffness, spread
 from solidsph_builtin.effects._crowding import REACH, crowding_kernel, sensitivity, sites, steepest
 from solidsph_builtin.effects._meeting import Meeting, Touch
 from solidsph_builtin.effects._search import Between, Search, Within, together
@@ -152,6 +152,8 @@ class Contact(Effect):
 @final
 @attrs.frozen(eq=False)
 class _Contact(EnergyTerm, FieldTerm, Load):
+    rate_independent: ClassVar[bool] = True
+
     label: str
     particles: Indices  # (k,)
     reference: Array  # X of all particles, (n, d) [m]
@@ -213,13 +215,25 @@ class _Contact(EnergyTerm, FieldTerm, Load):
 
     def stiffness(self, displacements: Array, time: float) -> csr_array | None:
         """Minus the derivative of the normal forces, (d n, d n) [N/m]; None while all are apart."""
-        positions = self.reference + displacements
+        return self.stiffness_of_step(time, 0.0, displacements, np.zeros_like(displacements), {})
+
+    def stiffness_of_step(
+        self, time: float, step: float, displacements: Array, velocities: Array, memory: Memory
+    ) -> csr_array | None:
+        """That of the normal forces and of friction, (d n, d n) [N/m]; None while all are apart."""
+        x = self.reference + displacements
         total: csr_array | None = None
         for meeting in self.meetings:
-            touch = meeting.touch(positions)
+            touch = meeting.touch(x)
             if touch is None or not touch.excess.any():
                 continue
-            of_all = spread(normal_stiffness(meeting, touch), meeting.particles, len(positions))
+            own = normal_stiffness(meeting, touch)
+            if self._has_friction(meeting):
+                slip, places = self._slip(meeting, memory), meeting.places
+                of_meeting = meeting, touch, x[places], velocities[places], slip, step
+                held = friction_stiffness(*of_meeting, self.friction)
+                own = own if held is None else csr_array(own + held)
+            of_all = spread(own, meeting.particles, len(x))
             total = of_all if total is None else csr_array(total + of_all)
         return total
 

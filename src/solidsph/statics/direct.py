@@ -34,7 +34,7 @@ class DirectSolver(LinearSolver):
     def linearised(
         self, displacements: Array, lead: Lead | None, increment: Increment, support: float = 0.0
     ) -> Linearised:
-        matrix = self.tangent.during(increment).matrix(displacements, lead, increment.time)
+        matrix = self.tangent.during(increment).matrix(displacements, lead)
         reduced = self.freedoms.reduced(matrix)
         added = support * np.abs(reduced.diagonal())
         if support:

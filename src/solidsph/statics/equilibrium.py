@@ -106,7 +106,7 @@ def equilibrium(
     while factor < 1.0:
         # Rounding must not leave a tiny last step.
         target = 1.0 if factor + step > 1.0 - 1e-9 else factor + step
-        increment = newton.path.increment(factor, target, state.memory)
+        increment = newton.path.increment(factor, target, state.memory, displacements)
         try:
             displacements, residuals = newton.solve(displacements, increment)
         except LoadStepError as failure:

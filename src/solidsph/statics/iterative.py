@@ -103,9 +103,9 @@ class IterativeSolver(LinearSolver):
     def linearised(
         self, displacements: Array, lead: Lead | None, increment: Increment, support: float = 0.0
     ) -> Linearised:
-        moduli = self.tangent.during(increment).moduli(displacements, lead)
-        of_loads = self.tangent.of_loads(displacements, increment.time)
-        return self._linearised(moduli, _symmetric(of_loads), support)
+        tangent = self.tangent.during(increment)
+        of_loads = _symmetric(tangent.of_loads(displacements))
+        return self._linearised(tangent.moduli(displacements, lead), of_loads, support)
 
     def lowest_modes(
         self, displacements: Array, masses: Array, shift: float, count: int
@@ -114,7 +114,7 @@ class IterativeSolver(LinearSolver):
         shifts = np.zeros(free.size)
         shifts[free] = shift * masses
         added = csr_array(diags_array(shifts, format="csr"))
-        of_loads = _symmetric(self.tangent.of_loads(displacements, 0.0))
+        of_loads = _symmetric(self.tangent.of_loads(displacements))
         shifted = self._linearised(self.tangent.moduli(displacements), _sum(of_loads, added))
         if not shifted.positive():
             raise SingularError(None)
@@ -217,7 +217,7 @@ class IterativeSolver(LinearSolver):
     def _at_rest(self) -> tuple[Array, csr_array | None]:
         """Moduli, and the symmetric stiffness of loads."""
         rest = np.zeros(self.freedoms.free.shape)
-        return self.tangent.moduli(rest), _symmetric(self.tangent.of_loads(rest, 0.0))
+        return self.tangent.moduli(rest), _symmetric(self.tangent.of_loads(rest))
 
     def _factorised(
         self, space: CoarseSpace, pattern: int, moduli: Array, of_loads: csr_array | None
