@@ -7,7 +7,7 @@ from typing import Any
 
 import attrs
 import numpy as np
-from scipy.sparse import block_diag, bsr_array, csr_array, diags_array
+from scipy.sparse import block_diag, csr_array, diags_array
 
 from solidsph.engines.matrix import MatrixForces, Operators
 from solidsph.errors import SolidsphError
@@ -52,16 +52,10 @@ class _BodyTangent:
 
     def matrix(self, constant: Operators, A: Array) -> csr_array:
         """(d n, d n) [N/m] with moduli (n, d, d, d, d)."""
-        n, d = A.shape[:2]
-        blocks = [constant.gradient[k * n : (k + 1) * n] for k in range(d)]
-        g = np.stack([block.data for block in blocks], axis=1)
-        # Change of stress T_ik at p per displacement of q along j, in blocks (p, q).
-        starts, columns = blocks[0].indptr, blocks[0].indices
-        changes = np.einsum("mikjl,ml->mikj", np.repeat(A, np.diff(starts), axis=0), g)
-        of_displacement = bsr_array(
-            (changes.reshape(-1, d * d, d), columns, starts), shape=(d * d * n, d * n)
-        )
-        return csr_array(-(self._force(constant, n, d) @ self._extended(of_displacement)))
+        ghosts = self.body.particles.ghosts
+        nothing_on_them = self.body.formulation.divergence.uses_ghost_stress
+        forces = constant.of_stresses(ghosts if nothing_on_them else None)
+        return csr_array(-(forces @ self._extended(constant.stress_changes(A))))
 
     def stress(self, stresses: Array) -> Array:
         """Stresses (n, d, d) at real particles, extended to ghosts."""
@@ -106,15 +100,6 @@ class _BodyTangent:
     def _extended(self, stresses: Any) -> Any:
         """Stresses of real particles, or their derivative, extended to ghosts."""
         return stresses if self.stresses is None else self.stresses @ stresses
-
-    def _force(self, constant: Operators, n: int, d: int) -> bsr_array:
-        """Matrix (d n, d d n) from stress components (j, k) at q to forces along i at p."""
-        blocks = [constant.force[:, k * n : (k + 1) * n] for k in range(d)]
-        f = np.stack([block.data for block in blocks], axis=1)
-        if self.body.formulation.divergence.uses_ghost_stress:  # nothing acts on ghosts then
-            f[np.repeat(self.body.particles.ghosts, np.diff(blocks[0].indptr))] = 0.0
-        weights = np.einsum("ij,mk->mijk", np.eye(d), f).reshape(-1, d, d * d)
-        return bsr_array((weights, blocks[0].indices, blocks[0].indptr), shape=(d * n, d * d * n))
 
 
 @attrs.frozen(eq=False)
