@@ -112,8 +112,7 @@ def equilibrium(
         except LoadStepError as failure:
             step *= 0.5
             LOG.info("load factor %.4g failed, and is halved: %s", target, failure.cause)
-            hopeless = newton.hopeless_at_rest or step < _SHORTEST_LOAD_STEP / load_steps
-            if hopeless:
+            if newton.hopeless or step < _SHORTEST_LOAD_STEP / load_steps:
                 raise newton.error(failure, factor, increment) from None
             continue
         steps.append(LoadStep(target, residuals))

@@ -44,6 +44,10 @@ _NOTHING_HOLDS = (
     "either the body is not fully clamped, or its gradients have a zero-energy mode; clamp it in "
     "every direction, or add hourglass control"
 )
+_MEETS_NOTHING = (
+    "push the body towards what is to hold it, and place it within two spacings of that; or clamp "
+    "it in every direction"
+)
 _TOO_SOFT = (
     "the body may be nearly free to move in some way: clamp it in every direction; or a material "
     "may be nearly incompressible: use solver = 'direct' if the body is small, or a damped motion"
@@ -107,7 +111,7 @@ class Newton:
     max_iterations: int
     iterations: int = 0
     last: Linearised | None = None
-    hopeless_at_rest: bool = False
+    hopeless: bool = False
     rounding: float = 0.0  # imbalance by rounding of displacements [N]
     coarsest: float = 0.0  # imbalance by rounding of positions [N]
 
@@ -133,7 +137,7 @@ class Newton:
         free displacements, so that a large imposed motion does not crush the particles beside it.
         """
         at = self._arrived(start, None, increment)
-        residuals = [self._relative(at.forces)]
+        residuals, adrift = [self._relative(at.forces)], True
         if not (at.missing.any() or self._imbalance(at.forces).any()):
             return at.u, tuple(residuals)
         for _ in range(self.max_iterations):
@@ -143,12 +147,16 @@ class Newton:
                 if self._cannot_improve(at):
                     return at.u, tuple(residuals)
                 raise
+            adrift = adrift and self.last is not None and bool(self.last.support.any())
             residuals.append(self._relative(at.forces))
             LOG.debug("load factor %.4g: imbalance %.3g", increment.factor, residuals[-1])
             if not at.missing.any() and self._converged(at.forces):
                 return at.u, tuple(residuals)
         if self._cannot_improve(at):
             return at.u, tuple(residuals)
+        if adrift:
+            self.hopeless = True
+            raise LoadStepError("a body meets nothing that holds it", _MEETS_NOTHING, at.u)
         raise LoadStepError(
             f"{self.max_iterations} iterations leave an imbalance of {residuals[-1]:.3g} of the "
             "applied forces",
@@ -174,11 +182,11 @@ class Newton:
             return self._advanced(at, increment, self._correction(at, increment))
         except SingularError as error:
             if not self.path.may_meet:
-                self.hopeless_at_rest = not at.u.any()
+                self.hopeless = not at.u.any()
                 raise LoadStepError(self._free_motion(error), _NOTHING_HOLDS, at.u) from None
         except UnsolvedError as error:
             if not self.path.may_meet:
-                self.hopeless_at_rest = not at.u.any()
+                self.hopeless = not at.u.any()
                 raise LoadStepError(str(error), _TOO_SOFT, at.u) from None
         except LoadStepError:
             if not self.path.may_meet or self._cannot_improve(at):
