@@ -53,7 +53,7 @@ MADE = {
     ),
     "UnsolvedError": lambda kind: kind(0.1, 5000),
     "SingularError": lambda kind: kind(3),
-    "_LoadStepError": lambda kind: kind("cause", "remedy", np.arange(3.0)),
+    "LoadStepError": lambda kind: kind("cause", "remedy", np.arange(3.0)),
     "UnsoundError": lambda kind: kind(
         time=0.1, part=0.3, tolerance=0.01, cause="the step", remedy="a smaller one"
     ),

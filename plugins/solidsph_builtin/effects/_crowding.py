@@ -24,6 +24,9 @@ _NODES, _WEIGHTS = leggauss(64)
 # then right to 1e-6.
 _TABULATED = 1000
 
+# Particles this close to the depth of a row belong to it, in spacings.
+_ROW = 0.3
+
 
 @final
 @attrs.frozen
@@ -124,7 +127,8 @@ def _rows(body: Body, reach: float) -> list[tuple[float, float]]:
     """Depth and thickness of the rows of particles below a plane face, down to `reach` [m].
 
     The first is at the median depth of the particles that own the surface: half a spacing for
-    centres of cells, and 0 on the surface, where a row is half as thick as the others.
+    centres of cells, and 0 on the surface. A row is as thick as its particles' volumes say, which
+    for particles on the surface are a half of the others, or what a fit of volumes gives them.
     """
     own = body.particles
     spacing = float(np.median(own.spacings[~own.ghosts]))
@@ -134,7 +138,15 @@ def _rows(body: Body, reach: float) -> list[tuple[float, float]]:
         first = float(np.median(-body.shape.signed_distance(own.positions[owners])))
         first = min(max(first, 0.0), spacing)
     depths = np.arange(first, reach, spacing)
-    return [(float(z), spacing if k else first + 0.5 * spacing) for k, z in enumerate(depths)]
+    real = ~own.ghosts
+    below = -body.shape.signed_distance(own.positions[real])
+    thick = own.volumes[real] / spacing ** (own.dimension - 1)
+    rows = []
+    for k, z in enumerate(depths):
+        there = thick[np.abs(below - z) < _ROW * spacing]
+        usual = spacing if k else first + 0.5 * spacing
+        rows.append((float(z), float(np.median(there)) if there.size else usual))
+    return rows
 
 
 def _layer(kernel: SmoothingKernel, heights: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import attrs
 import numpy as np
+from scipy.sparse import csr_array
 
 from solidsph.engines.matrix import Operators, operators
 from solidsph.errors import SceneError
@@ -38,6 +39,12 @@ class BodyGradient:
     def forces(self, stress: Array) -> Array:
         """Forces (n, d) [N] of a first Piola-Kirchhoff stress (d, d, n) [Pa]; ghosts have none."""
         return self.matrices.forces(np.where(self.body.particles.ghosts, 0.0, stress))
+
+    def stiffness(self, moduli: Array) -> csr_array:
+        """Minus the derivative (d n, d n) [N/m] of these forces, with moduli (n, d, d, d, d) [Pa]
+        of the stress: dP_ik / dF_jl."""
+        real = np.where(self.body.particles.ghosts[:, None, None, None, None], 0.0, moduli)
+        return csr_array(-(self.matrices.of_stresses() @ self.matrices.stress_changes(real)))
 
 
 def in_the_reference(model: DiscreteModel, effect: str) -> None:

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.maths.arrays import Array, Indices, Mask
-from solidsph_builtin.effects._contact_passes import Passes, passes
+from solidsph_builtin.effects._contact_passes import Passes, Surroundings, passes
 from solidsph_builtin.effects._crowding import REACH
 from solidsph_builtin.effects._search import NeighbourList, Search, together
 from solidsph_builtin.effects._slip import slid
@@ -30,6 +30,19 @@ class Touch:
     values: Array  # (k,) W [m^-d]
     slopes: Array  # (k,) dW/dr / r [m^-(d+2)]
     excess: Array  # (m,) o, volume fraction of the other body beyond the room [-]
+
+
+@attrs.frozen(eq=False)
+class Rubbing:
+    """Particles that friction holds to the other body."""
+
+    around: Surroundings
+    places: Indices  # (k,) in `around`
+    own: Indices  # (k,) their numbers
+    relative: Array  # (k, d) their velocity relative to the other body [m/s]
+    normals: Array  # (k, d)
+    limits: Array  # (k,) largest friction [N]
+    rise: Array  # (k,) its derivative by the excess [N]
 
 
 @attrs.frozen(eq=False)
@@ -124,21 +137,34 @@ class Meeting:
         forces, slipped = np.zeros_like(x), np.zeros_like(x)
         if not touch.excess.any():
             return forces, slipped
-        i, j, values, V = touch.i, touch.j, touch.values, self.volumes
-        floor = _SLENDER * self.kernel.support_radius**2
-        of_pairs = i, j, touch.offsets, values, touch.slopes
+        rub = self.rubbing(touch, x, v, friction)
+        own = rub.own
+        slipped[own] = slid(
+            slip[own], rub.relative, rub.normals, step, self.spring[own], rub.limits
+        )
+        pull = np.zeros_like(rub.around.slope)
+        pull[rub.places] = forces[own] = -self.spring[own][:, None] * slipped[own]
+        of_pairs = touch.i, touch.j, touch.values
+        self._passes.react(rub.around, *of_pairs, self.volumes, x, forces, pull)
+        return forces, slipped
+
+    def rubbing(self, touch: Touch, x: Array, v: Array, friction: float) -> Rubbing:
+        """The particles with a spring at positions x (m, d) [m] and velocities v (m, d) [m/s]."""
+        V, floor = self.volumes, _SLENDER * self.kernel.support_radius**2
+        of_pairs = touch.i, touch.j, touch.offsets, touch.values, touch.slopes
         around = self._passes.surroundings(*of_pairs, V, touch.excess, x, v, floor)
         steep = np.linalg.norm(around.slope, axis=1)
         k = np.flatnonzero((steep > 0.0) & around.sound)
         own = around.own[k]
-        limits = friction * self.modulus * V[own] * touch.excess[own] * steep[k]
-        normals = around.slope[k] / steep[k][:, None]
-        relative = v[own] - around.velocity[k]
-        slipped[own] = slid(slip[own], relative, normals, step, self.spring[own], limits)
-        pull = np.zeros_like(around.slope)
-        pull[k] = forces[own] = -self.spring[own][:, None] * slipped[own]
-        self._passes.react(around, i, j, values, V, x, forces, pull)
-        return forces, slipped
+        return Rubbing(
+            around=around,
+            places=k,
+            own=own,
+            relative=v[own] - around.velocity[k],
+            normals=around.slope[k] / steep[k][:, None],
+            limits=friction * self.modulus * V[own] * touch.excess[own] * steep[k],
+            rise=friction * self.modulus * V[own] * steep[k],
+        )
 
     def least_gap(self, positions: Array) -> float:
         """Distance of the surfaces of two bodies [m], by their nearest outermost particles."""

@@ -9,6 +9,7 @@ from typing import ClassVar, final
 
 import attrs
 import numpy as np
+from scipy.sparse import csr_array
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
@@ -19,6 +20,7 @@ from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.interfaces.terms import EnergyTerm, FieldTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.registry.parameters import check_positive, number
+from solidsph_builtin.effects._contact_stiffness import friction_stiffness, normal_stiffness, spread
 from solidsph_builtin.effects._crowding import REACH, crowding_kernel, sensitivity, sites, steepest
 from solidsph_builtin.effects._meeting import Meeting, Touch
 from solidsph_builtin.effects._search import Between, Search, Within, together
@@ -110,6 +112,7 @@ class Contact(Effect):
         return _Contact(
             label=label,
             particles=np.unique(np.concatenate([meeting.particles for meeting in meetings])),
+            reference=model.particles.positions,
             meetings=meetings,
             friction=self.friction,
             dimension=model.particles.dimension,
@@ -149,8 +152,11 @@ class Contact(Effect):
 @final
 @attrs.frozen(eq=False)
 class _Contact(EnergyTerm, FieldTerm, Load):
+    rate_independent: ClassVar[bool] = True
+
     label: str
     particles: Indices  # (k,)
+    reference: Array  # X of all particles, (n, d) [m]
     meetings: Sequence[Meeting]
     friction: float
     dimension: int
@@ -206,6 +212,30 @@ class _Contact(EnergyTerm, FieldTerm, Load):
         none = (len(self.particles), positions.shape[1])
         found = np.zeros(none) if forces is None else forces[self.places]
         return found, {self._asleep: count, **slips}
+
+    def stiffness(self, displacements: Array, time: float) -> csr_array | None:
+        """Minus the derivative of the normal forces, (d n, d n) [N/m]; None while all are apart."""
+        return self.stiffness_of_step(time, 0.0, displacements, np.zeros_like(displacements), {})
+
+    def stiffness_of_step(
+        self, time: float, step: float, displacements: Array, velocities: Array, memory: Memory
+    ) -> csr_array | None:
+        """That of the normal forces and of friction, (d n, d n) [N/m]; None while all are apart."""
+        x = self.reference + displacements
+        total: csr_array | None = None
+        for meeting in self.meetings:
+            touch = meeting.touch(x)
+            if touch is None or not touch.excess.any():
+                continue
+            own = normal_stiffness(meeting, touch)
+            if self._has_friction(meeting):
+                slip, places = self._slip(meeting, memory), meeting.places
+                of_meeting = meeting, touch, x[places], velocities[places], slip, step
+                held = friction_stiffness(*of_meeting, self.friction)
+                own = own if held is None else csr_array(own + held)
+            of_all = spread(own, meeting.particles, len(x))
+            total = of_all if total is None else csr_array(total + of_all)
+        return total
 
     def _contact_force(
         self,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, final
 
 import attrs
 import numpy as np
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import block_diag, csr_array, diags_array
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
@@ -261,6 +261,27 @@ class _Conduction(FieldTerm, Load):
             forces[body.extent] = gradient.forces(_swelling(body.material, H, g))
         return forces
 
+    def stiffness(self, displacements: Array, time: float) -> csr_array | None:
+        """Minus the derivative of the forces of swelling at the start, (d n, d n) [N/m]."""
+        return self.stiffness_of_step(time, 0.0, displacements, np.zeros_like(displacements), {})
+
+    def stiffness_of_step(
+        self, time: float, step: float, displacements: Array, velocities: Array, memory: Memory
+    ) -> csr_array | None:
+        """Minus the derivative of the forces of swelling, (d n, d n) [N/m]."""
+        if not self.gradients:
+            return None
+        T = self.temperature(memory)
+        if step > 0.0:
+            T = self._conducted(T, time, step)
+        parts = []
+        for gradient in self.gradients:
+            body = gradient.body
+            g = 1.0 + self.expansion * T[body.extent]
+            H = gradient.gradient(displacements[body.extent])
+            parts.append(gradient.stiffness(_swelling_moduli(body.material, H, g)))
+        return csr_array(block_diag(parts, format="csr"))
+
     def fields(self, observation: Observation) -> Mapping[str, Array]:
         return {f"{self.label} temperature [K]": self.temperature(observation.state.memory)}
 
@@ -274,11 +295,32 @@ class _Conduction(FieldTerm, Load):
 
 def _swelling(material: Material, H: Array, g: Array) -> Array:
     """Change of the stress by a free stretch g (n,), g^2 P(F / g) - P(F), (d, d, n) [Pa]."""
-    d, n = len(H), H.shape[2]
-    F = np.repeat(np.eye(3)[:, :, None], n, axis=2)
-    F[:d, :d] += H
+    d, F = len(H), _in_space(H)
     swollen, own = (_stress(material, deformation) for deformation in (F / g, F))
     return (g**2 * swollen - own)[:d, :d]
+
+
+def _swelling_moduli(material: Material, H: Array, g: Array) -> Array:
+    """Derivative of that change by F, g A(F / g) - A(F), (n, d, d, d, d) [Pa]."""
+    d, n, F = len(H), H.shape[2], _in_space(H)
+    moduli = np.empty((n, d, d, d, d))
+    for j in range(d):
+        for k in range(d):
+            dF = np.zeros_like(F)
+            dF[j, k] = 1.0
+            swollen, own = (
+                particles_first(material.tangent(at, dF, material.params), n) for at in (F / g, F)
+            )
+            moduli[..., j, k] = (g[:, None, None] * swollen - own)[:, :d, :d]
+    return moduli
+
+
+def _in_space(H: Array) -> Array:
+    """F = I + H in space, (3, 3, n), from H (d, d, n)."""
+    d = len(H)
+    F = np.repeat(np.eye(3)[:, :, None], H.shape[2], axis=2)
+    F[:d, :d] += H
+    return F
 
 
 def _stress(material: Material, F: Array) -> Array:

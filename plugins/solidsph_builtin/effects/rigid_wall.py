@@ -20,7 +20,7 @@ from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import AXES, Where
 from solidsph.registry.parameters import check_positive, formula, number, optional_number
 from solidsph_builtin.boundaries._reports import resultant
-from solidsph_builtin.effects._slip import slid
+from solidsph_builtin.effects._slip import slid, slip_stiffness
 
 # Stiffness of the spring of friction over that against penetration (Mindlin 1949, as for contact).
 _TANGENTIAL = 0.8
@@ -107,7 +107,7 @@ class RigidWall(Effect):
                 for body in model.bodies
             ),
         )
-        wall.motion(0.0, 0)  # a formula outside its domain raises now, not during the run
+        wall.motion(0.0)  # a formula outside its domain raises now, not during the run
         return wall
 
 
@@ -121,6 +121,8 @@ def _depths(model: DiscreteModel) -> Array:
 @final
 @attrs.frozen(eq=False)
 class _Wall(EnergyTerm, FieldTerm, Load):
+    rate_independent: ClassVar[bool] = True
+
     label: str
     particles: Indices  # (k,)
     reference: Array  # X of all particles, (n, d) [m]
@@ -143,19 +145,19 @@ class _Wall(EnergyTerm, FieldTerm, Load):
             **slip,
         }
 
-    def motion(self, time: float, order: int, step: float = 0.0) -> Array:
-        """Displacement of the plane, (d,) [m], or its derivative of the given order."""
+    def motion(self, time: float) -> Array:
+        """Displacement of the plane, (d,) [m]."""
         moved = np.zeros(len(self.point))
         if self.field is not None:
             for axis in self.field.components:
-                moved[axis] = self.field.derivative(axis, self.point[None, :], time, order, step)[0]
+                moved[axis] = self.field.values(axis, self.point[None, :], time)[0]
         return moved
 
     def gaps(self, time: float, positions: Array) -> Array:
         """Distance of each particle's surface from the plane, (k,) [m]."""
         # Of all particles, as choosing numbers is cheaper than choosing vectors.
         along = np.einsum("ni,i->n", positions, self.normal)
-        plane = (self.point + self.motion(time, 0)) @ self.normal
+        plane = (self.point + self.motion(time)) @ self.normal
         return np.asarray(along[self.particles] - (plane + self.clearances))
 
     def pressed(self, time: float, positions: Array) -> Array:
@@ -177,8 +179,8 @@ class _Wall(EnergyTerm, FieldTerm, Load):
         pressed = self.pressed(time, positions)
         slip = slid(
             self._slip(memory),
-            velocities[self.particles] - self.motion(time, 1, step),
-            self.normal,
+            self._sliding(time, step, velocities),
+            np.broadcast_to(self.normal, (len(pressed), len(self.normal))),
             step,
             _TANGENTIAL * self.springs,
             self.friction * pressed,
@@ -188,14 +190,44 @@ class _Wall(EnergyTerm, FieldTerm, Load):
 
     def stiffness(self, displacements: Array, time: float) -> csr_array:
         """Minus the derivative of the normal forces, (d n, d n) [N/m]."""
-        n, d = displacements.shape
         touching = self.gaps(time, self.reference + displacements) < 0.0
-        springs = np.zeros(n)
-        springs[self.particles] = np.where(touching, self.springs, 0.0)
+        springs = np.where(touching, self.springs, 0.0)
         blocks = springs[:, None, None] * np.outer(self.normal, self.normal)
-        rows = np.arange(n)
-        matrix = bsr_array((blocks, rows, np.append(rows, n)), shape=(n * d, n * d))
-        return csr_array(matrix)
+        return self._on_particles(blocks, len(displacements))
+
+    def stiffness_of_step(
+        self, time: float, step: float, displacements: Array, velocities: Array, memory: Memory
+    ) -> csr_array:
+        """That of the normal forces and of friction, (d n, d n) [N/m]."""
+        normal = self.stiffness(displacements, time)
+        if not self.friction or step == 0.0:
+            return normal
+        pressed = self.pressed(time, self.reference + displacements)
+        normals = np.broadcast_to(self.normal, (len(pressed), len(self.normal)))
+        slip = slip_stiffness(
+            self._slip(memory),
+            step * self._sliding(time, step, velocities),
+            normals,
+            _TANGENTIAL * self.springs,
+            self.friction * pressed,
+        )
+        pressing = np.where(pressed > 0.0, self.friction * self.springs, 0.0)
+        by_gap = slip.by_limit[:, :, None] * (pressing[:, None] * -normals)[:, None, :]
+        return csr_array(normal + self._on_particles(slip.by_motion + by_gap, len(displacements)))
+
+    def _sliding(self, time: float, step: float, velocities: Array) -> Array:
+        """Velocity of the particles relative to the wall, (k, d) [m/s]."""
+        if step == 0.0:
+            return velocities[self.particles]
+        moved = self.motion(time) - self.motion(time - step)
+        return np.asarray(velocities[self.particles] - moved / step)
+
+    def _on_particles(self, blocks: Array, n: int) -> csr_array:
+        """Matrix (d n, d n) of a block (k, d, d) for each particle on its diagonal."""
+        d = blocks.shape[-1]
+        of_all, rows = np.zeros((n, d, d)), np.arange(n)
+        of_all[self.particles] = blocks
+        return csr_array(bsr_array((of_all, rows, np.append(rows, n)), shape=(n * d, n * d)))
 
     def energies(self, observation: Observation) -> Array:
         """Energy of the springs, (n,) [J]."""

@@ -10,7 +10,7 @@ from typing import final
 
 import attrs
 import numpy as np
-from scipy.sparse import csr_array, diags_array, hstack, vstack
+from scipy.sparse import bsr_array, csr_array, diags_array, hstack, vstack
 
 from solidsph.engines.array_law import flux, stress_fields
 from solidsph.interfaces.body import Body, part_of
@@ -18,7 +18,7 @@ from solidsph.interfaces.engine import Engine, InternalForces, StressFields
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.plan import BodySize, Operations, Plan, SumMethod, array_bytes, vectors
 from solidsph.interfaces.terms import StressTerm
-from solidsph.maths.arrays import Array, Indices
+from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.neighbours import Pairs, neighbour_pairs
 
 
@@ -50,6 +50,34 @@ class Operators:
                 both = force.multiply(self.gradient[other * n : (other + 1) * n].T)
                 blocks -= (both @ moduli[:, :, k, :, other].reshape(n, -1)).reshape(n, d, d)
         return blocks
+
+    def stress_changes(self, moduli: Array) -> bsr_array:
+        """Matrix (d d n, d n) [Pa/m] of the change of stress by displacements.
+
+        Row (p d + i) d + k is component ik at p, column q d + j is component j of q, with moduli
+        dP_ik / dF_jl (n, d, d, d, d) [Pa].
+        """
+        n, d = moduli.shape[:2]
+        blocks = [self.gradient[k * n : (k + 1) * n] for k in range(d)]
+        g = np.stack([block.data for block in blocks], axis=1)
+        starts, columns = blocks[0].indptr, blocks[0].indices
+        changes = np.einsum("mikjl,ml->mikj", np.repeat(moduli, np.diff(starts), axis=0), g)
+        values = changes.reshape(-1, d * d, d)
+        return bsr_array((values, columns, starts), shape=(d * d * n, d * n))
+
+    def of_stresses(self, left_out: Mask | None = None) -> bsr_array:
+        """Matrix (d n, d d n) [m^(d-1)] from stresses to forces, in the order of `stress_changes`.
+
+        There are no forces on the particles `left_out` (n,).
+        """
+        n = self.force.shape[0]
+        d = self.force.shape[1] // n
+        blocks = [self.force[:, k * n : (k + 1) * n] for k in range(d)]
+        f = np.stack([block.data for block in blocks], axis=1)
+        if left_out is not None:
+            f[np.repeat(left_out, np.diff(blocks[0].indptr))] = 0.0
+        weights = np.einsum("ij,mk->mijk", np.eye(d), f).reshape(-1, d, d * d)
+        return bsr_array((weights, blocks[0].indices, blocks[0].indptr), shape=(d * n, d * d * n))
 
     def part(self, chosen: Indices) -> Operators:
         """The matrices of the chosen particles; rows that reach beyond these are left out."""

@@ -157,6 +157,10 @@ class Load(Term):
     """True if its stiffness is there in every state, so that the spectrum of a scene shows it. For
     other loads, such as contact, the stable step adds what `stiffness_rate` declares."""
 
+    rate_independent: ClassVar[bool] = False
+    """True if velocities count for it only as motion within a step, as for friction. In an
+    equilibrium it gets those of a load step, where others are at rest."""
+
     @property
     def stiffness_rate(self) -> float:
         """Highest angular frequency that its stiffness adds [rad/s]; for the stable step."""

@@ -4,7 +4,7 @@ from solidsph.statics.critical_step import StableStep, critical_step, highest_fr
 from solidsph.statics.equilibrium import EquilibriumResult, LoadStep, equilibrium
 from solidsph.statics.modes import Modes, frequencies
 from solidsph.statics.run import run_statics
-from solidsph.statics.stiff import Stiff
+from solidsph.statics.stiff import Stiff, StiffInSteps
 from solidsph.statics.tangent import tangent
 
 __all__ = [
@@ -13,6 +13,7 @@ __all__ = [
     "Modes",
     "StableStep",
     "Stiff",
+    "StiffInSteps",
     "critical_step",
     "equilibrium",
     "frequencies",

@@ -32,12 +32,15 @@ class DirectSolver(LinearSolver):
     symmetric: bool
 
     def linearised(
-        self, displacements: Array, lead: Lead | None, increment: Increment
+        self, displacements: Array, lead: Lead | None, increment: Increment, support: float = 0.0
     ) -> Linearised:
-        matrix = self.tangent.during(increment).matrix(displacements, lead, increment.time)
+        matrix = self.tangent.during(increment).matrix(displacements, lead)
         reduced = self.freedoms.reduced(matrix)
+        added = support * np.abs(reduced.diagonal())
+        if support:
+            reduced = csr_array(reduced + diags_array(added, format="csr"))
         factors = factorise(reduced, symmetric=self.symmetric)
-        return _Factorised(matrix, self.freedoms, reduced.diagonal(), factors)
+        return _Factorised(matrix, self.freedoms, reduced.diagonal(), added, factors)
 
     def lowest_modes(
         self, displacements: Array, masses: Array, shift: float, count: int
@@ -68,7 +71,12 @@ class _Factorised(Linearised):
     matrix: csr_array  # (d n, d n)
     freedoms: Freedoms
     own_diagonal: Array
+    added: Array  # (k,)
     factors: Factors
+
+    @property
+    def support(self) -> Array:
+        return self.added
 
     @property
     def diagonal(self) -> Array:

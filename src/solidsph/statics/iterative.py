@@ -8,7 +8,7 @@ from typing import final
 import attrs
 import numpy as np
 from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import LinearOperator, minres
+from scipy.sparse.linalg import LinearOperator, gmres, minres
 
 from solidsph.maths.arrays import Array, Mask
 from solidsph.maths.conjugate_gradients import Solution, conjugate_gradients
@@ -34,8 +34,11 @@ _ALTERNATING = Fineness(3.0, {1: 10_000, 2: 10_000, 3: 1_500})
 # small, because it leaves out how the functions bend.
 _SHARE = 0.4
 
-# Iterations of one solution.
-_MOST = 5000
+# Iterations of one solution, and those after which one for a tangent without symmetry begins anew.
+_MOST, _KEPT = 5000, 100
+
+# A load's stiffness is made symmetric if what it loses is below this part of that of particles.
+_SKEW = 0.01
 
 # What the solution that looks for a soft or falling motion leaves of its smooth forces.
 _LOOK = 1e-3
@@ -101,11 +104,11 @@ class IterativeSolver(LinearSolver):
         )
 
     def linearised(
-        self, displacements: Array, lead: Lead | None, increment: Increment
+        self, displacements: Array, lead: Lead | None, increment: Increment, support: float = 0.0
     ) -> Linearised:
-        moduli = self.tangent.during(increment).moduli(displacements, lead)
-        of_loads = self.tangent.of_loads(displacements, increment.time)
-        return self._linearised(moduli, _symmetric(of_loads))
+        tangent = self.tangent.during(increment)
+        of_loads = tangent.of_loads(displacements)
+        return self._linearised(tangent.moduli(displacements, lead), of_loads, support)
 
     def lowest_modes(
         self, displacements: Array, masses: Array, shift: float, count: int
@@ -114,25 +117,35 @@ class IterativeSolver(LinearSolver):
         shifts = np.zeros(free.size)
         shifts[free] = shift * masses
         added = csr_array(diags_array(shifts, format="csr"))
-        of_loads = _symmetric(self.tangent.of_loads(displacements, 0.0))
-        if of_loads is not None:
-            added = csr_array(added + of_loads)
-        shifted = self._linearised(self.tangent.moduli(displacements), added)
+        of_loads = _symmetric(self.tangent.of_loads(displacements))
+        shifted = self._linearised(self.tangent.moduli(displacements), _sum(of_loads, added))
         if not shifted.positive():
             raise SingularError(None)
         squares, modes = lowest_modes(shifted.product, shifted.roughly, masses, count)
         return squares - shift, modes
 
-    def _linearised(self, moduli: Array, of_loads: csr_array | None) -> _Iterated:
+    def _linearised(
+        self, moduli: Array, of_loads: csr_array | None, support: float = 0.0
+    ) -> _Iterated:
         blocks = self.tangent.own_stiffness(moduli)
+        whole, of_loads = of_loads, _symmetric(of_loads)
+        turns = whole is not None and _turns(whole, np.einsum("pii->pi", blocks))
         if of_loads is not None:
             blocks += _blocks(of_loads, blocks.shape[1])
-        smooth, rises = self._smooth_correction(moduli, of_loads)
+        added = support * np.abs(np.einsum("pii->pi", blocks))
+        supporting = None
+        if support:
+            blocks += added[:, :, None] * np.eye(blocks.shape[1])
+            supporting = csr_array(diags_array(added.ravel(), format="csr"))
+            whole, of_loads = _sum(whole, supporting), _sum(of_loads, supporting)
+        smooth, rises = self._smooth_correction(moduli, of_loads, supporting)
         alternating = self._alternating_correction()
         return _Iterated(
             solver=self,
-            whole_product=self.product(moduli, of_loads),
+            whole_product=self.product(moduli, whole if turns else of_loads),
+            turns=turns,
             own_diagonal=np.einsum("pii->pi", blocks)[self.freedoms.free],
+            added=added[self.freedoms.free],
             alone=_inverted(blocks, self.freedoms.free),
             corrections=[own for own in (smooth, alternating) if own is not None],
             rises=rises,
@@ -151,7 +164,7 @@ class IterativeSolver(LinearSolver):
         return product
 
     def _smooth_correction(
-        self, moduli: Array, of_loads: csr_array | None
+        self, moduli: Array, of_loads: csr_array | None, supporting: csr_array | None
     ) -> tuple[_Correction | None, bool]:
         """The correction by smooth functions, of a positive stiffness, and whether it is that here.
 
@@ -167,6 +180,10 @@ class IterativeSolver(LinearSolver):
                 return _Correction(space, [factors], [1.0]), True
         except SingularError:
             pass
+        if supporting is not None:  # nothing may hold the body at rest
+            at_rest, own = self._at_rest()
+            factors = self._factorised(space, 0, at_rest, _sum(own, supporting))
+            return _Correction(space, [factors], [1.0]), False
         if self.smooth_at_rest is None:
             factors = self._factorised(space, 0, *self._at_rest())
             self.smooth_at_rest = _Correction(space, [factors], [1.0])
@@ -206,7 +223,7 @@ class IterativeSolver(LinearSolver):
     def _at_rest(self) -> tuple[Array, csr_array | None]:
         """Moduli, and the symmetric stiffness of loads."""
         rest = np.zeros(self.freedoms.free.shape)
-        return self.tangent.moduli(rest), _symmetric(self.tangent.of_loads(rest, 0.0))
+        return self.tangent.moduli(rest), _symmetric(self.tangent.of_loads(rest))
 
     def _factorised(
         self, space: CoarseSpace, pattern: int, moduli: Array, of_loads: csr_array | None
@@ -239,10 +256,16 @@ class _Iterated(Linearised):
 
     solver: IterativeSolver
     whole_product: Callable[[Array], Array]  # with motions (n, d) of all particles
+    turns: bool  # True if it is far from symmetric
     own_diagonal: Array  # (k,)
+    added: Array  # (k,)
     alone: Array  # (n, d, d) inverse stiffness of every particle alone [m/N]
     corrections: Sequence[_Correction]
     rises: bool  # False if their own stiffness is not positive
+
+    @property
+    def support(self) -> Array:
+        return self.added
 
     @property
     def diagonal(self) -> Array:
@@ -256,9 +279,11 @@ class _Iterated(Linearised):
         return pull
 
     def solve(self, forces: Array, tolerance: float) -> Array:
+        if self.turns:
+            return self._by(gmres, forces, tolerance, restart=_KEPT, maxiter=_MOST // _KEPT)
         found = self._iterated(forces, tolerance)
-        if found.falls:
-            return self._by_minimal_residuals(forces, tolerance)
+        if found.falls:  # a tangent that lets some motions fall
+            return self._by(minres, forces, tolerance, maxiter=_MOST)
         if found.left > tolerance:
             raise UnsolvedError(found.left, _MOST)
         return found.values
@@ -281,15 +306,21 @@ class _Iterated(Linearised):
     def _iterated(self, forces: Array, tolerance: float) -> Solution:
         return conjugate_gradients(self.product, self._preconditioned, forces, tolerance, _MOST)
 
-    def _by_minimal_residuals(self, forces: Array, tolerance: float) -> Array:
-        """Solution with a tangent that lets some motions fall."""
+    def _by(
+        self,
+        method: Callable[..., tuple[Array, int]],
+        forces: Array,
+        tolerance: float,
+        **limits: int,
+    ) -> Array:
+        """Solution by a method for other tangents than positive ones."""
         shape = (len(forces), len(forces))
-        values, code = minres(
+        values, code = method(
             LinearOperator(shape, matvec=self.product, dtype=np.float64),
             forces,
             rtol=tolerance,
-            maxiter=_MOST,
             M=LinearOperator(shape, matvec=self._preconditioned, dtype=np.float64),
+            **limits,
         )
         if code != 0:
             left = np.linalg.norm(forces - self.product(values)) / np.linalg.norm(forces)
@@ -338,6 +369,16 @@ def _inverted(blocks: Array, free: Mask) -> Array:
         values = np.maximum(values, _LEAST * np.median(values[:, -1]))
         return np.asarray((vectors / values[:, None, :]) @ vectors.transpose(0, 2, 1))
     return np.linalg.inv(kept)
+
+
+def _sum(one: csr_array | None, other: csr_array) -> csr_array:
+    return other if one is None else csr_array(one + other)
+
+
+def _turns(matrix: csr_array, diagonal: Array) -> bool:
+    """Whether a load's stiffness is so far from symmetric that this slows Newton's method."""
+    skew = csr_array(matrix - matrix.T)
+    return bool(skew.nnz and np.abs(skew.data).max() > _SKEW * np.median(diagonal))
 
 
 def _symmetric(matrix: csr_array | None) -> csr_array | None:

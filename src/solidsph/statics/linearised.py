@@ -24,6 +24,11 @@ class Linearised(ABC):
 
     @property
     @abstractmethod
+    def support(self) -> Array:
+        """Stiffness that was added to each of them for want of its own, (k,) [N/m]."""
+
+    @property
+    @abstractmethod
     def diagonal(self) -> Array:
         """Its diagonal, (k,) [N/m]; an estimate suffices."""
 
@@ -80,7 +85,7 @@ class LinearSolver(ABC):
 
     @abstractmethod
     def linearised(
-        self, displacements: Array, lead: Lead | None, increment: Increment
+        self, displacements: Array, lead: Lead | None, increment: Increment, support: float = 0.0
     ) -> Linearised:
         """The tangent at displacements (n, d) [m].
 
@@ -88,6 +93,7 @@ class LinearSolver(ABC):
             displacements: u = x - X of all particles.
             lead: of the step that led there, whose prediction the moduli are taken at.
             increment: the load step.
+            support: stiffness added to every free displacement, over its own [-].
 
         Raises:
             SingularError: some motion has no stiffness.

@@ -9,10 +9,11 @@ import numpy as np
 
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.memory import Memory
-from solidsph.interfaces.terms import GhostConstraint
+from solidsph.interfaces.terms import EnergyTerm, GhostConstraint
 from solidsph.maths.arrays import Array, Mask
 from solidsph.run.built_scene import BuiltScene
 from solidsph.statics.increment import Increment
+from solidsph.statics.stiff import is_stiff
 
 
 @attrs.frozen(eq=False)
@@ -63,6 +64,21 @@ class LoadPath:
             held=held & ~particles.ghosts[:, None],
         )
 
+    @property
+    def may_meet(self) -> bool:
+        """Whether a body may come to something that holds it, such as another body or a wall."""
+        loads = self.simulation.dynamics.loads
+        return any(
+            isinstance(load, EnergyTerm) and not load.acts_always and is_stiff(load)
+            for load in loads
+        )
+
+    @property
+    def spacing(self) -> float:
+        """Of the finest particles [m]."""
+        particles = self.simulation.particles
+        return float(particles.spacings[~particles.ghosts].min())
+
     def time(self, factor: float) -> float:
         """Time of a load factor [s]."""
         return factor * self.simulation.scene.duration
@@ -74,23 +90,25 @@ class LoadPath:
             motion.impose(self.time(factor), 0, placed)
         return placed - (1.0 - factor) * self.offset
 
-    def increment(self, since: float, factor: float, memory: Memory) -> Increment:
-        """The load step to a factor, from what bodies remember at the factor `since`."""
+    def increment(self, since: float, factor: float, memory: Memory, start: Array) -> Increment:
+        """The load step to a factor, from displacements (n, d) and memory at the factor `since`."""
         time = self.time(factor)
-        return Increment(factor, time, time - self.time(since), memory)
+        return Increment(factor, time, time - self.time(since), memory, start)
 
     def forces(self, displacements: Array, increment: Increment) -> Forces:
         """Forces at displacements (n, d) at the end of a load step."""
         dynamics, time, factor = self.simulation.dynamics, increment.time, increment.factor
         positions = dynamics.particles.positions + displacements
-        rest = np.zeros_like(positions)
         total, changed = self.internal.advance(
             time, increment.step, displacements, increment.memory
         )
         remembered = dict(changed)
         applied: dict[str, Array] = {}
         for load in dynamics.loads:
-            own, changed = load.advance(time, increment.step, positions, rest, increment.memory)
+            velocities = increment.velocities(load, displacements)
+            own, changed = load.advance(
+                time, increment.step, positions, velocities, increment.memory
+            )
             remembered |= changed
             force = np.zeros_like(positions)
             force[load.particles] = own - (1.0 - factor) * self.initial_loads[load.label]

@@ -38,7 +38,7 @@ class LocalLaw(ABC):
 
     @abstractmethod
     def change(self, F: Array, dF: Array) -> Array:
-        """dP (n, d, d) [Pa], linear in dF (n, d, d) or (d, d)."""
+        """dP (n, d, d) [Pa], linear in dF (n, d, d)."""
 
     def moduli(self, F: Array) -> Array:
         """dP_ik / dF_jl, (n, d, d, d, d) [Pa]."""
@@ -48,7 +48,7 @@ class LocalLaw(ABC):
             for k in range(d):
                 dF = np.zeros((d, d))
                 dF[j, k] = 1.0
-                moduli[..., j, k] = self.change(F, dF)
+                moduli[..., j, k] = self.change(F, np.broadcast_to(dF, F.shape))
         return moduli
 
 

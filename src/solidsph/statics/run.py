@@ -17,7 +17,8 @@ from solidsph.statics.equilibrium import equilibrium
 
 _UNSTABLE = (
     "the equilibrium is unstable: the body would leave it, as a strip does beyond its buckling "
-    "load. To find what it goes to, add a small load aside, or follow a damped motion"
+    "load, or is free to slide or roll. To find what it goes to, add a small load aside, or follow "
+    "a damped motion"
 )
 
 

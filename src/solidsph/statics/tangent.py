@@ -7,7 +7,7 @@ from typing import Any
 
 import attrs
 import numpy as np
-from scipy.sparse import block_diag, bsr_array, csr_array, diags_array
+from scipy.sparse import block_diag, csr_array, diags_array
 
 from solidsph.engines.matrix import MatrixForces, Operators
 from solidsph.errors import SolidsphError
@@ -18,11 +18,11 @@ from solidsph.interfaces.terms import Load, StressTerm
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import components_first
 from solidsph.run.built_scene import BuiltScene
-from solidsph.statics.increment import Increment
+from solidsph.statics.increment import AT_REST, Increment
 from solidsph.statics.lead import Lead
 from solidsph.statics.linear_part import linear_part
 from solidsph.statics.local_law import LocalLaw, local_law
-from solidsph.statics.stiff import is_stiff
+from solidsph.statics.stiff import is_stiff, is_stiff_in_steps
 from solidsph.statics.sums import sums_by_matrices
 
 # A linear prediction of a volume is trusted up to this ratio to the actual one.
@@ -52,16 +52,10 @@ class _BodyTangent:
 
     def matrix(self, constant: Operators, A: Array) -> csr_array:
         """(d n, d n) [N/m] with moduli (n, d, d, d, d)."""
-        n, d = A.shape[:2]
-        blocks = [constant.gradient[k * n : (k + 1) * n] for k in range(d)]
-        g = np.stack([block.data for block in blocks], axis=1)
-        # Change of stress T_ik at p per displacement of q along j, in blocks (p, q).
-        starts, columns = blocks[0].indptr, blocks[0].indices
-        changes = np.einsum("mikjl,ml->mikj", np.repeat(A, np.diff(starts), axis=0), g)
-        of_displacement = bsr_array(
-            (changes.reshape(-1, d * d, d), columns, starts), shape=(d * d * n, d * n)
-        )
-        return csr_array(-(self._force(constant, n, d) @ self._extended(of_displacement)))
+        ghosts = self.body.particles.ghosts
+        nothing_on_them = self.body.formulation.divergence.uses_ghost_stress
+        forces = constant.of_stresses(ghosts if nothing_on_them else None)
+        return csr_array(-(forces @ self._extended(constant.stress_changes(A))))
 
     def stress(self, stresses: Array) -> Array:
         """Stresses (n, d, d) at real particles, extended to ghosts."""
@@ -107,15 +101,6 @@ class _BodyTangent:
         """Stresses of real particles, or their derivative, extended to ghosts."""
         return stresses if self.stresses is None else self.stresses @ stresses
 
-    def _force(self, constant: Operators, n: int, d: int) -> bsr_array:
-        """Matrix (d n, d d n) from stress components (j, k) at q to forces along i at p."""
-        blocks = [constant.force[:, k * n : (k + 1) * n] for k in range(d)]
-        f = np.stack([block.data for block in blocks], axis=1)
-        if self.body.formulation.divergence.uses_ghost_stress:  # nothing acts on ghosts then
-            f[np.repeat(self.body.particles.ghosts, np.diff(blocks[0].indptr))] = 0.0
-        weights = np.einsum("ij,mk->mijk", np.eye(d), f).reshape(-1, d, d * d)
-        return bsr_array((weights, blocks[0].indices, blocks[0].indptr), shape=(d * n, d * d * n))
-
 
 @attrs.frozen(eq=False)
 class Tangent:
@@ -124,6 +109,7 @@ class Tangent:
     bodies: Sequence[_BodyTangent]
     internal: InternalForces  # the sums, in double precision
     loads: Sequence[Load]
+    increment: Increment = AT_REST  # the load step
 
     @classmethod
     def of(cls, simulation: BuiltScene, internal: InternalForces) -> Tangent:
@@ -150,9 +136,9 @@ class Tangent:
         )
 
     def during(self, increment: Increment) -> Tangent:
-        """The tangent in a load step, of the stress at its end."""
+        """The tangent in a load step, of the forces at its end."""
         bodies = [attrs.evolve(b, law=b.law.during(increment)) for b in self.bodies]
-        return attrs.evolve(self, bodies=bodies)
+        return attrs.evolve(self, bodies=bodies, increment=increment)
 
     def moduli(self, displacements: Array, lead: Lead | None = None) -> Array:
         """dT_ik / dF_jl of all particles, (n, d, d, d, d) [Pa], at displacements (n, d).
@@ -166,12 +152,10 @@ class Tangent:
             parts.append(part.moduli(F[extent], None if lead is None else lead.of(extent)))
         return np.concatenate(parts)
 
-    def matrix(
-        self, displacements: Array, lead: Lead | None = None, time: float = 0.0
-    ) -> csr_array:
+    def matrix(self, displacements: Array, lead: Lead | None = None) -> csr_array:
         """K, (d n, d n) [N/m], at displacements u = x - X (n, d) of all particles.
 
-        Rows and columns include ghosts. Loads are those of `time` [s].
+        Rows and columns include ghosts.
         """
         A = self.moduli(displacements, lead)
         parts = [
@@ -179,14 +163,22 @@ class Tangent:
             for part, constant in zip(self.bodies, self._constant(), strict=True)
         ]
         total = parts[0] if len(parts) == 1 else csr_array(block_diag(parts, format="csr"))
-        of_loads = self.of_loads(displacements, time)
+        of_loads = self.of_loads(displacements)
         return total if of_loads is None else csr_array(total + of_loads)
 
-    def of_loads(self, displacements: Array, time: float) -> csr_array | None:
+    def of_loads(self, displacements: Array) -> csr_array | None:
         """The part of K that loads add, (d n, d n) [N/m]; None if there is none."""
-        added = [load.stiffness(displacements, time) for load in self.loads if is_stiff(load)]
+        added = [self._of_load(load, displacements) for load in self.loads]
         parts = [part for part in added if part is not None]
         return csr_array(sum(parts[1:], parts[0])) if parts else None
+
+    def _of_load(self, load: Load, displacements: Array) -> csr_array | None:
+        own: object = load
+        now = self.increment
+        if is_stiff_in_steps(own):
+            velocities = now.velocities(load, displacements)
+            return own.stiffness_of_step(now.time, now.step, displacements, velocities, now.memory)
+        return own.stiffness(displacements, now.time) if is_stiff(own) else None
 
     def product(self, moduli: Array, motion: Array) -> Array:
         """K motion without the part of the loads, (n, d) [N], with these moduli."""

@@ -162,6 +162,36 @@ def test_bodies_touch_where_their_surfaces_are(d: int, on_boundary: bool) -> Non
     assert 0.03 < pressure(-0.1) / MODULUS < 0.2
 
 
+@pytest.mark.parametrize("d", [2, 3])
+def test_fitted_particles_touch_where_their_surfaces_are(d: int) -> None:
+    """Fits give particles on a surface 3/8 of a cell, and more to the row below."""
+    scene = (
+        Simulation.builder()
+        .body("block", shape={"type": "box", "lengths": [1.0] * d}, spacing=0.2)
+        .body(
+            "other",
+            shape={"type": "box", "lengths": [1.0] * d, "origin": [1.0] + [0.0] * (d - 1)},
+            spacing=0.2,
+        )
+        .material("neo-hookean", **SOFT)
+        .effect("contact")
+        .duration(1e-2)
+    )
+    simulation = scene.build()
+    assert simulation.model.bodies[0].particles.volumes.min() < 0.4 * 0.2**d
+    pushed = [
+        abs(
+            forces(simulation, apart(simulation, -depth))[
+                : simulation.model.bodies[0].extent.stop, 0
+            ].sum()
+        )
+        for depth in (1e-4, 2e-4)
+    ]
+    # Two thousandths of a spacing and half of that: at once, and in proportion.
+    assert pushed[0] > 1e-4 / 0.2 * SOFT["youngs_modulus"] * 0.3
+    assert pushed[1] == pytest.approx(2.0 * pushed[0], rel=0.1)
+
+
 def test_lattices_do_not_interlock() -> None:
     """A block pressed on a plate and moved along it goes up no hill: the pair force of one spacing
     has hills of 0.13 spacings, at the same lattices."""
