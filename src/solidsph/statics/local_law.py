@@ -70,8 +70,7 @@ class _Elastic(LocalLaw):
 
     def change(self, F: Array, dF: Array) -> Array:
         material = self.body.material
-        along = components_first(np.broadcast_to(dF, F.shape))
-        dP = material.tangent(components_first(F), along, material.params)
+        dP = material.tangent(components_first(F), components_first(dF), material.params)
         return particles_first(dP, len(F))
 
 
