@@ -54,21 +54,19 @@ def remaining(
     """
     # Far above rounding, far below what the samples resolve.
     step = 1e-6 * spacing
-    points = np.concatenate([surface.points for surface in surfaces])
-    area_vectors = np.concatenate([surface.area_vectors for surface in surfaces])
     # A removed shape may be much larger than the body.
     low, high = whole.bounds()
-    within = (points >= low - 2.0 * step) & (points <= high + 2.0 * step)
-    some = np.flatnonzero(functools.reduce(np.logical_and, within.T))
-    ahead = step * unit(area_vectors[some])
-    behind = whole.signed_distance(points[some] - ahead) < 0.0
-    some, ahead = some[behind], ahead[behind]
-    some = some[whole.signed_distance(points[some] + ahead) > 0.0]
+    bounded = [_inside(surface, low - 2.0 * step, high + 2.0 * step) for surface in surfaces]
+    points = np.concatenate([surface.points for surface in bounded])
+    area_vectors = np.concatenate([surface.area_vectors for surface in bounded])
+    ahead = step * unit(area_vectors)
+    some = np.flatnonzero(whole.signed_distance(points - ahead) < 0.0)
+    some = some[whole.signed_distance(points[some] + ahead[some]) > 0.0]
     stays = np.zeros(len(points), dtype=np.bool_)
     stays[some] = True
     lower, upper = corners(parts)
     first = 0
-    for i, surface in enumerate(surfaces):
+    for i, surface in enumerate(bounded):
         own = first + np.flatnonzero(stays[first : first + len(surface.points)])
         first += len(surface.points)
         if not own.size:
@@ -78,5 +76,16 @@ def remaining(
         near = ((lower[:i] <= high) & (upper[:i] >= low)).all(axis=1)
         for earlier in np.flatnonzero(near).tolist():
             stays[own] &= np.abs(parts[earlier].signed_distance(points[own])) > step
-    faces = chain.from_iterable(surface.faces for surface in surfaces)
+    faces = chain.from_iterable(surface.faces for surface in bounded)
     return Surface(points[stays], area_vectors[stays], tuple(compress(faces, stays.tolist())))
+
+
+def _inside(surface: Surface, low: Array, high: Array) -> Surface:
+    """The samples of a surface in the box from `low` to `high`, both (d,) [m]."""
+    columns = zip(surface.points.T, low, high, strict=True)
+    inside = functools.reduce(np.logical_and, ((x >= a) & (x <= b) for x, a, b in columns))
+    if inside.all():
+        return surface
+    some = np.flatnonzero(inside)
+    names = np.array(surface.faces, dtype=object)[some]
+    return Surface(surface.points[some], surface.area_vectors[some], tuple(names.tolist()))
