@@ -68,7 +68,8 @@ def passes(dimension: int, degree: int) -> Passes:
             w[m] = sums.weights[begin + m]
             for i in range(d):
                 x[i, m] = (X[q, i] - X[p, i]) * scale
-        w[count:whole] = 0.0
+        for m in range(count, whole):
+            w[m] = 0.0
         for i in range(d):
             for m in range(whole):
                 b[i, m] = own * x[i, m]
@@ -116,9 +117,9 @@ def passes(dimension: int, degree: int) -> Passes:
     def product(sums, multipliers):
         n = len(sums.starts) - 1
         alone = multipliers.shape[1] == 1
-        out = np.zeros_like(multipliers)
+        out = np.zeros(multipliers.shape)
         w, x, b = scratch(sums.starts)
-        y, t, part = np.zeros_like(x), np.empty(k), np.empty(k)
+        y, t, part = np.zeros((d, len(w))), np.empty(k), np.empty(k)
         for p in range(n):
             if sums.shares[p] == 0.0:
                 continue
