@@ -192,7 +192,11 @@ class Fit:
             self._functions(points[some], np.full(len(some), self._rule.degree))
             for some in np.array_split(first, 1 + len(first) // _POINTS_AT_ONCE)
         ]
-        values, near = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        width = max(near.shape[1] for _, near in found)
+        values, near = (
+            np.concatenate([np.pad(part, ((0, 0), (0, width - part.shape[1]))) for part in parts])
+            for parts in zip(*found, strict=True)
+        )
         # Where the particles are, from the cell of the point; one without a value may be anywhere.
         count = near.shape[1]
         places = lattice.places(self.particles[near.ravel()]).reshape(near.shape)
@@ -230,13 +234,12 @@ def _functions(
         distances[alone, :1], near[alone, :1] = tree.query(points[alone], k=[1])
     near = np.minimum(near, tree.n - 1)  # those further away weigh nothing, and stand last
     most = int(np.isfinite(distances).sum(axis=1).max(initial=1))
-    distances, some = distances[:, :most], near[:, :most]
+    distances, near = distances[:, :most], near[:, :most]
     reach = np.maximum(radius, 1.01 * distances[:, :1])
     q = np.minimum(distances / reach, 1.0)
     weight = (1.0 - q) ** 4 * (1.0 + 4.0 * q)
-    offsets = (tree.data[some] - points[:, None, :]) / reach[:, :, None]
-    values = np.zeros(near.shape)
-    values[:, :most] = weight * _fits(weight, offsets, degree, rule)
+    offsets = (tree.data[near] - points[:, None, :]) / reach[:, :, None]
+    values: Array = weight * _fits(weight, offsets, degree, rule)
     return values, near
 
 
