@@ -85,9 +85,7 @@ class ConformingLattice(Discretisation):
         return True
 
 
-def outermost(
-    shape: Shape, grid: Grid, distance: Array, spacing: float
-) -> tuple[Array, Mask]:
+def outermost(shape: Shape, grid: Grid, distance: Array, spacing: float) -> tuple[Array, Mask]:
     """The particles on the boundary of `shape`, (m, d) [m], by a `grid` with points on it, and
     which of them are on no edge or corner, (m,).
 
