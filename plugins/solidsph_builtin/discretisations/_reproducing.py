@@ -249,18 +249,21 @@ def _fits(weight: Array, offsets: Array, degree: Indices, rule: Rule) -> Array:
     powers = _powers(offsets.shape[2])
     degrees = np.array([_degree(power) for power in powers])
     powers = powers[degrees <= degree.max(initial=0)]
+    known = {tuple(power): number for number, power in enumerate(powers.tolist())}
     basis = np.ones((len(offsets), len(powers), offsets.shape[1]))
-    for number, power in enumerate(powers):
-        for axis in np.repeat(np.arange(len(power)), power):
-            basis[:, number] *= offsets[:, :, axis]
+    for number, power in enumerate(powers[1:].tolist(), start=1):
+        axis = int(np.flatnonzero(power)[-1])
+        power[axis] -= 1
+        np.multiply(basis[:, known[tuple(power)]], offsets[:, :, axis], out=basis[:, number])
     moments = (basis * weight[:, None, :]) @ basis.transpose(0, 2, 1)
     accepted = np.zeros(weight.shape)
     for number in range(1 + int(degree.max(initial=0))):
         some = np.flatnonzero(degree >= number)
+        own = slice(None) if len(some) == len(degree) else some  # without copies
         size = int(np.sum(degrees <= number))
-        factors = _first_column(moments[some, :size, :size], rule.determined)
-        fitted = np.einsum("mjk,mj->mk", basis[some, :size], factors)
-        safe = np.abs(weight[some] * fitted).sum(axis=1) <= rule.largest_sum
+        factors = _first_column(moments[own, :size, :size], rule.determined)
+        fitted = np.einsum("mjk,mj->mk", basis[own, :size], factors)
+        safe = np.abs(weight[own] * fitted).sum(axis=1) <= rule.largest_sum
         accepted[some[safe]] = fitted[safe]
     return accepted
 
