@@ -169,11 +169,12 @@ def _modified(place: str) -> int:
 
 def entry_points(*, group: str) -> EntryPoints:
     """Installed entry points of a group; those of all groups are read at once."""
-    return _installed(_places()).select(group=group)
+    found: EntryPoints = _installed(_places()).select(group=group)
+    return found
 
 
 @lru_cache(maxsize=4)
-def _installed(places: object) -> EntryPoints:
+def _installed(places: object) -> Any:  # before Python 3.12 of another type
     return metadata.entry_points()
 
 
