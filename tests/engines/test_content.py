@@ -186,13 +186,14 @@ from solidsph.engines.compiled.fixed.block_law import block_law
 from solidsph.engines.compiled.fixed.block_sweeps import force_sweep
 from solidsph.engines.compiled.history_law import without_history
 from solidsph.engines.compiled.pointwise import compiled_flux
+from solidsph_builtin.gradients._passes import passes
 from solidsph_builtin.formulations.total_lagrangian import TotalLagrangian
 from solidsph_builtin.materials.neo_hookean import NeoHookean
 
 formulation = TotalLagrangian()
 law = compiled_flux(formulation, NeoHookean(1e6, 0.3, 1000.0), 2)
 apply = block_law(2, "float64", without_history(law), 0, 2)
-print(content(force_sweep(2, "float64", apply), frozenset("abc")))
+print(content(force_sweep(2, "float64", apply), frozenset("abc"), passes(2, 2).product))
 """
     found = {
         subprocess.run(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import attrs
 import numpy as np
+from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import cKDTree
 
 from solidsph.interfaces.shape import Surface
-from solidsph.maths.arrays import Array
+from solidsph.maths.arrays import Array, Indices
 from solidsph_builtin.discretisations._nearest import thinned
 
 # Tangent planes at more than this angle make an edge; at less, a bend.
@@ -54,12 +55,14 @@ def meetings(of: Features, reach: float) -> Features:
     neighbours are closest to each other is kept.
     """
     d = of.points.shape[1]
-    pairs = cKDTree(of.points).query_pairs(_NEIGHBOURS * reach, output_type="ndarray")
+    some = _beside_bends(of, _NEIGHBOURS * reach)
+    tree = cKDTree(of.points[some])
+    pairs = some[tree.query_pairs(_NEIGHBOURS * reach, output_type="ndarray")]
     # Nearly all neighbours lie on the same smooth part.
     bent = np.abs(of.normals[pairs[:, 1]] - of.normals[pairs[:, 0]]).max(axis=(1, 2), initial=0.0)
     pairs = np.sort(pairs[bent > _SMOOTH], axis=1)
     normals = of.normals[pairs].reshape(len(pairs), 2 * of.normals.shape[1], d)
-    crossing = _rank(normals) > _rank(of.normals)[pairs].max(axis=1, initial=0)
+    crossing = _rank(normals) > _rank(of.normals[pairs]).max(axis=1, initial=0)
     pairs, normals = pairs[crossing], normals[crossing]
     ends = of.points[pairs]
     middle = ends.mean(axis=1)
@@ -76,8 +79,33 @@ def meetings(of: Features, reach: float) -> Features:
     return Features(points[stays], normals[order][stays])
 
 
+def _beside_bends(of: Features, distance: float) -> Indices:
+    """Features with all those whose neighbours, up to this `distance` [m], have other normals.
+
+    Of most features in cubes that are at least as large, the cubes around included, the normals
+    are alike: they lie deep in a smooth face.
+    """
+    m, d = of.points.shape
+    if not m:
+        return np.arange(0)
+    offsets = of.points - of.points.min(axis=0)
+    extent = offsets.max(axis=0)
+    side = max(distance, float(np.prod(extent) / m) ** (1.0 / d))
+    counts = tuple((extent // side).astype(np.intp) + 1)
+    cubes = np.ravel_multi_index(tuple((offsets // side).astype(np.intp).T), counts)
+    order = np.argsort(cubes, kind="stable")
+    there, first = np.unique(cubes[order], return_index=True)
+    bent = np.zeros(counts, dtype=np.bool_)
+    for normal in of.normals.reshape(m, -1)[order].T:
+        least, most = np.full(counts, np.inf), np.full(counts, -np.inf)
+        least.flat[there] = np.minimum.reduceat(normal, first)
+        most.flat[there] = np.maximum.reduceat(normal, first)
+        bent |= maximum_filter(most, 3) - minimum_filter(least, 3) > _SMOOTH
+    return np.flatnonzero(bent.ravel()[cubes])
+
+
 def _rank(normals: Array) -> Array:
-    """Number of planes with these `normals` (m, k, d) that cross sharply, (m,)."""
+    """Number of planes with these `normals` (..., k, d) that cross sharply, (...)."""
     # The singular values of two unit normals at an angle a are sqrt(1 +- cos a).
     sharp = np.sqrt(1.0 - _SHARPEST_BEND)
-    return np.asarray(np.sum(np.linalg.svd(normals, compute_uv=False) > sharp, axis=1))
+    return np.asarray(np.sum(np.linalg.svd(normals, compute_uv=False) > sharp, axis=-1))

@@ -23,6 +23,7 @@ from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._pieces import finest_pieces
 from solidsph_builtin.discretisations._reproducing import Fit
+from solidsph_builtin.discretisations._sampled_once import sampled_once
 from solidsph_builtin.discretisations._surface import area_vectors, sampled
 
 # Samples of the surface along a spacing, over those that an assignment to particles needs.
@@ -73,7 +74,7 @@ def fitted(
     Raises:
         SceneError: a volume would not be positive.
     """
-    real = ~given.ghosts
+    shape, real = sampled_once(shape), ~given.ghosts
     X, volumes = given.positions, given.volumes.copy()
     volumes[real] = fitted_volumes(
         discretisation, shape, spacing, X[real], volumes[real], disturbed

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.maths.arrays import Array, Mask
+from solidsph.maths.arrays import Array, Indices, Mask
 
 # Particles repel each other up to this distance, in spacings: those across the diagonal of a cell.
 _REACH = 1.5
@@ -19,6 +19,8 @@ _STEP = 0.1
 
 # Neighbours are searched anew after so many steps, during which none moves by more than a spacing.
 _SEARCH = 5
+# Until two may have come closer by this, in spacings, only those within the reach and this count.
+_SLACK = 0.2
 
 # Keeps the force of two particles at one place finite.
 _SOFT = 1e-3
@@ -49,10 +51,13 @@ def relaxed(
             pairs = cKDTree(x).query_pairs(
                 reach + 2.0 * _SEARCH * _STEP * spacing, output_type="ndarray"
             )
-            a, b = pairs[moves[pairs].any(axis=1)].T
-        offsets = x[b] - x[a]
+            found, slack = pairs[moves[pairs[:, 0]] | moves[pairs[:, 1]]].T, -1.0
+        if slack < 0.0:
+            slack = _SLACK * spacing
+            near_pairs, _ = _within(x, found, reach + slack)
+        (a, b), offsets = _within(x, near_pairs, reach)
         q = np.linalg.norm(offsets, axis=1) / reach
-        strength = np.maximum(1.0 - q, 0.0) ** 2 / (q + _SOFT)
+        strength = (1.0 - q) ** 2 / (q + _SOFT)
         away = strength[:, None] * offsets / np.maximum(q, _SOFT)[:, None] / reach
         way = np.stack(
             [
@@ -64,6 +69,15 @@ def relaxed(
         length = np.linalg.norm(way, axis=1, keepdims=True)
         # Without any pair these are integers.
         way = way * (_STEP * spacing / np.maximum(length, 1.0))
-        x[moves] = onto(x[moves] + way[moves])
+        before = x[moves]
+        x[moves] = onto(before + way[moves])
+        slack -= 2.0 * float(np.linalg.norm(x[moves] - before, axis=1).max())
     X[some] = x
     return X
+
+
+def _within(x: Array, pairs: Indices, distance: float) -> tuple[Indices, Array]:
+    """The `pairs` (2, m) less than a `distance` apart, (2, k), and their offsets (k, d)."""
+    offsets = x[pairs[1]] - x[pairs[0]]
+    some = np.flatnonzero(np.einsum("mi,mi->m", offsets, offsets) < distance**2)
+    return pairs[:, some], offsets[some]

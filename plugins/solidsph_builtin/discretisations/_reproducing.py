@@ -192,7 +192,11 @@ class Fit:
             self._functions(points[some], np.full(len(some), self._rule.degree))
             for some in np.array_split(first, 1 + len(first) // _POINTS_AT_ONCE)
         ]
-        values, near = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        width = max(near.shape[1] for _, near in found)
+        values, near = (
+            np.concatenate([np.pad(part, ((0, 0), (0, width - part.shape[1]))) for part in parts])
+            for parts in zip(*found, strict=True)
+        )
         # Where the particles are, from the cell of the point; one without a value may be anywhere.
         count = near.shape[1]
         places = lattice.places(self.particles[near.ravel()]).reshape(near.shape)
@@ -230,13 +234,12 @@ def _functions(
         distances[alone, :1], near[alone, :1] = tree.query(points[alone], k=[1])
     near = np.minimum(near, tree.n - 1)  # those further away weigh nothing, and stand last
     most = int(np.isfinite(distances).sum(axis=1).max(initial=1))
-    distances, some = distances[:, :most], near[:, :most]
+    distances, near = distances[:, :most], near[:, :most]
     reach = np.maximum(radius, 1.01 * distances[:, :1])
     q = np.minimum(distances / reach, 1.0)
     weight = (1.0 - q) ** 4 * (1.0 + 4.0 * q)
-    offsets = (tree.data[some] - points[:, None, :]) / reach[:, :, None]
-    values = np.zeros(near.shape)
-    values[:, :most] = weight * _fits(weight, offsets, degree, rule)
+    offsets = (tree.data[near] - points[:, None, :]) / reach[:, :, None]
+    values: Array = weight * _fits(weight, offsets, degree, rule)
     return values, near
 
 
@@ -246,18 +249,21 @@ def _fits(weight: Array, offsets: Array, degree: Indices, rule: Rule) -> Array:
     powers = _powers(offsets.shape[2])
     degrees = np.array([_degree(power) for power in powers])
     powers = powers[degrees <= degree.max(initial=0)]
+    known = {tuple(power): number for number, power in enumerate(powers.tolist())}
     basis = np.ones((len(offsets), len(powers), offsets.shape[1]))
-    for number, power in enumerate(powers):
-        for axis in np.repeat(np.arange(len(power)), power):
-            basis[:, number] *= offsets[:, :, axis]
+    for number, power in enumerate(powers[1:].tolist(), start=1):
+        axis = int(np.flatnonzero(power)[-1])
+        power[axis] -= 1
+        np.multiply(basis[:, known[tuple(power)]], offsets[:, :, axis], out=basis[:, number])
     moments = (basis * weight[:, None, :]) @ basis.transpose(0, 2, 1)
     accepted = np.zeros(weight.shape)
     for number in range(1 + int(degree.max(initial=0))):
         some = np.flatnonzero(degree >= number)
+        own = slice(None) if len(some) == len(degree) else some  # without copies
         size = int(np.sum(degrees <= number))
-        factors = _first_column(moments[some, :size, :size], rule.determined)
-        fitted = np.einsum("mjk,mj->mk", basis[some, :size], factors)
-        safe = np.abs(weight[some] * fitted).sum(axis=1) <= rule.largest_sum
+        factors = _first_column(moments[own, :size, :size], rule.determined)
+        fitted = np.einsum("mjk,mj->mk", basis[own, :size], factors)
+        safe = np.abs(weight[own] * fitted).sum(axis=1) <= rule.largest_sum
         accepted[some[safe]] = fitted[safe]
     return accepted
 

@@ -85,10 +85,12 @@ class ConformingLattice(Discretisation):
         return True
 
 
-def outermost(shape: Shape, grid: Grid, spacing: float) -> tuple[Array, Mask]:
+def outermost(shape: Shape, grid: Grid, distance: Array, spacing: float) -> tuple[Array, Mask]:
     """The particles on the boundary of `shape`, (m, d) [m], by a `grid` with points on it, and
-    which of them are on no edge or corner, (m,)."""
-    distance = in_chunks(grid.size, lambda n: shape.signed_distance(grid.positions(n)))
+    which of them are on no edge or corner, (m,).
+
+    `distance` (size,) [m] is that of the points of the grid.
+    """
     found = _arranged(shape, grid, distance, spacing)
     return found.positions[found.onto], found.on_smooth[found.onto]
 

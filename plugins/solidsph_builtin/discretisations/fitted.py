@@ -20,6 +20,7 @@ from solidsph_builtin.discretisations._fitting import fitted
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._nearest import nearest
 from solidsph_builtin.discretisations._relaxation import relaxed
+from solidsph_builtin.discretisations._sampled_once import sampled_once
 from solidsph_builtin.discretisations._surface import faces, sampled, without_ghosts
 from solidsph_builtin.discretisations.conforming_lattice import outermost
 
@@ -62,7 +63,7 @@ class Fitted(Discretisation):
             SceneError: the spacing is not positive, so large that the body has no particles inside
                 its surface, or so small that there would be too many.
         """
-        spacing = check_spacing(self, spacing)
+        spacing, shape = check_spacing(self, spacing), sampled_once(shape)
         grid = grid_over(self, shape, spacing, on_boundary=True)
         surface = sampled(self, shape, spacing)
         size = mean_spacing(grid, spacing)
@@ -87,8 +88,8 @@ class Fitted(Discretisation):
     ) -> tuple[Array, Mask, bool]:
         """Positions (n, d) [m], whether they are on the boundary (n,), and whether any particle is
         off the lattice."""
-        outer, at_lattice = _snapped(_outer(shape, grid, spacing, size), grid)
         distance = in_chunks(grid.size, lambda n: shape.signed_distance(grid.positions(n)))
+        outer, at_lattice = _snapped(_outer(shape, grid, distance, spacing, size), grid)
         inside = np.flatnonzero(distance < -_CLEAR * size)
         inner = grid.positions(inside)
         inner = inner[cKDTree(outer).query(inner)[0] > _CLEAR * size] if len(inner) else inner
@@ -105,13 +106,13 @@ class Fitted(Discretisation):
         return X[order], onto[order], bool(len(off))
 
 
-def _outer(shape: Shape, grid: Grid, spacing: float, size: float) -> Array:
-    """Particles on the boundary, (m, d) [m]."""
+def _outer(shape: Shape, grid: Grid, distance: Array, spacing: float, size: float) -> Array:
+    """Particles on the boundary, (m, d) [m]; `distance` (size,) [m] is that of the lattice."""
     if shape.dimension == 2:
         return even_points(shape, spacing)
-    start, on_smooth = outermost(shape, grid, size)
+    start, on_smooth = outermost(shape, grid, distance, size)
     outer, at_lattice = _snapped(start, grid)
-    surface = shape.surface(size)
+    surface = shape.surface(spacing)
     return relaxed(
         outer,
         on_smooth & ~at_lattice,

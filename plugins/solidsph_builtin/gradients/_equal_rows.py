@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,13 +55,23 @@ def _fingerprints(pairs: Pairs, volumes: Array) -> NDArray[np.uint64]:
     """A whole number for each row, (n,): equal for equal rows, and else for one pair in 2^64."""
     reach = _EQUAL * float(pairs.distances.max(initial=0.0)) or 1.0
     size = _EQUAL * float(volumes.max())
-    place = np.arange(pairs.count) - pairs.spread(pairs.starts[:-1])
-    mixed = _mixed(place)
-    for values, unit in ((volumes[pairs.columns], size), *((x, reach) for x in pairs.offsets.T)):
-        mixed = _mixed(mixed + np.rint(values / unit).astype(np.int64).view(np.uint64))
+    mixed = np.arange(pairs.count, dtype=np.uint64)
+    mixed -= pairs.spread(pairs.starts[:-1]).astype(np.uint64)
+    _mix(mixed)
+    mixed += _whole(volumes / size)[pairs.columns]
+    _mix(mixed)
+    for x in pairs.offsets.T:
+        mixed += _whole(x / reach)
+        _mix(mixed)
     return np.add.reduceat(mixed, pairs.starts[:-1])
 
 
-def _mixed(numbers: NDArray[Any]) -> NDArray[np.uint64]:
-    mixed = numbers.astype(np.uint64) * _MIXER
-    return (mixed ^ (mixed >> _SHIFT)) * _MIXER
+def _whole(values: Array) -> NDArray[np.uint64]:
+    return np.rint(values, out=values).astype(np.int64).view(np.uint64)
+
+
+def _mix(numbers: NDArray[np.uint64]) -> None:
+    """Mix the bits of each number, in place."""
+    numbers *= _MIXER
+    numbers ^= numbers >> _SHIFT
+    numbers *= _MIXER

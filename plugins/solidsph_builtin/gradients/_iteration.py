@@ -67,7 +67,8 @@ def solved(
         return result
 
     def of_sums_alone(x: Array) -> Array:
-        return softened(np.concatenate([x, np.zeros_like(x, shape=(len(x), d, d))], axis=1))[:, :1]
+        result: Array = product(sums, x) + soft[:, :1, None] * x
+        return result
 
     multipliers = _conjugate_gradients(softened, np.linalg.inv(blocks), missing, _LEFT, steps)
     # The sums themselves must be right to more digits, for uniform stresses to be in balance.
@@ -91,12 +92,12 @@ def _sums(
         units.append(fits.units)
     root = np.concatenate(roots)
     kept = close > 0.0
+    columns = pairs.columns[kept]
     return Sums(
         row_starts(np.bincount(pairs.rows[kept], minlength=particles.count)),
-        pairs.columns[kept].astype(np.int32),
+        columns.astype(np.int32),
         particles.positions,
-        close[kept],
-        particles.cells,
+        close[kept] * particles.cells[columns],
         particles.volumes**2 * free,
         (root @ root.transpose(0, 2, 1))[kinds],
         np.concatenate(units)[kinds],

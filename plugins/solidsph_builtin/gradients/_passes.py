@@ -13,6 +13,9 @@ from solidsph_builtin.gradients._local_fits import factors_of
 # Sums in any order: they are vectorised.
 _FAST = {"reassoc", "contract", "nsz"}
 
+# Rows are filled up with pairs of no weight to a multiple of this, for whole vectors.
+_WHOLE = 8
+
 
 class Sums(NamedTuple):
     """What the passes read."""
@@ -20,8 +23,7 @@ class Sums(NamedTuple):
     starts: Any  # (n + 1,)
     columns: Any  # (m,)
     positions: Any  # (n, d) [m]
-    closeness: Any  # (m,)
-    cells: Any  # (n,) [m^d]
+    weights: Any  # (m,) closeness times the cell of the neighbour
     shares: Any  # (n,) V^2 s [m^2d]
     inverses: Any  # (n, k, k) of the moments of the functions that keep their gradient
     units: Any  # (n,) of the offsets in these functions [m]
@@ -32,7 +34,9 @@ class Passes(NamedTuple):
     """Compiled passes."""
 
     diagonal_blocks: Any  # (sums) -> (n, 1 + d, 1 + d)
-    product: Any  # (sums, multipliers (n, 1 + d, d)) -> what they add to the sums, the same shape
+    # (sums, multipliers (n, 1 + d, d)) -> what they add to the sums, the same shape;
+    # of multipliers (n, 1, d), l alone, to the sums without their first moments.
+    product: Any
 
 
 @cache
@@ -49,26 +53,31 @@ def passes(dimension: int, degree: int) -> Passes:
         longest = 0
         for p in range(len(starts) - 1):
             longest = max(longest, starts[p + 1] - starts[p])
-        return np.empty(longest), np.empty((d, longest)), np.empty((k, longest))
+        longest = (longest + _WHOLE - 1) // _WHOLE * _WHOLE
+        return np.zeros(longest), np.zeros((d, longest)), np.zeros((k, longest))
 
     @njit(fastmath=_FAST)
     def row(sums, p, w, x, b):
         begin = sums.starts[p]
         count = sums.starts[p + 1] - begin
-        X, own = sums.positions, sums.length / sums.units[p]
+        whole = (count + _WHOLE - 1) // _WHOLE * _WHOLE
+        X, scale = sums.positions, 1.0 / sums.length
+        own = sums.length / sums.units[p]
         for m in range(count):
             q = sums.columns[begin + m]
-            w[m] = sums.closeness[begin + m] * sums.cells[q]
+            w[m] = sums.weights[begin + m]
             for i in range(d):
-                x[i, m] = (X[q, i] - X[p, i]) / sums.length
+                x[i, m] = (X[q, i] - X[p, i]) * scale
+        for m in range(count, whole):
+            w[m] = 0.0
         for i in range(d):
-            for m in range(count):
+            for m in range(whole):
                 b[i, m] = own * x[i, m]
         for at in range(d, k):
             i, j = factors[at - d, 0], factors[at - d, 1]
-            for m in range(count):
+            for m in range(whole):
                 b[at, m] = b[i, m] * b[j, m]
-        return begin, count
+        return begin, count, whole
 
     @njit(fastmath=_FAST)
     def diagonal_blocks(sums):
@@ -79,7 +88,7 @@ def passes(dimension: int, degree: int) -> Passes:
         for p in range(n):
             if sums.shares[p] == 0.0:
                 continue
-            begin, count = row(sums, p, w, x, b)
+            begin, count, _ = row(sums, p, w, x, b)
             own, inverse = sums.shares[p], sums.inverses[p]
             t[:] = 0.0
             total = 0.0
@@ -107,44 +116,53 @@ def passes(dimension: int, degree: int) -> Passes:
     @njit(fastmath=_FAST)
     def product(sums, multipliers):
         n = len(sums.starts) - 1
-        out = np.zeros((n, 1 + d, d))
+        alone = multipliers.shape[1] == 1
+        out = np.zeros(multipliers.shape)
         w, x, b = scratch(sums.starts)
-        y, t = np.empty((d, len(w))), np.empty(k)
+        y, t, part = np.zeros((d, len(w))), np.empty(k), np.empty(k)
         for p in range(n):
             if sums.shares[p] == 0.0:
                 continue
-            begin, count = row(sums, p, w, x, b)
+            begin, count, whole = row(sums, p, w, x, b)
             for m in range(count):
                 q = sums.columns[begin + m]
                 for c in range(d):
                     value = multipliers[q, 0, c] - multipliers[p, 0, c]
-                    for i in range(d):
-                        value -= multipliers[q, 1 + i, c] * x[i, m]
+                    if not alone:
+                        for i in range(d):
+                            value -= multipliers[q, 1 + i, c] * x[i, m]
                     y[c, m] = value
-            own = sums.shares[p]
             for c in range(d):
+                yc = y[c]
+                for m in range(whole):
+                    yc[m] *= w[m]
                 for i in range(k):
-                    along = 0.0
-                    for m in range(count):
-                        along += w[m] * b[i, m] * y[c, m]
-                    t[i] = along
+                    bi, value = b[i], 0.0
+                    for m in range(whole):
+                        value += bi[m] * yc[m]
+                    t[i] = value
                 for i in range(k):
-                    part = 0.0
+                    value = 0.0
                     for j in range(k):
-                        part += sums.inverses[p, i, j] * t[j]
-                    for m in range(count):
-                        y[c, m] -= part * b[i, m]
+                        value += sums.inverses[p, i, j] * t[j]
+                    part[i] = value
                 total = 0.0
-                for m in range(count):
-                    y[c, m] *= own * w[m]
-                    total += y[c, m]
+                for m in range(whole):
+                    kept = 0.0
+                    for i in range(k):
+                        kept += part[i] * b[i, m]
+                    value = sums.shares[p] * (yc[m] - w[m] * kept)
+                    yc[m] = value
+                    total += value
                 out[p, 0, c] -= total
             for m in range(count):
                 q = sums.columns[begin + m]
                 for c in range(d):
-                    out[q, 0, c] += y[c, m]
-                    for i in range(d):
-                        out[q, 1 + i, c] -= y[c, m] * x[i, m]
+                    value = y[c, m]
+                    out[q, 0, c] += value
+                    if not alone:
+                        for i in range(d):
+                            out[q, 1 + i, c] -= value * x[i, m]
         return out
 
     return Passes(diagonal_blocks, product)

@@ -175,11 +175,10 @@ def _missing(particles: Particles, pairs: Pairs, weights: Array, length: float) 
     """
     n, d = particles.positions.shape
     V = particles.volumes
-    factors = [np.ones(pairs.count), *(-pairs.offsets.T / length)]
-    sums = [
-        [np.bincount(pairs.columns, V[pairs.rows] * g * factor, minlength=n) for g in weights.T]
-        for factor in factors
-    ]
+    own = [V[pairs.rows] * g for g in weights.T]
+    sums = [[np.bincount(pairs.columns, part, minlength=n) for part in own]]
+    for arm in -pairs.offsets.T / length:
+        sums.append([np.bincount(pairs.columns, part * arm, minlength=n) for part in own])
     wanted = np.zeros((n, 1 + d, d))
     wanted[:, 0] = particles.area_vectors
     for face in particles.faces.values():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
+from itertools import chain, compress
 from reprlib import repr as short
 from typing import Any
 
@@ -10,7 +12,7 @@ import attrs
 import numpy as np
 
 from solidsph.interfaces.shape import Shape, Surface
-from solidsph.maths.arrays import Array, Mask
+from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes._checks import as_tuple, refusal
 from solidsph_builtin.shapes._sampling import unit
 
@@ -52,27 +54,38 @@ def remaining(
     """
     # Far above rounding, far below what the samples resolve.
     step = 1e-6 * spacing
-    points = np.concatenate([surface.points for surface in surfaces])
-    ahead = step * unit(np.concatenate([surface.area_vectors for surface in surfaces]))
-    all_kept = whole.signed_distance(points + ahead) > 0.0
-    all_kept &= whole.signed_distance(points - ahead) < 0.0
-    kept: list[Mask] = np.split(all_kept, np.cumsum([len(s.points) for s in surfaces])[:-1])
+    # A removed shape may be much larger than the body.
+    low, high = whole.bounds()
+    bounded = [_inside(surface, low - 2.0 * step, high + 2.0 * step) for surface in surfaces]
+    points = np.concatenate([surface.points for surface in bounded])
+    area_vectors = np.concatenate([surface.area_vectors for surface in bounded])
+    ahead = step * unit(area_vectors)
+    some = np.flatnonzero(whole.signed_distance(points - ahead) < 0.0)
+    some = some[whole.signed_distance(points[some] + ahead[some]) > 0.0]
+    stays = np.zeros(len(points), dtype=np.bool_)
+    stays[some] = True
     lower, upper = corners(parts)
-    for i, (surface, keep) in enumerate(zip(surfaces, kept, strict=True)):
+    first = 0
+    for i, surface in enumerate(bounded):
+        own = first + np.flatnonzero(stays[first : first + len(surface.points)])
+        first += len(surface.points)
+        if not own.size:
+            continue
         # Only a part whose box is so near has a boundary there.
-        low, high = surface.points.min(axis=0) - 2.0 * step, surface.points.max(axis=0) + 2.0 * step
+        low, high = points[own].min(axis=0) - 2.0 * step, points[own].max(axis=0) + 2.0 * step
         near = ((lower[:i] <= high) & (upper[:i] >= low)).all(axis=1)
         for earlier in np.flatnonzero(near).tolist():
-            keep &= np.abs(parts[earlier].signed_distance(surface.points)) > step
-    return Surface(
-        points=np.concatenate([s.points[k] for s, k in zip(surfaces, kept, strict=True)]),
-        area_vectors=np.concatenate(
-            [s.area_vectors[k] for s, k in zip(surfaces, kept, strict=True)]
-        ),
-        faces=tuple(
-            face
-            for surface, keep in zip(surfaces, kept, strict=True)
-            for face, stays in zip(surface.faces, keep.tolist(), strict=True)
-            if stays
-        ),
-    )
+            stays[own] &= np.abs(parts[earlier].signed_distance(points[own])) > step
+    faces = chain.from_iterable(surface.faces for surface in bounded)
+    return Surface(points[stays], area_vectors[stays], tuple(compress(faces, stays.tolist())))
+
+
+def _inside(surface: Surface, low: Array, high: Array) -> Surface:
+    """The samples of a surface in the box from `low` to `high`, both (d,) [m]."""
+    columns = zip(surface.points.T, low, high, strict=True)
+    inside = functools.reduce(np.logical_and, ((x >= a) & (x <= b) for x, a, b in columns))
+    if inside.all():
+        return surface
+    some = np.flatnonzero(inside)
+    names = np.array(surface.faces, dtype=object)[some]
+    return Surface(surface.points[some], surface.area_vectors[some], tuple(names.tolist()))

@@ -8,6 +8,7 @@ to one particle as to another, whether these are at the centres of the cells or 
 from __future__ import annotations
 
 import math
+from itertools import chain, repeat
 from typing import TypeAlias
 
 import numpy as np
@@ -102,7 +103,7 @@ def joined(pieces: list[Piece]) -> Surface:
     return Surface(
         points=np.concatenate([points for _, points, _ in pieces]),
         area_vectors=np.concatenate([area_vectors for _, _, area_vectors in pieces]),
-        faces=tuple(name for name, points, _ in pieces for _ in range(len(points))),
+        faces=tuple(chain.from_iterable(repeat(name, len(points)) for name, points, _ in pieces)),
     )
 
 

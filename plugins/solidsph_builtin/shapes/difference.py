@@ -75,5 +75,6 @@ class Difference(Shape):
 
 def _inverted(surface: Surface, taken: frozenset[str]) -> Surface:
     """The boundary of a hole: normals point into it."""
-    faces = tuple(f"hole-{face}" if face in taken else face for face in surface.faces)
+    names = {face: f"hole-{face}" if face in taken else face for face in set(surface.faces)}
+    faces = tuple(map(names.__getitem__, surface.faces))
     return attrs.evolve(surface, area_vectors=-surface.area_vectors, faces=faces)

@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array, csr_array
 from scipy.spatial import cKDTree
 
 from solidsph.maths.arrays import Array, Indices, Mask
@@ -132,14 +132,18 @@ def neighbour_pairs(positions: Array, radius: float, hidden: Hidden | None = Non
     near = cKDTree(positions).query_pairs(radius, output_type="ndarray")
     if hidden is not None:
         near = near[~hidden.between(near[:, 0], near[:, 1])]
-    itself = np.arange(len(positions), dtype=np.intp)
-    rows = np.concatenate([near[:, 0], near[:, 1], itself]).astype(np.intp)
-    columns = np.concatenate([near[:, 1], near[:, 0], itself]).astype(np.intp)
-    order = np.lexsort((columns, rows))
-    rows, columns = rows[order], columns[order]
+    n = len(positions)
+    itself = np.arange(n, dtype=np.intp)
+    rows = np.concatenate([near[:, 0], near[:, 1], itself])
+    columns = np.concatenate([near[:, 1], near[:, 0], itself])
+    # As a sparse matrix, which is sorted row by row.
+    there = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(n, n)).tocsr()
+    there.sort_indices()
+    rows = np.repeat(itself, np.diff(there.indptr))
+    columns = there.indices.astype(np.intp)
     offsets = positions[columns] - positions[rows]
     return Pairs(
-        starts=np.searchsorted(rows, np.arange(len(positions) + 1)).astype(np.intp),
+        starts=there.indptr.astype(np.intp),
         rows=rows,
         columns=columns,
         offsets=offsets,

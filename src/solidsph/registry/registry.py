@@ -10,8 +10,8 @@ import os
 import sys
 from collections.abc import Callable, Mapping
 from functools import lru_cache
-from importlib import import_module
-from importlib.metadata import Distribution, EntryPoint, entry_points
+from importlib import import_module, metadata
+from importlib.metadata import Distribution, EntryPoint, EntryPoints
 from pathlib import Path
 from typing import Any
 
@@ -152,8 +152,12 @@ def _points(kind: str) -> tuple[EntryPoint, ...]:
 
 def _key(kind: str) -> tuple[Any, ...]:
     """Key of a scan for parts, which is cached: it takes milliseconds, and a scene needs many."""
-    places = tuple((place, _modified(place)) for place in sys.path)
-    return entry_points, kind, os.environ.get(RESTRICT), places
+    return entry_points, kind, os.environ.get(RESTRICT), _places()
+
+
+def _places() -> tuple[tuple[str, int], ...]:
+    """Where distributions may be, and when that changed."""
+    return tuple((place, _modified(place)) for place in sys.path)
 
 
 def _modified(place: str) -> int:
@@ -161,6 +165,17 @@ def _modified(place: str) -> int:
         return Path(place).stat().st_mtime_ns
     except OSError:
         return 0
+
+
+def entry_points(*, group: str) -> EntryPoints:
+    """Installed entry points of a group; those of all groups are read at once."""
+    found: EntryPoints = _installed(_places()).select(group=group)
+    return found
+
+
+@lru_cache(maxsize=4)
+def _installed(places: object) -> Any:  # before Python 3.12 of another type
+    return metadata.entry_points()
 
 
 @lru_cache(maxsize=64)

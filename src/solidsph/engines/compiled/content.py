@@ -83,8 +83,8 @@ def _(value: Any, digest: Digest) -> Iterator[bytes]:
     yield from map(digest, value)
 
 
-@_parts.register
-def _(value: frozenset, digest: Digest) -> Iterator[bytes]:  # type: ignore[type-arg]
+@_parts.register(set | frozenset)
+def _(value: Any, digest: Digest) -> Iterator[bytes]:
     yield from sorted(map(digest, value))
 
 
@@ -131,7 +131,7 @@ def _(value: FunctionType, digest: Digest) -> Iterator[bytes]:
 
 @_parts.register
 def _(value: Dispatcher, digest: Digest) -> Iterator[bytes]:
-    yield repr(sorted(value.targetoptions.items())).encode()
+    yield digest(value.targetoptions)
     yield digest(value.py_func)
 
 
