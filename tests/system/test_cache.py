@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -46,6 +47,26 @@ def test_what_was_not_used_for_longest_goes_first(store: Store) -> None:
     store.write("f", bytes(150))
     assert {path.name for path, _ in store.entries} == set("acdef")
     assert sum(size for _, size in store.entries) <= store.largest
+
+
+def test_small_entries_stay_within_the_bound_without_a_look_at_each(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(CACHE, str(tmp_path))
+    store, looks = Store("many", 100_000), 0
+    listed = Path.iterdir
+
+    def counted(folder: Path) -> Iterator[Path]:
+        nonlocal looks
+        looks += 1
+        return listed(folder)
+
+    monkeypatch.setattr(Path, "iterdir", counted)
+    for key in range(4000):
+        store.write(str(key), bytes(18))  # and 32 of the digest: a two thousandth of the bound
+    # One in twenty looks, and 2000 entries fit. Chance leaves neither limit once in 10^9 tests.
+    assert looks < 400
+    assert sum(size for _, size in store.entries) < 1.25 * store.largest
 
 
 def test_several_writers_leave_one_whole_entry(store: Store) -> None:

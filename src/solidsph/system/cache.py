@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import secrets
 import threading
 from contextlib import suppress
 from pathlib import Path
@@ -13,6 +14,9 @@ import attrs
 
 CACHE = "SOLIDSPH_CACHE"
 """Environment variable: folder of the cache, instead of the user's cache folder."""
+
+_LOOKS = 100
+"""How often the sum of all entries is looked at, on average, while the bound is written."""
 
 _DIGEST = hashlib.sha256().digest_size  # bytes before the content of an entry
 
@@ -76,8 +80,12 @@ class Store:
 
     def write(self, key: str, content: bytes) -> None:
         """Keep an entry; do nothing where that is impossible."""
-        write_whole(self.folder / key, hashlib.sha256(content).digest() + content)
-        self._delete_beyond(self.largest)
+        entry = hashlib.sha256(content).digest() + content
+        write_whole(self.folder / key, entry)
+        # To look at all entries after each write would take longer than to write. By chance, since
+        # many processes write little each; the numbers of `random` are the user's.
+        if secrets.randbelow(self.largest) < _LOOKS * len(entry):
+            self._delete_beyond(self.largest)
 
     def clear(self) -> None:
         """Delete all entries."""
