@@ -8,12 +8,16 @@ import pytest
 from tests.stability import random_scenes
 from tests.stability.random_scenes import BOUNDED, REFUSED, Words, campaign, drawn, outcome
 
+# Scenes of which the share that is refused is not chance: a third of all, give or take a tenth.
+MANY = 50
+
 
 def assert_all_sound(count: int) -> None:
     counts, wrong = campaign(count)
     print(dict(counts))
     assert not wrong, f"{len(wrong)} of {count}; again by drawn(seed):\n" + "\n".join(wrong)
-    assert counts[REFUSED] < 0.4 * count  # or it says little
+    if count >= MANY:
+        assert counts[REFUSED] < 0.4 * count  # or it says little
 
 
 def test_random_scenes() -> None:

@@ -56,6 +56,7 @@ class LoadHistory(TimeHistory):
 
     stresses: Array  # (t,) largest force over the area that its particle owns [Pa]; 0 inside
     accelerations: Array  # (t,) largest force over mass [m/s^2]
+    mean_accelerations: Array  # (t,) force over mass of all its particles together [m/s^2]
     on_surface: bool
 
 
@@ -81,7 +82,7 @@ def _load_history(simulation: BuiltScene, load: Load, areas: Array) -> LoadHisto
     times = _times(simulation, len(masses) * simulation.particles.dimension)
     if not isinstance(load, ScheduledLoad):
         times = times[:: max(1, len(times) // 4)]
-    owns, real = areas > 0.0, masses > 0.0
+    owns, real, mass = areas > 0.0, masses > 0.0, float(masses.sum())
 
     def sample(some: Array) -> tuple[Array, ...]:
         if isinstance(load, ScheduledLoad):
@@ -92,14 +93,16 @@ def _load_history(simulation: BuiltScene, load: Load, areas: Array) -> LoadHisto
             forces = np.stack([load.forces(float(t), x, v) for t in some])
         sizes = np.linalg.norm(forces, axis=2)
         accelerations = (sizes[:, real] / masses[real]).max(axis=1, initial=0.0)
+        together = np.linalg.norm(forces.sum(axis=1), axis=1)
+        means = together / mass if mass > 0.0 else np.zeros(len(some))
         # A particle at an edge owns area of both faces, so its stress is less than the others'.
         stresses = (sizes[:, owns] / areas[owns]).max(axis=1, initial=0.0)
-        return sizes.max(axis=1, initial=0.0), accelerations, stresses
+        return sizes.max(axis=1, initial=0.0), stresses, accelerations, means
 
-    times, (sizes, accelerations, stresses) = _sampled(times, sample)
+    times, (sizes, stresses, *accelerations) = _sampled(times, sample)
     on_surface = isinstance(load, SurfaceLoad)
     stresses = stresses if on_surface else np.zeros_like(sizes)
-    return LoadHistory(load.label, times, sizes, stresses, accelerations, on_surface)
+    return LoadHistory(load.label, times, sizes, stresses, *accelerations, on_surface)
 
 
 def motion_histories(simulation: BuiltScene) -> Iterator[MotionHistory]:

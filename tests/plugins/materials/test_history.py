@@ -208,13 +208,6 @@ def test_histories_survive_a_restart_bit_for_bit(
     assert np.array_equal(whole.positions, again.positions)
 
 
-def test_statics_of_what_remembers_is_refused() -> None:
-    with pytest.raises(BuildError, match="depends on the history"):
-        Simulation.builder(
-            attrs.evolve(block(2, VISCOELASTIC).scene(), initial=())
-        ).statics().build()
-
-
 def test_a_run_without_history_has_no_column_and_no_memory_of_it(tmp_path: Path) -> None:
     state = block(2, {"type": "neo-hookean", **RUBBER}).build().run(record=tmp_path / "r.h5").state
     assert list(state.memory) == ["mean velocity of the step"]
