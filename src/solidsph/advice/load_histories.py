@@ -99,10 +99,10 @@ def _load_history(simulation: BuiltScene, load: Load, areas: Array) -> LoadHisto
         stresses = (sizes[:, owns] / areas[owns]).max(axis=1, initial=0.0)
         return sizes.max(axis=1, initial=0.0), stresses, accelerations, means
 
-    times, (sizes, stresses, *accelerations) = _sampled(times, sample)
+    times, (sizes, stresses, accelerations, means) = _sampled(times, sample)
     on_surface = isinstance(load, SurfaceLoad)
     stresses = stresses if on_surface else np.zeros_like(sizes)
-    return LoadHistory(load.label, times, sizes, stresses, *accelerations, on_surface)
+    return LoadHistory(load.label, times, sizes, stresses, accelerations, means, on_surface)
 
 
 def motion_histories(simulation: BuiltScene) -> Iterator[MotionHistory]:
