@@ -41,7 +41,11 @@ SLOW = (
     # A full disk late in a run, beside one early in it.
     "tests/results/test_resume.py::test_what_a_full_disk_stops_goes_on[900000-",
     # What takes long to compile, beside what does not: other laws, the same in fewer dimensions.
-    "tests/engines/test_merged_loads.py::test_beside_a_material_that_remembers[effect0]",
+    "tests/engines/test_merged_loads.py::test_beside_a_material_that_remembers",
+    "tests/engines/test_merged_loads.py::test_one_is_merged_and_the_other_has_a_pass_of_its_own",
+    "tests/engines/test_time_loop.py::test_every_effect[joint]",
+    "tests/engines/test_engines.py::test_compiled_agrees_for_every_material[2-holzapfel-ogden]",
+    "tests/engines/test_whole_steps.py::test_all_that_ask_get_one_answer[a law that remembers]",
     "tests/engines/test_time_loop.py::test_every_effect[hourglass-control]",
     "tests/engines/test_block_law.py::"
     "test_lanes_know_all_that_built_in_laws_are_made_of[holzapfel-ogden]",

@@ -129,7 +129,7 @@ def test_a_pressure_that_follows_the_surface(pressure: str) -> None:
 
 
 # The others are under validation: each takes some seconds to compile.
-QUICK = {(2, "j2-plasticity")}
+QUICK = {(2, "viscoelastic")}
 
 # What replaces the internal forces by its own.
 BY_STEP = {"bond-failure"}
