@@ -86,6 +86,13 @@ def _drawn(law: str) -> Addition:
     )
 
 
+def _breaking(builder: SceneBuilder, spacing: float) -> SceneBuilder:
+    """Stretched ever faster towards the right, where bonds fail in every step."""
+    return builder.effect("bond-failure", critical_stretch=0.02).initial(
+        where="block", velocity={"x": "0.5*X*X"}
+    )
+
+
 PLAIN = "plain"
 SCENES: Mapping[str, Scene] = {
     PLAIN: Scene(lambda builder, spacing: builder, 1.0),
@@ -106,6 +113,7 @@ SCENES: Mapping[str, Scene] = {
     "heat": Scene(_effect("heat", conductivity=1.0, heat_capacity=1e3), 1.8),
     "kelvin-voigt": Scene(_effect("kelvin-voigt", time=1e-5), 1.7),
     "bond-failure": Scene(_effect("bond-failure", critical_stretch=0.5), 2.0),
+    "bond-failure, failing": Scene(_breaking, 2.0),
     "contact, apart": Scene(_apart, 1.05),
     "contact": Scene(_touching(0.0), 1.3),
     "contact with friction": Scene(_touching(0.3), 1.4),
