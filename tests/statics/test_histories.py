@@ -143,10 +143,14 @@ def test_a_thick_ring_collapses_at_hills_pressure() -> None:
     pressures: list[float] = []
 
     def observe(state: State) -> None:
-        pressures.append(float(np.sum(state.applied["push"] * directions)) / (2.0 * np.pi))
+        inner = 1.0 + pushed * state.time
+        force = float(np.sum(state.applied["push"] * directions))
+        pressures.append(force / (2.0 * np.pi * inner))
 
-    equilibrium(scene, observer=observe)
+    state = equilibrium(scene, observer=observe).state
+    radii = np.linalg.norm(state.positions, axis=1)
     elastic = 0.1 * pushed * E / (1.0 + nu) * 3.0 / (1.0 - 2.0 * nu + 4.0)  # Lame, b = 2 a
     assert pressures[1] == pytest.approx(elastic, rel=0.01)  # as fine as this ring is
-    # The ring has grown thinner by 0.5 % of its logarithm.
-    assert pressures[-1] == pytest.approx(2.0 * k * np.log(2.0), rel=0.01)
+    # The ring as it is then, which is thinner by 0.7 %. At this spacing it is 0.1 % off.
+    limit = 2.0 * k * np.log(radii.max() / radii.min())
+    assert pressures[-1] == pytest.approx(limit, rel=2e-3)

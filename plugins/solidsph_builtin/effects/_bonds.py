@@ -100,9 +100,7 @@ class Bonds:
 
     def damage(self, flags: Array) -> Array:
         """Fraction of the bonds of each particle that have failed, (n,) [-]."""
-        own = np.diff(self.pairs.starts) - 1  # a particle is among its own neighbours
-        lost = np.bincount(self.pairs.rows[flags == 0.0], minlength=len(own))
-        return np.asarray(lost / np.maximum(own, 1))
+        return _damage(self.pairs, flags)
 
     def beyond(self, remains: Remains, displacements: Array) -> tuple[Indices, float]:
         """Intact bonds (k,) that are stretched too far at displacements (n, d) [m], each as one of
@@ -138,11 +136,10 @@ class Bonds:
     def _left(self, before: Remains, flags: Array, alone: Mask, losers: Indices) -> Remains:
         """What is left where the losers (k,) have lost bonds since `before`."""
         where, rows = self.pairs.chosen(losers)
-        left = flags[where] > 0.0
         damage = before.damage.copy()
-        own = np.diff(rows.starts) - 1  # a particle is among its own neighbours
-        damage[losers] = (own + 1 - rows.row_sums(flags[where])) / np.maximum(own, 1)
-        kept = (left & ~alone[rows.rows]) | (rows.rows == rows.columns)
+        damage[losers] = _damage(rows, flags[where])
+        acting = (flags[where] > 0.0) & ~alone[rows.rows]
+        kept = acting | (rows.rows == rows.columns)
         changed = RowWeights.of(rows, self._weights(flags, alone, rows, where), kept)
         return Remains(flags, damage, alone, before.rows.replaced_by(changed))
 
@@ -172,6 +169,12 @@ class Bonds:
         where, rows = self.pairs.chosen(np.unique(q))
         keys = rows.rows * self.pairs.row_count + rows.columns
         return np.asarray(where[np.searchsorted(keys, q * self.pairs.row_count + p)])
+
+
+def _damage(rows: Pairs, flags: Array) -> Array:
+    """Fraction of the bonds of the particles listed that have failed, (k,) [-]."""
+    own = np.diff(rows.starts) - 1  # a particle is among its own neighbours
+    return np.asarray((own + 1 - rows.row_sums(flags)) / np.maximum(own, 1))
 
 
 @final

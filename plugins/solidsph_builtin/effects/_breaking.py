@@ -171,14 +171,11 @@ class BreakingForces(InternalForces):
 
     def _remembered(self, memory: Memory) -> tuple[Remains, ...]:
         """What is left in this memory; formed anew if it is not that of the last step."""
-        return tuple(
-            bonds.none_failed
-            if bonds.name not in memory
-            else last
-            if memory[bonds.name] is last.flags
-            else bonds.remains(memory[bonds.name])
-            for bonds, last in zip(self.bonds, self._remains, strict=True)
-        )
+        found = []
+        for bonds, last in zip(self.bonds, self._remains, strict=True):
+            flags = memory.get(bonds.name, bonds.none_failed.flags)
+            found.append(last if flags is last.flags else bonds.remains(flags))
+        return tuple(found)
 
     def _of(self, remains: tuple[Remains, ...]) -> InternalForces:
         """The forces of what is left."""
