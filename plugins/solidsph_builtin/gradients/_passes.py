@@ -37,6 +37,17 @@ class Passes(NamedTuple):
     # (sums, multipliers (n, 1 + d, d)) -> what they add to the sums, the same shape;
     # of multipliers (n, 1, d), l alone, to the sums without their first moments.
     product: Any
+    # (sums, places (n,)) -> the rows that change, with a neighbour whose place is >= 0, or one.
+    rows_beside: Any
+    # (sums, rows (r,), places (n,), block (m, m)): block += what these rows add to the part of the
+    # matrix of l alone that couples the particles with a place in the block, >= 0.
+    add_block: Any
+    # (sums, functions of the particles (n, c) by their rows' starts, columns and values, matrix
+    # (c, c)): matrix += that of l alone between the functions.
+    add_functions: Any
+    # (ends (b + 1,) of the blocks among their members, members, inverses of their matrices one
+    # after the other, r (n, d), z (n, d)): z += the solutions of all blocks.
+    add_solutions: Any
 
 
 @cache
@@ -165,4 +176,152 @@ def passes(dimension: int, degree: int) -> Passes:
                             out[q, 1 + i, c] -= value * x[i, m]
         return out
 
-    return Passes(diagonal_blocks, product)
+    @njit
+    def rows_beside(sums, places):
+        n = len(sums.starts) - 1
+        beside = np.zeros(n, np.bool_)
+        for p in range(n):  # pairs are symmetric
+            if places[p] >= 0:
+                beside[p] = sums.shares[p] > 0.0
+                for m in range(sums.starts[p], sums.starts[p + 1]):
+                    q = sums.columns[m]
+                    beside[q] = sums.shares[q] > 0.0
+        return np.flatnonzero(beside)
+
+    # y of a row is l of the neighbours less its own. `inside` are the neighbours in the block.
+    @njit(fastmath=_FAST)
+    def add_block(sums, rows, places, block):
+        w, x, b = scratch(sums.starts)
+        inside = np.empty(len(w), np.int64)
+        weighted, held = np.empty((k, len(w))), np.empty(k)
+        kept, gained = np.empty(len(w)), np.empty(len(w))
+        for p in rows:
+            begin, count, whole = row(sums, p, w, x, b)
+            own, inverse, here = sums.shares[p], sums.inverses[p], places[p]
+            for i in range(k):
+                for m in range(whole):
+                    b[i, m] *= w[m]
+            if here >= 0:
+                total = 0.0
+                for m in range(count):
+                    total += w[m]
+                for i in range(k):
+                    value = 0.0
+                    for m in range(whole):
+                        value += b[i, m]
+                    held[i] = value
+                for i in range(k):
+                    for j in range(k):
+                        total -= held[i] * inverse[i, j] * held[j]
+                block[here, here] += own * total
+            members = 0
+            for m in range(count):
+                place = places[sums.columns[begin + m]]
+                if place >= 0:
+                    inside[members] = place
+                    kept[members] = w[m]
+                    for i in range(k):
+                        weighted[i, members] = b[i, m]
+                    members += 1
+            for a in range(members):
+                at = inside[a]
+                change = own * kept[a]
+                gained[:] = 0.0
+                for i in range(k):
+                    value = 0.0
+                    for j in range(k):
+                        value += inverse[i, j] * weighted[j, a]
+                    value *= own
+                    change -= value * held[i]
+                    wi = weighted[i]
+                    for c in range(members):
+                        gained[c] += value * wi[c]
+                line = block[at]
+                line[at] += own * kept[a]
+                for c in range(members):
+                    line[inside[c]] -= gained[c]
+                if here >= 0:
+                    line[here] -= change
+                    block[here, at] -= change
+
+    @njit(fastmath=_FAST)
+    def add_functions(sums, functions, matrix):
+        starts, columns, values = functions
+        n = len(sums.starts) - 1
+        w, x, b = scratch(sums.starts)
+        t, part = np.empty(k), np.empty(k)
+        # The functions beside a row, at most those of all its neighbours.
+        most = 0
+        for p in range(n):
+            total = starts[p + 1] - starts[p]
+            for m in range(sums.starts[p], sums.starts[p + 1]):
+                total += starts[sums.columns[m] + 1] - starts[sums.columns[m]]
+            most = max(most, total)
+        most = min(most, len(matrix))
+        found, slots = np.empty(most, np.int64), np.full(len(matrix), -1)
+        y, rest = np.zeros((most, len(w))), np.zeros((most, len(w)))
+        for p in range(n):
+            if sums.shares[p] == 0.0:
+                continue
+            begin, count, whole = row(sums, p, w, x, b)
+            size = 0
+            for m in range(-1, count):
+                q = p if m < 0 else sums.columns[begin + m]
+                for e in range(starts[q], starts[q + 1]):
+                    if slots[columns[e]] < 0:
+                        slots[columns[e]] = size
+                        found[size] = columns[e]
+                        y[size] = 0.0
+                        size += 1
+            for m in range(count):
+                q = sums.columns[begin + m]
+                for e in range(starts[q], starts[q + 1]):
+                    y[slots[columns[e]], m] += values[e]
+            for e in range(starts[p], starts[p + 1]):
+                y[slots[columns[e]], :count] -= values[e]
+            for a in range(size):
+                slots[found[a]] = -1
+                ya, ra = y[a], rest[a]
+                for i in range(k):
+                    value = 0.0
+                    for m in range(whole):
+                        value += w[m] * b[i, m] * ya[m]
+                    t[i] = value
+                for i in range(k):
+                    value = 0.0
+                    for j in range(k):
+                        value += sums.inverses[p, i, j] * t[j]
+                    part[i] = value
+                for m in range(whole):
+                    kept = ya[m]
+                    for i in range(k):
+                        kept -= part[i] * b[i, m]
+                    ra[m] = sums.shares[p] * w[m] * kept
+            for a in range(size):
+                ya, line = y[a], matrix[found[a]]
+                for c in range(size):
+                    rc, value = rest[c], 0.0
+                    for m in range(whole):
+                        value += ya[m] * rc[m]
+                    line[found[c]] += value
+
+    # By loops, since the threads of a linear algebra library wait for each other at every block.
+    @njit(fastmath=_FAST)
+    def add_solutions(ends, members, inverses, r, z):
+        own = np.empty((d, np.diff(ends).max()), np.float32)
+        first = 0
+        for block in range(len(ends) - 1):
+            begin, count = ends[block], ends[block + 1] - ends[block]
+            for m in range(count):
+                for c in range(d):
+                    own[c, m] = r[members[begin + m], c]
+            for m in range(count):
+                line = inverses[first : first + count]
+                for c in range(d):
+                    oc, value = own[c], np.float32(0.0)
+                    for j in range(count):
+                        value += line[j] * oc[j]
+                    z[members[begin + m], c] += value
+                first += count
+
+    return Passes(diagonal_blocks, product, rows_beside, add_block, add_functions, add_solutions)

@@ -68,8 +68,9 @@ class Consistent(Gradient):
     the weights themselves.
 
     The system is solved once, when the body is built: by a factorisation if it is small, else by
-    conjugate gradients over the fixed pairs, to a hundredth of what was missing or for a number of
-    steps that takes some seconds.
+    conjugate gradients over the fixed pairs. They leave a tenth of what the first moments lack, of
+    the sums 1e-7 of it up to some 60 000 particles in space, and more in larger bodies: 1e-4 in a
+    cube of 97 000.
     """
 
     of: Gradient = attrs.field(factory=Cubic, metadata={"part": "gradients"})
