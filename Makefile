@@ -18,6 +18,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 SPHINX := $(BIN)/sphinx-build --quiet
 DOCS_STAMP := $(VENV)/.docs
+BENCH_STAMP := $(VENV)/.bench
 
 .PHONY: demo test validate bare gallery frontiers bench bench-page docs docs-links lint format clean
 
@@ -34,10 +35,11 @@ validate: $(STAMP) docs  ## the slow physics, every combination, many more examp
 bare: $(STAMP)  ## scenes that name nothing of the scheme: their errors as a table, and plots over spacing
 	$(BIN)/python -m tests.bare results/bare
 
-bench: $(STAMP)  ## against a plain C loop, whole steps, memory, throughput along every axis, the updated form, every effect
+bench: $(BENCH_STAMP)  ## against a plain C loop, whole steps, memory, throughput along every axis, the updated form, every effect, finite elements
 	$(BIN)/python benchmarks/bench.py
 	$(BIN)/python benchmarks/moving.py
 	$(BIN)/python benchmarks/effects.py
+	$(BIN)/python benchmarks/finite_elements.py
 
 bench-page: $(STAMP)  ## the same, written to the documentation
 	$(BIN)/python benchmarks/bench.py --write docs/benchmarks.md
@@ -72,6 +74,10 @@ $(STAMP): pyproject.toml $(EXAMPLE)/pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable ".[test,dev]"
 	$(BIN)/python -m pip install --quiet --editable $(EXAMPLE)
 	touch $(STAMP)
+
+$(BENCH_STAMP): $(STAMP)
+	$(BIN)/python -m pip install --quiet --editable ".[bench]"
+	touch $(BENCH_STAMP)
 
 $(DOCS_STAMP): $(STAMP)
 	$(BIN)/python -m pip install --quiet --editable ".[docs]"

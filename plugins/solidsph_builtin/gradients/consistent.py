@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, final
+from typing import final
 
 import attrs
 import numpy as np
-from scipy.sparse import csc_array, csr_array, diags_array, hstack
-from scipy.sparse.linalg import splu
+from scipy.sparse import csc_array, csr_array, diags_array, hstack, vstack
+from scipy.sparse.linalg import SuperLU, splu
 
 from solidsph.errors import BuildError
 from solidsph.interfaces.gradient import Gradient
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.maths.arrays import Array, Mask
+from solidsph.maths.band import BandFactors, band_factors
 from solidsph.model.neighbours import Pairs
 from solidsph.model.particles import Particles
 from solidsph_builtin.gradients._local_fits import LocalFits, closeness, portions
@@ -234,12 +235,12 @@ class _Change:
             for offset in pairs.offsets.T
         ]
         y = csr_array(hstack([there - here, *arms], format="csr"))
-        total = y.T @ (diags_array(V**2 * s * w) @ y)
-        for b in tests.T:
-            rows = csr_array((V * np.sqrt(s) * w * b, every[:-1], pairs.starts), shape=(n, m))
-            kept = csr_array(rows @ y)
-            total = total - kept.T @ kept
-        return csr_array(total)
+        rows = [
+            csr_array((V * np.sqrt(s) * w * b, every[:-1], pairs.starts), shape=(n, m))
+            for b in tests.T
+        ]
+        kept = csr_array(csr_array(vstack(rows, format="csr")) @ y)
+        return csr_array(y.T @ (diags_array(V**2 * s * w) @ y) - kept.T @ kept)
 
 
 def _possible(missing: Array, positions: Array, surface: Mask, degree: int) -> Array:
@@ -267,16 +268,7 @@ def _solved(matrix: csr_array, missing: Array, surface: Mask) -> Array:
     size = float(np.median(diagonal[0][diagonal[0] > 0.0]))
     soft = softening(diagonal.T, surface).T.ravel()
     softened = csr_array(matrix + diags_array(soft))
-    regular = csc_array(softened + diags_array(np.full(n * kinds, _REGULAR * size)))
-    try:
-        factors: Any = splu(
-            regular,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:  # exactly singular: bodies of a particle or two have nothing to change
-        raise _unsolved(1.0) from None
+    factors = _factors(csr_array(softened + diags_array(np.full(n * kinds, _REGULAR * size))))
     wanted = missing.transpose(1, 0, 2).reshape(n * kinds, d)
     multipliers, left, unsolved = np.zeros_like(wanted), wanted, 1.0
     for _ in range(_REFINEMENTS):
@@ -292,6 +284,22 @@ def _solved(matrix: csr_array, missing: Array, surface: Mask) -> Array:
         raise _unsolved(unsolved)
     result: Array = multipliers.reshape(kinds, n, d).transpose(1, 0, 2)
     return result
+
+
+def _factors(matrix: csr_array) -> BandFactors | SuperLU:
+    """Factors of a symmetric matrix, which but for rounding is positive definite."""
+    found = band_factors(matrix)
+    if found is not None:
+        return found
+    try:
+        return splu(
+            csc_array(matrix),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError:  # exactly singular: bodies of a particle or two have nothing to change
+        raise _unsolved(1.0) from None
 
 
 def _unsolved(left: float) -> BuildError:

@@ -1,4 +1,4 @@
-"""LU factors of a sparse stiffness matrix."""
+"""Factors of a sparse stiffness matrix."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from solidsph.errors import PortableError
 from solidsph.maths.arrays import Array
+from solidsph.maths.band import BandFactors, band_factors
 
 # Smaller eigenvalues of the matrix scaled to a unit diagonal are rounding.
 _SINGULAR = 1e-13
@@ -24,32 +25,34 @@ class SingularError(PortableError):
 
 @attrs.frozen(eq=False)
 class Factors:
-    """LU factors of a matrix scaled to a unit diagonal."""
+    """Factors of a matrix scaled to a unit diagonal."""
 
     scaling: Array  # (k,)
-    lu: SuperLU
+    scaled: BandFactors | SuperLU
 
     @property
     def positive(self) -> bool:
-        """Whether all pivots are positive: a symmetric matrix is positive definite then.
+        """Whether a symmetric matrix is positive definite: all pivots are positive then.
 
-        SuperLU copies its factors, which takes as
-        long as the factorisation.
+        SuperLU copies its factors to tell, which takes as long as the factorisation.
         """
-        return bool(np.all(self.lu.U.diagonal() > 0.0))
+        if isinstance(self.scaled, BandFactors):
+            return True
+        return bool(np.all(self.scaled.U.diagonal() > 0.0))
 
     def solve(self, values: Array) -> Array:
         """Solution of K x = `values` (k,)."""
-        solution: Array = self.scaling * self.lu.solve(self.scaling * values)
+        solution: Array = self.scaling * self.scaled.solve(self.scaling * values)
         return solution
 
 
 def factorise(matrix: csr_array, *, symmetric: bool) -> Factors:
     """Factorise `matrix` (k, k).
 
-    A `symmetric` matrix is ordered by minimum degree with pivots on its diagonal: half the time of
-    the general ordering for a beam, a sixth for a square. Loads may make it
-    slightly less than symmetric.
+    A `symmetric` matrix is factorised in a band if it is positive definite and the band is not too
+    wide. Else SuperLU orders it by minimum degree with pivots on its diagonal: half the time of the
+    general ordering for a beam, a sixth for a square. Loads may make it slightly less than
+    symmetric.
 
     Raises:
         SingularError: some motion has no stiffness to working precision.
@@ -61,27 +64,27 @@ def factorise(matrix: csr_array, *, symmetric: bool) -> Factors:
     if empty.any():
         raise SingularError(int(np.argmax(empty)))
     scaling = 1.0 / np.sqrt(diagonal)
-    scaled = csc_array(matrix)
-    columns = np.repeat(scaling, np.diff(scaled.indptr))
-    scaled = csc_array(
-        (scaled.data * scaling[scaled.indices] * columns, scaled.indices, scaled.indptr)
-    )
+    both = np.repeat(scaling, np.diff(matrix.indptr)) * scaling[matrix.indices]
+    scaled = csr_array((matrix.data * both, matrix.indices, matrix.indptr), shape=matrix.shape)
+    factors = (band_factors(scaled) if symmetric else None) or _sparse_factors(scaled, symmetric)
+    # The response to a random force is largest along the softest eigenvector.
+    probe = np.random.default_rng(0).standard_normal(len(scaling))
+    softest = factors.solve(probe)
+    if not np.linalg.norm(softest) * _SINGULAR < np.linalg.norm(probe):
+        finite = np.isfinite(softest).all()
+        raise SingularError(int(np.argmax(np.abs(softest))) if finite else None)
+    return Factors(scaling, factors)
+
+
+def _sparse_factors(matrix: csr_array, symmetric: bool) -> SuperLU:
     try:
         if symmetric:
-            lu = splu(
-                scaled,
+            return splu(
+                csc_array(matrix),
                 permc_spec="MMD_AT_PLUS_A",
                 diag_pivot_thresh=0.0,
                 options={"SymmetricMode": True},
             )
-        else:
-            lu = splu(scaled, permc_spec="COLAMD")
+        return splu(csc_array(matrix), permc_spec="COLAMD")
     except RuntimeError:  # a pivot is exactly zero; SuperLU does not report which
         raise SingularError(None) from None
-    # The response to a random force is largest along the softest eigenvector.
-    probe = np.random.default_rng(0).standard_normal(len(scaling))
-    softest = lu.solve(probe)
-    if not np.linalg.norm(softest) * _SINGULAR < np.linalg.norm(probe):
-        finite = np.isfinite(softest).all()
-        raise SingularError(int(np.argmax(np.abs(softest))) if finite else None)
-    return Factors(scaling, lu)
