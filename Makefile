@@ -35,11 +35,12 @@ validate: $(STAMP) docs  ## the slow physics, every combination, many more examp
 bare: $(STAMP)  ## scenes that name nothing of the scheme: their errors as a table, and plots over spacing
 	$(BIN)/python -m tests.bare results/bare
 
-bench: $(BENCH_STAMP)  ## against a plain C loop, whole steps, memory, throughput along every axis, the updated form, every effect, finite elements
+bench: $(BENCH_STAMP)  ## against a plain C loop, whole steps, memory, throughput along every axis, the updated form, every effect, finite elements, LAMMPS
 	$(BIN)/python benchmarks/bench.py
 	$(BIN)/python benchmarks/moving.py
 	$(BIN)/python benchmarks/effects.py
 	$(BIN)/python benchmarks/finite_elements.py
+	$(BIN)/python benchmarks/beside_lammps.py
 
 bench-page: $(STAMP)  ## the same, written to the documentation
 	$(BIN)/python benchmarks/bench.py --write docs/benchmarks.md
