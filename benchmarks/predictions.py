@@ -2,9 +2,10 @@
 
     python benchmarks/predictions.py                    all, some minutes
     python benchmarks/predictions.py --repeats 3 beam
+    python benchmarks/predictions.py --again            what was compiled before
 
 Each scene is written to a file. One process predicts what it takes, as `solidsph explain` does;
-others take it, as `solidsph run` does, fresh each time, of which the medians count. Time is from
+others take it, as `solidsph run` does, fresh each time or --again, of which the medians count. Time is from
 the beginning of the build to the end of the run.
 """
 
@@ -52,6 +53,17 @@ def swinging(lengths: list[float], spacing: float, **body: Any) -> SceneBuilder:
     return block(lengths, spacing, **body).initial(velocity={"y": "0.5*X"})
 
 
+def bare_block(across: int) -> SceneBuilder:
+    """A cantilever that names nothing of the scheme, pulled aside by its end."""
+    return (
+        Simulation.builder()
+        .body("block", shape={"type": "box", "lengths": [4.0, 1.0, 1.0]}, spacing=1.0 / across)
+        .material("neo-hookean", **SOFT)
+        .boundary("clamp", where="left")
+        .boundary("traction", where="right", traction={"y": -4e3})
+    )
+
+
 def jittered() -> dict[str, Any]:
     return {"type": "jittered-lattice", "amplitude": 0.2, "seed": 1}
 
@@ -96,6 +108,64 @@ SCENES: Mapping[str, Callable[[], SceneBuilder]] = {
         .duration(1.0)
         .outputs(20)
     ),
+    "Mooney-Rivlin": lambda: (
+        swinging([0.2, 0.2, 0.2], 0.01)
+        .material("mooney-rivlin", c10=3e5, c01=1e5, bulk_modulus=2e6, density=1000.0)
+        .engine("compiled")
+        .duration(0.2)
+        .outputs(10)
+    ),
+    "3D statics, direct": lambda: bare_block(9).statics(solver="direct").duration(1.0),
+    "3D statics": lambda: bare_block(12).statics().duration(1.0),
+    "3D statics, nu 0.49": lambda: (
+        bare_block(12)
+        .material("neo-hookean", **{**SOFT, "poissons_ratio": 0.49})
+        .statics()
+        .duration(1.0)
+    ),
+    "statics far bent": lambda: (
+        block([0.4, 0.04], 0.002)
+        .effect("body-force", acceleration={"y": -40.0})
+        .statics()
+        .duration(1.0)
+    ),
+    "heat": lambda: (
+        swinging([0.2, 0.2, 0.2], 0.01)
+        .effect("heat", conductivity=1.0, heat_capacity=1e3)
+        .engine("compiled")
+        .duration(0.2)
+        .outputs(10)
+    ),
+    "contact": lambda: (
+        swinging([0.2, 0.2, 0.2], 0.01)
+        .body(
+            "other",
+            shape={"type": "box", "lengths": [0.2] * 3, "origin": [0.0, 0.2, 0.0]},
+            spacing=0.01,
+        )
+        .effect("contact", friction=0.3)
+        .engine("compiled")
+        .duration(0.1)
+        .outputs(10)
+    ),
+    "many effects": lambda: (
+        swinging([0.2, 0.2, 0.2], 0.01)
+        .effect("hourglass-control")
+        .effect("artificial-viscosity")
+        .effect("heat", conductivity=1.0, heat_capacity=1e3)
+        .effect("body-force", acceleration={"z": -9.81})
+        .effect("mass-damping", rate=2.0)
+        .engine("compiled")
+        .duration(0.1)
+        .outputs(10)
+    ),
+    "plasticity": lambda: (
+        swinging([0.2, 0.2, 0.2], 0.01)
+        .material("j2-plasticity", **SOFT, yield_stress=1e4, hardening=1e5)
+        .engine("compiled")
+        .duration(0.1)
+        .outputs(10)
+    ),
     "many outputs": lambda: swinging([1.0, 0.5], 0.02).engine("matrix").duration(0.4).outputs(2000),
     "consistent gradient": lambda: (
         swinging([0.3, 0.2], 0.01, discretisation={"type": "conforming-lattice"})
@@ -135,10 +205,12 @@ def measure(file: Path, record: Path) -> dict[str, Any]:
     }
 
 
-def row(name: str, file: Path, repeats: int) -> tuple[str, ...]:
-    """Of one scene."""
-    expected = _in_a_process("--predict", file)
-    runs = [_in_a_process("--measure", file) for _ in range(repeats)]
+def row(name: str, file: Path, repeats: int, *, again: bool) -> tuple[str, ...]:
+    """Of one scene, whose functions were compiled before if it is run `again`."""
+    if again:
+        _in_a_process("--measure", file, keep=True)
+    expected = _in_a_process("--predict", file, keep=again)
+    runs = [_in_a_process("--measure", file, keep=again) for _ in range(repeats)]
     quantities = ("seconds", "processor", "memory")
     found = {one: median(run[one] for run in runs) for one in quantities}
     cells: list[str] = []
@@ -151,9 +223,10 @@ def row(name: str, file: Path, repeats: int) -> tuple[str, ...]:
     return (name, *work, *cells, parts)
 
 
-def _in_a_process(what: str, file: Path) -> dict[str, Any]:
-    for store in (COMPILED, COMPILATIONS):  # every run is a first one, and so predicted
-        store.clear()
+def _in_a_process(what: str, file: Path, *, keep: bool) -> dict[str, Any]:
+    if not keep:
+        for store in (COMPILED, COMPILATIONS):  # every run is a first one, and so predicted
+            store.clear()
     command = [sys.executable, __file__, what, str(file)]
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     if done.returncode:
@@ -168,6 +241,7 @@ def main() -> None:
     )
     parser.add_argument("which", nargs="*", help="words of the scenes wanted; all by default")
     parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--again", action="store_true", help="runs for which all is compiled")
     parser.add_argument("--threads", type=int, help="as many as there are cores by default")
     parser.add_argument("--predict", type=Path, help="this scene only, as JSON")
     parser.add_argument("--measure", type=Path, help="this scene only, as JSON")
@@ -189,7 +263,7 @@ def main() -> None:
         for k, name in enumerate(wanted):
             file = Path(folder) / f"scene{k}.toml"
             file.write_text(SCENES[name]().scene().to_toml(), encoding="utf-8")
-            rows.append(row(name, file, options.repeats))
+            rows.append(row(name, file, options.repeats, again=options.again))
             print(*rows[-1], sep="  ", file=sys.stderr, flush=True)
     each = ("predicted", "measured", "ratio")
     table = Table(

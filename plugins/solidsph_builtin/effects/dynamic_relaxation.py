@@ -52,8 +52,7 @@ class DynamicRelaxation(Effect):
     def bind(self, model: DiscreteModel, label: str) -> Load:
         return _Relaxation(
             label=label,
-            shape=(model.particles.count, model.particles.dimension),
-            masses=model.masses,
+            masses=np.repeat(model.masses[:, None], model.particles.dimension, axis=1),
             damping=self.damping,
             damping_rate=_CAP * lattice_frequency(model.bodies),
         )
@@ -63,15 +62,14 @@ class DynamicRelaxation(Effect):
 @attrs.frozen(eq=False)
 class _Relaxation(Load):
     label: str
-    shape: tuple[int, int]  # (n, d)
-    masses: Array  # (n,) [kg]
+    masses: Array  # (n, d), of a particle for each axis: products of whole arrays are quicker [kg]
     damping: float
     damping_rate: float  # largest [1/s]
 
     @property
     def arrays(self) -> Mapping[str, int]:
-        n, d = self.shape
-        return {"masses": 8 * n, "first step": 2 * 8 * n * d, "last velocity": 8 * n * d}
+        size = self.masses.nbytes
+        return {"masses": size, "first step": 2 * size, "last velocity": size}
 
     @property
     def particles(self) -> Indices:
@@ -90,29 +88,32 @@ class _Relaxation(Load):
         elif last is None:
             kept = {self._named("last velocity"): velocities}
         else:
-            # Acceleration by all other forces: without the part of this damping.
-            acceleration = (velocities - last) / step + c * velocities
-            first = (
-                memory.get(self._named("first position"), positions),
-                memory.get(self._named("first acceleration"), acceleration),
-            )
-            c = self._rate(positions - first[0], acceleration - first[1], c)
+            first = memory.get(self._named("first position"), positions)
+            change = velocities - last
+            # The acceleration by all other forces, without the part of this damping, is
+            # change / step + c velocities.
+            first_acceleration = memory.get(self._named("first acceleration"))
+            if first_acceleration is None:
+                first_acceleration = change / step + c * velocities
+            way = positions - first
+            weighted = self.masses * way
+            power = _product(weighted, change) / step + c * _product(weighted, velocities)
+            power -= _product(weighted, first_acceleration)
+            c = self._rate(_product(weighted, way), power, c)
             kept = {
-                self._named("first position"): first[0],
-                self._named("first acceleration"): first[1],
+                self._named("first position"): first,
+                self._named("first acceleration"): first_acceleration,
                 self._named("last velocity"): velocities,
                 self._named("rate"): np.array([c]),
             }
-        return -c * self.masses[:, None] * velocities, kept
+        force = self.masses * velocities
+        force *= -c
+        return force, kept
 
     def _named(self, name: str) -> str:
         return f"{self.label}: {name}"
 
-    def _rate(self, way: Array, acceleration: Array, c: float) -> float:
-        weighted = self.masses[:, None] * way
-        weight, power = (
-            float(np.einsum("ni,ni->", weighted, change)) for change in (way, acceleration)
-        )
+    def _rate(self, weight: float, power: float, c: float) -> float:
         # The rate is kept before the first motion and while a load drives the body on.
         if not (weight > 0.0 and power < 0.0):
             return c
@@ -121,3 +122,8 @@ class _Relaxation(Load):
     def report(self, observation: Observation) -> Mapping[str, float]:
         rate = observation.state.memory.get(self._named("rate"), np.zeros(1))
         return {f"{self.label} rate [1/s]": float(rate[0])}
+
+
+def _product(a: Array, b: Array) -> float:
+    """Sum of the products of all numbers."""
+    return float(np.einsum("i,i->", a.ravel(), b.ravel()))
