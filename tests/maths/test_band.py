@@ -45,8 +45,15 @@ def test_what_is_not_symmetric_has_none(place: tuple[int, int], mirrored: float)
     assert band_factors(csr_array(whole)) is None
 
 
+def test_rounding_that_stands_alone_is_left_out() -> None:
+    """Sums that cancel on one side of the diagonal only are not stored there."""
+    whole = symmetric(6.0).tolil()
+    whole[3, 40] = 1e-16
+    assert band_factors(csr_array(whole)) is not None
+
+
 def test_a_band_that_would_fill_the_memory_is_left_to_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(band, "_MOST", 100)
+    monkeypatch.setattr(band, "MOST_IN_BAND", 100)
     assert band_factors(symmetric(4.0)) is None

@@ -15,8 +15,8 @@ from threadpoolctl import ThreadpoolController
 
 from solidsph.maths.arrays import Array, Indices
 
-# Numbers in a band that are worth their memory, half a gigabyte.
-_MOST = 60_000_000
+MOST_IN_BAND = 60_000_000
+"""Numbers that are worth their memory, half a gigabyte."""
 
 # Difference from its transpose that is rounding, over the largest number on the diagonal.
 _ROUNDING = 1e-9
@@ -44,6 +44,9 @@ def band_factors(matrix: csr_array) -> BandFactors | None:
     Slender and small bodies have narrow bands, in which LAPACK takes a quarter to a tenth of the
     time of a sparse factorisation. Rows are in the order of Cuthill and McKee (1969), reversed.
     """
+    difference, largest = (matrix - matrix.T).data, np.abs(matrix.diagonal()).max(initial=0.0)
+    if np.abs(difference).max(initial=0.0) > _ROUNDING * largest:
+        return None
     count = matrix.shape[0]
     order = reverse_cuthill_mckee(matrix, symmetric_mode=True).astype(np.intp)
     places = np.empty(count, dtype=np.intp)
@@ -51,16 +54,11 @@ def band_factors(matrix: csr_array) -> BandFactors | None:
     rows, columns = np.repeat(places, np.diff(matrix.indptr)), places[matrix.indices]
     below = rows - columns
     width = int(below.max(initial=0))
-    if (width + 1) * count > _MOST:
+    if (width + 1) * count > MOST_IN_BAND:
         return None
     band = np.zeros((width + 1, count), order="F")
-    lower, upper = below >= 0, (below < 0) & (below >= -width)
+    lower = below >= 0
     band[below[lower], columns[lower]] = matrix.data[lower]
-    mirrored = band[-below[upper], rows[upper]]
-    if 2 * upper.sum() + (below == 0).sum() != below.size or np.any(
-        np.abs(matrix.data[upper] - mirrored) > _ROUNDING * np.abs(band[0]).max(initial=0.0)
-    ):
-        return None
     with _one_thread():
         factors, info = dpbtrf(band, lower=1, overwrite_ab=1)
     return None if info else BandFactors(order, factors)
