@@ -1,6 +1,7 @@
 """The coefficients of the cost model, measured: prints src/solidsph/costs/coefficients.py.
 
     python benchmarks/fit_costs.py --rows rows.pickle > src/solidsph/costs/coefficients.py
+    python benchmarks/fit_costs.py --only iteration compile > new.py        the others stay
 
 Each body is built and run in a process of its own, on one thread, and every phase is timed by the
 clock of the processor, which other programs disturb least. The terms of each phase come from the
@@ -19,6 +20,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import prod
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -30,6 +32,7 @@ from scipy.optimize import nnls
 from solidsph import Simulation
 from solidsph.costs import terms
 from solidsph.costs.calibration import Calibration, measure_calibration
+from solidsph.costs.coefficients import COEFFICIENTS, REFERENCE
 from solidsph.costs.count import count_work
 from solidsph.costs.process import memory_now, peak_memory
 from solidsph.costs.terms import CostTerm
@@ -60,6 +63,7 @@ class Specimen:
     symmetry: bool = False
     steps: int = 40
     statics: bool = False
+    bare: bool = False  # nothing of the scheme is named
     threads: int = 1
     outputs: int = 20
 
@@ -75,6 +79,16 @@ class Specimen:
         discretisation = dict(self.discretisation)
         if self.symmetry:
             discretisation |= {"ghosts": 3, "ghost_faces": ["right"]}
+        if self.bare:
+            return (
+                Simulation.builder()
+                .body("body", shape=shape, spacing=SPACING)
+                .material(self.material, **numbers)
+                .boundary("clamp", where="left")
+                .effect(GRAVITY)
+                .statics(solver="direct")
+                .duration(1.0)
+            )
         builder = (
             Simulation.builder()
             .body("body", shape=shape, spacing=SPACING, discretisation=discretisation)
@@ -90,7 +104,7 @@ class Specimen:
         for effect in self.effects:
             builder = builder.effect(effect)
         if self.statics:
-            return builder.statics().effect(GRAVITY).duration(1.0)
+            return builder.statics(solver="direct").effect(GRAVITY).duration(1.0)
         return (
             builder.initial(velocity={"x": "0.01*X"})
             .integrator("central-difference", time_step=STEP)
@@ -141,6 +155,17 @@ def specimens() -> Iterable[Specimen]:
     yield Specimen((40, 40, 30), "compiled", steps=5, discretisation=JITTERED)
     for cells in ((20, 20), (60, 10), (60, 40), (100, 60), (4, 4, 12), (7, 7, 7), (9, 9, 9)):
         yield Specimen(cells, "matrix", statics=True)
+    for cells in (
+        (12, 12),
+        (30, 30),
+        (60, 60),
+        (100, 4),
+        (200, 16),
+        (3, 3, 12),
+        (6, 6, 12),
+        (8, 8, 16),
+    ):
+        yield Specimen(cells, "auto", statics=True, bare=True)
     for cells in ((350, 20), (240, 12), (150, 30), (400, 6)):  # slender
         yield Specimen(cells, "matrix", statics=True)
     for cells in ((60, 20), (141, 9)):
@@ -222,10 +247,13 @@ TERMS: Mapping[str, Callable[[Work], Iterable[CostTerm]]] = {
 }
 
 
-def fitted(rows: Sequence[tuple[Work, dict[str, float]]], units: Calibration) -> dict[str, float]:
+def fitted(
+    rows: Sequence[tuple[Work, dict[str, float]]], units: Calibration, phases: Iterable[str]
+) -> dict[str, float]:
     """Coefficients by name, phase by phase."""
     found: dict[str, float] = {}
-    for phase, of_work in TERMS.items():
+    for phase in phases:
+        of_work = TERMS[phase]
         own = [(list(of_work(work)), values[phase]) for work, values in rows if phase in values]
         own = [(row, value) for row, value in own if row]
         if not own:
@@ -275,6 +303,15 @@ from solidsph.costs.calibration import Calibration
 '''
 
 
+# The specimens that a phase needs: compiling takes as long for a small body.
+_OF_FEW: Mapping[str, Callable[[Specimen], bool]] = {
+    "iteration": lambda one: one.statics,
+    "compile": lambda one: (
+        one.engine.startswith("compiled") and (prod(one.cells) <= 5000 or one.threads > 1)
+    ),
+}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -283,8 +320,16 @@ def main() -> None:
         "--one", type=int, help="measure this specimen only, and pickle what is found"
     )
     parser.add_argument("--rows", type=Path, help="keep what was measured here, and go on from it")
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        choices=_OF_FEW,
+        default=[],
+        help="fit these phases only, by the specimens that they need",
+    )
     options = parser.parse_args()
-    several = list(specimens())
+    needed = [_OF_FEW[phase] for phase in options.only] or [lambda one: True]
+    several = [one for one in specimens() if any(need(one) for need in needed)]
     if options.one is not None:
         sys.stdout.buffer.write(pickle.dumps(measured(several[options.one])))
         return
@@ -299,6 +344,7 @@ def main() -> None:
             continue
         begun = time.perf_counter()
         command = [sys.executable, __file__, "--one", f"{k}"]
+        command += ["--only", *options.only] if options.only else []
         with tempfile.TemporaryDirectory() as empty:  # so that nothing has been compiled before
             own = {"NUMBA_NUM_THREADS": f"{specimen.threads}", CACHE: empty}
             done = subprocess.run(
@@ -312,13 +358,17 @@ def main() -> None:
         if options.rows:
             options.rows.write_bytes(pickle.dumps(kept))
     units = Calibration(**kept["units"])
-    coefficients = fitted([kept[repr(one)] for one in several], units)
-    rows = "".join(f'    "{name}": {value:.4g},\n' for name, value in sorted(coefficients.items()))
+    rows = [kept[repr(one)] for one in several]
+    coefficients = fitted(rows, units, options.only or TERMS)
+    if options.only:
+        coefficients = {**COEFFICIENTS, **coefficients}
+        kept["units"] = attrs.asdict(REFERENCE)
+    lines = "".join(f'    "{name}": {value:.4g},\n' for name, value in sorted(coefficients.items()))
     machine = "".join(f"    {name}={_number(value)},\n" for name, value in kept["units"].items())
     sys.stdout.write(
         f"{HEAD}# Of the machine that they were measured on.\n"
         f"REFERENCE = Calibration(\n{machine})\n\n"
-        f"COEFFICIENTS: Mapping[str, float] = {{\n{rows}}}\n"
+        f"COEFFICIENTS: Mapping[str, float] = {{\n{lines}}}\n"
     )
 
 

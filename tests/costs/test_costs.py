@@ -20,10 +20,10 @@ from solidsph.costs import calibration, microbenchmarks, timing
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.cluster import Cluster, estimate_on_cluster
 from solidsph.costs.coefficients import REFERENCE
-from solidsph.costs.count import ITERATIONS, count_work
+from solidsph.costs.count import ITERATIONS, count_work, expected_products
 from solidsph.costs.effect_shares import effect_shares, without
 from solidsph.costs.estimate import ball, cut_off, estimate_work, lattice_neighbours
-from solidsph.costs.factorisation import estimate_factorisation
+from solidsph.costs.factorisation import estimate_dissection, estimate_factorisation
 from solidsph.costs.model import Built, coefficient, predict
 from solidsph.costs.prediction import predict_run
 from solidsph.costs.timing import time_uncounted
@@ -32,6 +32,7 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.plan import CompilationUnit, SumMethod
 from solidsph.interfaces.terms import Load
+from solidsph.registry.construct import construct
 from solidsph.run.cfl_step import cfl_step
 from solidsph.system.cache import CACHE
 from tests.commands.test_cli import solidsph
@@ -151,15 +152,37 @@ def test_a_statics_scene_counts_iterations_and_what_its_factors_take() -> None:
 
 
 def test_what_nothing_separates_is_a_full_block() -> None:
-    full = estimate_factorisation((4.0, 3.0), reach=4.0, components=2)
+    full = estimate_dissection((4.0, 3.0), reach=4.0, components=2)
     assert full.fill == (2 * 12) ** 2
     assert full.multiplications == (2 * 12) ** 3 // 3
+
+
+def test_a_band_is_as_wide_as_the_layers_that_are_coupled() -> None:
+    band = estimate_factorisation((100.0, 3.0), reach=4.0, components=2)
+    assert band.banded
+    assert band.fill == 600 * (24 + 1)
+    assert band.multiplications == 600 * 24**2 // 2
+    assert estimate_factorisation((4.0, 3.0), reach=9.0, components=1).fill == 12 * 12  # full
+    wide = (300.0, 300.0)  # more than half a gigabyte
+    assert estimate_factorisation(wide, 5.0, 2) == estimate_dissection(wide, 5.0, 2)
+
+
+def test_products_grow_towards_incompressibility() -> None:
+    """Measured: 147 and 626 with 8281 particles in space."""
+    few, many = (
+        expected_products(
+            construct("materials", {"type": "neo-hookean", **SOFT, "poissons_ratio": nu})
+        )
+        for nu in (0.3, 0.49)
+    )
+    assert few == pytest.approx(147, rel=0.3)
+    assert many == pytest.approx(626, rel=0.3)
 
 
 def test_dissection_grows_as_the_theory_says() -> None:
     """n log n entries and n^(3/2) multiplications in the plane, n^(4/3) and n^2 in space."""
     for d, (entries, work) in {2: (1.0, 1.5), 3: (4.0 / 3.0, 2.0)}.items():
-        small, large = (estimate_factorisation((side,) * d, 1.0, 1) for side in (4096.0, 8192.0))
+        small, large = (estimate_dissection((side,) * d, 1.0, 1) for side in (4096.0, 8192.0))
         grown = 2.0**d
         # The logarithm is what is left of the plane's entries: 13/12 at these sizes.
         assert large.fill / small.fill == pytest.approx(grown**entries, rel=0.12)

@@ -115,7 +115,7 @@ def work_rows(work: Work) -> list[Row]:
     solver = (
         ("products with the tangent", work.statics.products, "of conjugate gradients, a guess")
         if work.statics.products
-        else ("entries of the factors", work.statics.fill, "by nested dissection of the box")
+        else ("entries of the factors", work.statics.fill, "estimated for the body's box")
     )
     return counts + rows(
         ("iterations", work.statics.iterations, "of Newton's method, a guess"), solver

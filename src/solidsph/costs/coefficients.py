@@ -1,6 +1,7 @@
-"""Coefficients of the cost model, in units of a calibration, or in bytes.
+"""Coefficients of the cost model, in units of a calibration; those of memory in bytes.
 
-Printed by `python benchmarks/fit_costs.py`, which describes the measurement; do not edit by hand.
+Printed by `python benchmarks/fit_costs.py`, which says how they are measured; nothing here is
+edited by hand.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from collections.abc import Mapping
 
 from solidsph.costs.calibration import Calibration
 
-# Calibration of the machine on which they were measured.
+# Of the machine that they were measured on.
 REFERENCE = Calibration(
     sparse=2.309e-09,
     calls=2.672e-07,
@@ -70,6 +71,10 @@ COEFFICIENTS: Mapping[str, float] = {
     "WEIGHTS 2D pair": 0,
     "WEIGHTS 3D pair": 256.2,
     "WEIGHTS call": 7.077e04,
+    "band entry 2D": 0,
+    "band entry 3D": 22.57,
+    "band multiplication 2D": 0.06252,
+    "band multiplication 3D": 0,
     "build": 3.139e05,
     "build force 1D": 348.6,
     "build force 2D": 227.4,
@@ -98,8 +103,8 @@ COEFFICIENTS: Mapping[str, float] = {
     "compile FIELDS by threads": 158.7,
     "compile FORCES": 0,
     "compile FORCES by threads": 0,
-    "compile LOAD": 0,
     "compile HOURGLASS_LOAD": 121.4,
+    "compile LOAD": 0,
     "compile MOVING": 19.16,
     "compile MOVING_ENGINE": 76.93,
     "compile PAIR_LOAD": 33.7,
@@ -131,7 +136,7 @@ COEFFICIENTS: Mapping[str, float] = {
     "factor multiplication 3D": 0,
     "file": 22.32,
     "file particle": 190.8,
-    "iteration": 7.633e04,
+    "iteration": 1.301e05,
     "memory held 1D": 0.7809,
     "memory held 2D": 1.303,
     "memory held 3D": 1.825,
@@ -141,8 +146,8 @@ COEFFICIENTS: Mapping[str, float] = {
     "memory of FIELDS by threads": 0,
     "memory of FORCES": 0,
     "memory of FORCES by threads": 0,
-    "memory of LOAD": 0,
     "memory of HOURGLASS_LOAD": 7.398e07,
+    "memory of LOAD": 0,
     "memory of MOVING": 1.592e07,
     "memory of MOVING_ENGINE": 1.796e08,
     "memory of PAIR_LOAD": 2.827e07,
@@ -199,10 +204,10 @@ COEFFICIENTS: Mapping[str, float] = {
     "output": 0.965,
     "output byte": 0,
     "output condition": 128.8,
+    "output hourglass pair": 14.24,
     "output large particle 1D": 214.3,
     "output large particle 2D": 86.2,
     "output large particle 3D": 110,
-    "output hourglass pair": 14.24,
     "output particle anew 1D": 57.94,
     "output particle anew 2D": 1290,
     "output particle anew 3D": 4639,
@@ -234,7 +239,7 @@ COEFFICIENTS: Mapping[str, float] = {
     "step particle 2D": 0.832,
     "step particle 3D": 0,
     "tangent entry 2D": 0,
-    "tangent entry 3D": 27.31,
-    "tangent pair 2D": 685.7,
+    "tangent entry 3D": 53.26,
+    "tangent pair 2D": 791.2,
     "tangent pair 3D": 0,
 }

@@ -16,7 +16,13 @@ from math import ceil, floor, pi
 import attrs
 import numpy as np
 
-from solidsph.costs.count import ITERATIONS, full_box, iterated_work, record_bytes
+from solidsph.costs.count import (
+    ITERATIONS,
+    expected_products,
+    full_box,
+    iterated_work,
+    record_bytes,
+)
 from solidsph.costs.factorisation import estimate_factorisation
 from solidsph.costs.work import Loop, StaticWork, Work
 from solidsph.interfaces.effect import Effect
@@ -52,6 +58,7 @@ class BodyEstimate:
     cells: tuple[float, ...]  # particles along each axis of its box
     lattice: bool  # whether it has the default discretisation
     remembers: bool  # whether its material has internal variables
+    products: int  # with the tangent in a load step, if it is iterated
 
 
 def estimate_work(scene: Scene) -> Work:
@@ -125,6 +132,7 @@ def _body(scene: Scene, body: BodyScene, cover: float) -> BodyEstimate:
         cells=full_box(sides, particles),
         lattice=lattice,
         remembers=isinstance(material, HistoryMaterial),
+        products=expected_products(material),
     )
 
 
@@ -179,7 +187,8 @@ def _statics(scene: Scene, bodies: Sequence[BodyEstimate], d: int, cover: float)
     remembers = any(body.remembers for body in bodies)
     steps = load_steps(scene.statics.load_steps, remembers=remembers)
     if iterates(scene.statics.solver, d, unknowns):
-        return iterated_work(steps, steps * ITERATIONS, unknowns)
+        products = steps * max(body.products for body in bodies)
+        return iterated_work(steps, steps * ITERATIONS, unknowns, products)
     reach = 2.0 * cover
     factors = [estimate_factorisation(body.cells, reach, d) for body in bodies]
     return StaticWork(
@@ -189,4 +198,5 @@ def _statics(scene: Scene, bodies: Sequence[BodyEstimate], d: int, cover: float)
         entries=round(sum(b.particles for b in bodies) * ball(reach, d) * d * d),
         fill=sum(part.fill for part in factors),
         multiplications=sum(part.multiplications for part in factors),
+        banded=all(part.banded for part in factors),
     )

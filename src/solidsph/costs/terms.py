@@ -130,11 +130,20 @@ def iteration_terms(work: Work) -> Iterator[CostTerm]:
     """One iteration of Newton's method."""
     statics, d = work.statics, work.dimension
     assert statics is not None
+    if statics.products:
+        yield CostTerm(f"linearised particle {d}D", work.particles, Unit.SPARSE)
+        return
     yield CostTerm("iteration", 1.0, Unit.CALLS)
     yield CostTerm(f"tangent pair {d}D", work.pairs, Unit.SPARSE)
     yield CostTerm(f"tangent entry {d}D", statics.entries, Unit.SPARSE)
-    yield CostTerm(f"factor entry {d}D", statics.fill, Unit.SPARSE)
-    yield CostTerm(f"factor multiplication {d}D", statics.multiplications, Unit.SPARSE)
+    factor = "band" if statics.banded else "factor"
+    yield CostTerm(f"{factor} entry {d}D", statics.fill, Unit.SPARSE)
+    yield CostTerm(f"{factor} multiplication {d}D", statics.multiplications, Unit.SPARSE)
+
+
+def product_terms(work: Work) -> Iterator[CostTerm]:
+    """What goes with a product with the tangent: the preconditioner."""
+    yield CostTerm(f"preconditioned particle {work.dimension}D", work.particles, Unit.SPARSE)
 
 
 def build_memory(work: Work) -> Iterator[CostTerm]:

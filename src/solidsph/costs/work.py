@@ -26,8 +26,9 @@ class StaticWork:
     iterations: int
     freedoms: int  # unknowns
     entries: int  # of the tangent
-    fill: int  # entries of its factors, by nested dissection of the body's box
+    fill: int  # entries of its factors, estimated for the body's box
     multiplications: int  # of the factorisation, likewise
+    banded: bool = False  # the factors are kept in a band
     products: int = 0  # with the tangent in all, an estimate; 0 if it is factorised
 
 
