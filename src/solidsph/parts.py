@@ -40,7 +40,7 @@ from solidsph.interfaces.plan import (
     SumMethod,
 )
 from solidsph.interfaces.row_weights import RowWeights
-from solidsph.interfaces.shape import Shape, Surface
+from solidsph.interfaces.shape import Moments, Shape, Surface
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel, smoothing_kernel
 from solidsph.interfaces.subset import Subset
 from solidsph.interfaces.terms import (
@@ -137,6 +137,7 @@ __all__ = [
     "Material",
     "Measurement",
     "Memory",
+    "Moments",
     "Need",
     "Observation",
     "OneSceneCase",

@@ -13,7 +13,12 @@ from solidsph.results.checkpoint import START_OVER, Checkpoint, checkpoint_path,
 from solidsph.results.environment import differences, is_part, part_versions, run_environment
 from solidsph.results.record import Record
 from solidsph.results.recorder import COMPOSED, scene_text
-from solidsph.results.resume_checks import check_same_output, check_same_particles
+from solidsph.results.resume_checks import (
+    check_same_files,
+    check_same_output,
+    check_same_particles,
+)
+from solidsph.results.scene_files import FILE
 from solidsph.results.sole_writer import check_no_writer
 from solidsph.run.outcome import Result, is_over
 from solidsph.run.restart_point import RestartPoint
@@ -65,7 +70,7 @@ def resume(
     Raises:
         RecordError: the run is finished; the record or its checkpoint cannot be read or do not
             belong together; another run is writing it; or something has changed that the last
-            digits depend on, such as a version, or the particles in a file.
+            digits depend on, such as a version, or a file that a body is read from.
     """
     run = pending(Path(path), simulation=simulation, until=until, force=force)
     if run is None:
@@ -96,6 +101,7 @@ def pending(
         check_same_particles(record, simulation.particles, exactly=not force)
         simulation = _as_before(simulation, checkpoint)
         if not force:
+            check_same_files(record)
             _check_environment(record, checkpoint, simulation)
         notes = list(record.notes)
         if until is not None:
@@ -163,7 +169,11 @@ def _check_environment(
 
 def _recorded_environment(record: Record) -> Mapping[str, str]:
     """The part of the environment that the record itself holds."""
-    software = {k: v for k, v in record.versions.items() if k not in ("h5py", "hdf5")}
+    software = {
+        name: version
+        for name, version in record.versions.items()
+        if name not in ("h5py", "hdf5") and not name.startswith(FILE)
+    }
     return {**software, **part_versions(record.plugins)}
 
 

@@ -16,12 +16,16 @@ _AT = 1e-9
 
 
 def on_boundary(shape: Shape, surface: Surface, points: Array, spacing: float) -> Array:
-    """`points` (m, d) close to the boundary, moved onto it along the gradient of the distance [m].
+    """`points` (m, d) close to the boundary, moved to the nearest places on it, or along the
+    gradient of the distance where these are not known [m].
 
     Args:
         surface: samples of the boundary, the last resort where the gradient leads nowhere.
         spacing: of the particles [m].
     """
+    found = shape.nearest(points)
+    if found is not None:
+        return found
     d, tolerance = points.shape[1], 1e-14 * spacing
     points = points.copy()
     for _ in range(_STEPS):

@@ -6,7 +6,7 @@ from typing import final
 
 import attrs
 
-from solidsph.interfaces.shape import Shape, Surface
+from solidsph.interfaces.shape import Moments, Shape, Surface
 from solidsph.maths.arrays import Array
 
 
@@ -42,3 +42,9 @@ class _SampledOnce(Shape):
 
     def volume(self) -> float | None:
         return self.of.volume()
+
+    def moments(self, about: Array) -> Moments | None:
+        return self.of.moments(about)
+
+    def nearest(self, points: Array) -> Array | None:
+        return self.of.nearest(points)

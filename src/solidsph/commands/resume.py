@@ -19,7 +19,7 @@ from solidsph.run.outcome import UNSOUND
 @attrs.frozen
 class _Options(Output):
     until: float | None = option("Extend the run to this time [s].", type=float, metavar="T")
-    force: bool = flag("Resume even if versions, plugins or threads have changed.")
+    force: bool = flag("Resume even if versions, plugins, files or threads have changed.")
 
 
 @click.command()

@@ -19,6 +19,15 @@ class Surface:
     faces: tuple[str, ...]  # (m,) the named face of each sample
 
 
+@attrs.frozen(eq=False)
+class Moments:
+    """Integrals over a shape, with x from some point."""
+
+    volume: float  # of 1 [m^d]
+    first: Array  # of x, (d,) [m^(d+1)]
+    second: Array  # of x x^T, (d, d) [m^(d+2)]
+
+
 class Shape(Part):
     """A closed region in 1, 2 or 3 dimensions.
 
@@ -58,3 +67,12 @@ class Shape(Part):
     @abstractmethod
     def volume(self) -> float | None:
         """Length, area or volume [m^d]; None if no closed form is known."""
+
+    def moments(self, about: Array) -> Moments | None:
+        """Exact moments about a point (d,) [m]; None if no closed form is known."""
+        return None
+
+    def nearest(self, points: Array) -> Array | None:
+        """The places on the boundary nearest to `points` (n, d), (n, d) [m]; None if they are only
+        known by the distance."""
+        return None

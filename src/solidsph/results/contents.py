@@ -44,7 +44,8 @@ class Output:
         return digest.digest()
 
 
-def _installed() -> dict[str, str]:
+def installed() -> dict[str, str]:
+    """Versions of the software that this process uses, by its name."""
     names = ("solidsph", "numpy", "scipy", "h5py")
     versions = {name: metadata.version(name) for name in names}
     return {**versions, "hdf5": h5py.version.hdf5_version, "python": platform.python_version()}
@@ -61,7 +62,7 @@ class Reference:
     columns: Mapping[str, str]  # unit of each column of the history, by its name
     # Where relative paths in the scene begin.
     folder: str = attrs.field(factory=lambda: str(working_folder()))
-    versions: Mapping[str, str] = attrs.field(factory=_installed)  # of the software used
+    versions: Mapping[str, str] = attrs.field(factory=installed)  # of software, digests of files
     notes: Sequence[str] = ()  # what happened to the run, one line each
 
     def digest(self) -> bytes:

@@ -70,7 +70,8 @@ class Record:
             accuracy was asked for.
         scene: what was asked for, as TOML text.
         plugins: every part used.
-        versions: of the software that produced the run, by its name.
+        versions: of the software that produced the run, by its name; digests of the files that
+            bodies were read from, by "file PATH".
         notes: what happened to the run: that it was extended, or rolled back.
         folder: where relative paths in the scene begin.
         outcome: "finished", "diverged: ...", "stopped: ..."; "running" if it runs or was killed.

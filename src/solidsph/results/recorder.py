@@ -11,12 +11,13 @@ import numpy as np
 from solidsph.errors import RecordError, SceneError
 from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array
-from solidsph.results.contents import Output, Reference
+from solidsph.results.contents import Output, Reference, installed
 from solidsph.results.earlier_run import check_no_other_file
 from solidsph.results.layout import PluginUsed
 from solidsph.results.output_fields import fields, history, split_unit
 from solidsph.results.record import Record
 from solidsph.results.record_writer import RecordWriter
+from solidsph.results.scene_files import file_versions
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.energy import KINETIC, STRAIN, kinetic_energy, strain_energy
 from solidsph.run.hooks import implementation
@@ -84,14 +85,17 @@ class Recorder:
             first = (earlier.history[name][0] for name in (KINETIC, STRAIN))
             self._initial_energy = float(sum(first))
         columns = self._history(simulation, observation)
+        text = scene_text(simulation)
+        folder = str(working_folder()) if self._folder is None else self._folder
         reference = Reference(
             particles=simulation.particles,
-            scene=scene_text(simulation),
+            scene=text,
             plugins=[PluginUsed.of(entry) for entry in simulation.parts],
             fields=[field for field, _ in fields(observation, simulation.terms)],
             columns={name: split_unit(name)[1] for name in columns},
             notes=() if self._since is None else self._since.notes,
-            folder=str(working_folder()) if self._folder is None else self._folder,
+            folder=folder,
+            versions={**installed(), **file_versions(text, Path(folder))},
         )
         outputs = () if earlier is None else _outputs(earlier, self._kept_until)
         LOG.info("recording into %s", self._path)

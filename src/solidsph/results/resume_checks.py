@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator
 from typing import Any
 
@@ -15,7 +14,9 @@ from solidsph.results.checkpoint import START_OVER, Checkpoint
 from solidsph.results.layout import PARTICLE_ARRAYS
 from solidsph.results.output_fields import stress
 from solidsph.results.record import Record
+from solidsph.results.scene_files import FILE, file_versions, scene_files
 from solidsph.run.built_scene import BuiltScene
+from solidsph.system.files import working_folder
 
 # Other versions of libraries may round differently; a larger difference, in spacings, is a change.
 _ROUNDING = 1e-9
@@ -30,13 +31,29 @@ def check_same_particles(record: Record, built: Particles, *, exactly: bool) -> 
     difference = next(_differences(record.particles, built, exactly), None)
     if difference is None:
         return
-    files = ", ".join(f"{name!r}" for name in dict.fromkeys(_files(record.scene)))
+    files = ", ".join(f"{name!r}" for name in dict.fromkeys(scene_files(record.scene)))
     where = f" (the scene reads {files}, relative to {record.folder})" if files else ""
     raise RecordError(
         f"the run in {record.path} cannot go on: the scene no longer gives the particles that it "
         f"was begun with{where}: {difference}. Restore what the scene reads, or run it again, into "
         "another record"
     )
+
+
+def check_same_files(record: Record) -> None:
+    """Raise RecordError unless the files that bodies are read from are those of the record."""
+    now = file_versions(record.scene, working_folder())
+    changed = [
+        repr(name.removeprefix(FILE))
+        for name, digest in record.versions.items()
+        if name.startswith(FILE) and now.get(name) != digest
+    ]
+    if changed:
+        raise RecordError(
+            f"the run in {record.path} cannot go on: {', '.join(changed)} (relative to "
+            f"{record.folder}) changed since it was begun, though the particles are the same. "
+            "Restore it, or force it (--force)"
+        )
 
 
 def check_same_output(
@@ -121,20 +138,3 @@ def _array_differences(
 
 def _short(value: Any) -> str:
     return np.array2string(np.asarray(value), precision=9, separator=", ")
-
-
-def _files(scene: str) -> Iterator[str]:
-    """Files that parts of the scene read."""
-    try:
-        yield from _file_entries(tomllib.loads(scene))
-    except tomllib.TOMLDecodeError:  # a scene composed in Python has no such form
-        return
-
-
-def _file_entries(value: Any) -> Iterator[str]:
-    items = value.items() if isinstance(value, dict) else enumerate(value)
-    for key, entry in items:
-        if isinstance(entry, (dict, list)):
-            yield from _file_entries(entry)
-        elif key == "file" and isinstance(entry, str):
-            yield entry

@@ -1,0 +1,144 @@
+"""Files of meshes: triangles, and the names of the groups that they are in."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import tempfile
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from solidsph.maths.arrays import Array, Indices
+from solidsph_builtin.shapes._libraries import geometry_library
+from solidsph_builtin.shapes._mesh_cells import outer_triangles
+from solidsph_builtin.shapes._step_files import triangulated
+
+# Some 5 million triangles in binary STL, twice as many as are taken.
+MOST_BYTES = 2**28
+MOST_TRIANGLES = 2_000_000
+
+# Bytes of a binary STL before its triangles, and of each.
+_STL_HEAD, _STL_TRIANGLE = 84, 50
+
+
+@attrs.frozen(eq=False)
+class Soup:
+    """Triangles as a file has them."""
+
+    vertices: Array  # (m, 3) in the unit of the file
+    corners: Indices  # (k, 3) vertices of each triangle
+    groups: Sequence[str]  # (k,) the group that each is in; empty for none
+
+
+def read_soup(data: bytes, suffix: str) -> Soup:
+    """The triangles in the content of a file whose name ends in `suffix`, such as ".stl".
+
+    Raises:
+        SceneError: the library that reads such files is not installed.
+        ValueError: the content is something else.
+    """
+    if suffix not in _READERS:
+        known = ", ".join(name.lstrip(".") for name in _READERS)
+        raise ValueError(f"no mesh files end in {suffix or 'nothing'!r}; use one of {known}")
+    if not data:
+        raise ValueError("it is empty")
+    with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
+        warnings.simplefilter("ignore")
+        with contextlib.redirect_stderr(io.StringIO()):
+            soup = _READERS[suffix](data, suffix)
+    if not len(soup.corners):
+        raise ValueError("there are no triangles in it")
+    if len(soup.corners) > MOST_TRIANGLES:
+        raise ValueError(_too_many(len(soup.corners)))
+    if soup.corners.min() < 0 or soup.corners.max() >= len(soup.vertices):
+        raise ValueError(f"a triangle has a corner that is none of the {len(soup.vertices)} points")
+    return soup
+
+
+def _too_many(count: int) -> str:
+    return f"it has {count:,} triangles, at most {MOST_TRIANGLES:,} are taken; make it coarser"
+
+
+def _stl(data: bytes, suffix: str) -> Soup:
+    count = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
+    if len(data) != _STL_HEAD + _STL_TRIANGLE * count:
+        if not data.lstrip().startswith(b"solid"):
+            size = _STL_HEAD + _STL_TRIANGLE * count
+            raise ValueError(
+                "it is no text that begins with 'solid', and as a binary file it should have "
+                f"{size:,} bytes by its header, not {len(data):,}"
+            )
+        if data.count(b"endfacet") != data.count(b"outer loop"):
+            raise ValueError("it ends within a facet")
+    elif count > MOST_TRIANGLES:
+        raise ValueError(_too_many(count))
+    return _by_trimesh(data, suffix)
+
+
+def _ply(data: bytes, suffix: str) -> Soup:
+    found = re.search(rb"element\s+face\s+(\d+)", data[:4096])
+    if found and int(found[1]) > MOST_TRIANGLES:
+        raise ValueError(_too_many(int(found[1])))
+    return _by_trimesh(data, suffix)
+
+
+def _obj(data: bytes, suffix: str) -> Soup:
+    return _by_trimesh(data, suffix, split_groups=True, split_objects=True, skip_materials=True)
+
+
+def _by_trimesh(data: bytes, suffix: str, **options: Any) -> Soup:
+    """Read by trimesh, which executes nothing and opens no other file."""
+    trimesh = geometry_library("trimesh")
+    try:
+        scene = trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], process=False, **options)
+    except Exception as cause:
+        raise ValueError(f"{type(cause).__name__}: {cause}") from cause
+    meshes = [
+        (name, mesh) for name, mesh in scene.geometry.items() if len(getattr(mesh, "faces", ()))
+    ]
+    if not meshes:
+        raise ValueError("there are no triangles in it")
+    counts = np.cumsum([0, *(len(mesh.vertices) for _, mesh in meshes)])
+    groups: list[str] = []
+    for name, mesh in meshes:
+        groups += [str(name) if len(meshes) > 1 else ""] * len(mesh.faces)
+    return Soup(
+        np.concatenate([np.asarray(mesh.vertices, dtype=np.float64) for _, mesh in meshes]),
+        np.concatenate([m.faces + n for (_, m), n in zip(meshes, counts, strict=False)]),
+        groups,
+    )
+
+
+def _by_meshlane(data: bytes, suffix: str) -> Soup:
+    """Read by meshlane, whose readers take the path of a file only."""
+    meshlane = geometry_library("meshlane")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"mesh{suffix}"
+        path.write_bytes(data)
+        try:
+            mesh = meshlane.read(path, _FORMATS[suffix])
+        except (Exception, SystemExit) as cause:
+            said = str(cause) if isinstance(cause, Exception) else "the reader gave up"
+            raise ValueError(f"{type(cause).__name__}: {said}") from cause
+    return Soup(*outer_triangles(mesh))
+
+
+def _step(data: bytes, suffix: str) -> Soup:
+    return Soup(*triangulated(data, suffix))
+
+
+_FORMATS: Mapping[str, str] = {".msh": "gmsh", ".inp": "abaqus", ".vtu": "vtu"}
+_READERS: Mapping[str, Callable[[bytes, str], Soup]] = {
+    ".stl": _stl,
+    ".obj": _obj,
+    ".ply": _ply,
+    **dict.fromkeys(_FORMATS, _by_meshlane),
+    ".step": _step,
+    ".stp": _step,
+}
