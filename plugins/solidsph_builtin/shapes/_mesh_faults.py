@@ -30,8 +30,8 @@ def faults(vertices: Array, corners: Indices) -> Iterator[str]:
     yield from _open(vertices, corners)
     yield from _turned(vertices, corners)
     surface = Triangles(vertices, corners, ("all",), np.zeros(len(corners), dtype=np.intp))
-    yield from _wrong_sides(surface)
     yield from _crossing(surface)
+    yield from _wrong_sides(surface)
 
 
 def _not_finite(vertices: Array, corners: Indices) -> Iterator[str]:

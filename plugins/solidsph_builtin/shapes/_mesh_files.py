@@ -45,13 +45,17 @@ def read_soup(data: bytes, suffix: str) -> Soup:
     """
     if suffix not in _READERS:
         known = ", ".join(name.lstrip(".") for name in _READERS)
-        raise ValueError(f"no mesh files end in {suffix or 'nothing'!r}; use one of {known}")
+        end = repr(suffix) if suffix else "nothing"
+        raise ValueError(f"no mesh files end in {end}; use one of {known}")
     if not data:
         raise ValueError("it is empty")
-    with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
+    with (
+        warnings.catch_warnings(),
+        contextlib.redirect_stdout(io.StringIO()),
+        contextlib.redirect_stderr(io.StringIO()),
+    ):
         warnings.simplefilter("ignore")
-        with contextlib.redirect_stderr(io.StringIO()):
-            soup = _READERS[suffix](data, suffix)
+        soup = _READERS[suffix](data, suffix)
     if not len(soup.corners):
         raise ValueError("there are no triangles in it")
     if len(soup.corners) > MOST_TRIANGLES:
@@ -92,13 +96,18 @@ def _obj(data: bytes, suffix: str) -> Soup:
     return _by_trimesh(data, suffix, split_groups=True, split_objects=True, skip_materials=True)
 
 
+def _unreadable(cause: BaseException, suffix: str) -> ValueError:
+    why = f" ({type(cause).__name__}: {cause})" if isinstance(cause, Exception) else ""
+    return ValueError(f"it cannot be read as {suffix[1:]}{why}; is it complete, and of that kind?")
+
+
 def _by_trimesh(data: bytes, suffix: str, **options: Any) -> Soup:
     """Read by trimesh, which executes nothing and opens no other file."""
     trimesh = geometry_library("trimesh")
     try:
         scene = trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], process=False, **options)
     except Exception as cause:
-        raise ValueError(f"{type(cause).__name__}: {cause}") from cause
+        raise _unreadable(cause, suffix) from cause
     meshes = [
         (name, mesh) for name, mesh in scene.geometry.items() if len(getattr(mesh, "faces", ()))
     ]
@@ -123,9 +132,8 @@ def _by_meshlane(data: bytes, suffix: str) -> Soup:
         path.write_bytes(data)
         try:
             mesh = meshlane.read(path, _FORMATS[suffix])
-        except (Exception, SystemExit) as cause:
-            said = str(cause) if isinstance(cause, Exception) else "the reader gave up"
-            raise ValueError(f"{type(cause).__name__}: {said}") from cause
+        except (Exception, SystemExit) as cause:  # meshlane ends the program where it fails
+            raise _unreadable(cause, suffix) from cause
     return Soup(*outer_triangles(mesh))
 
 

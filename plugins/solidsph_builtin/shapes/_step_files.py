@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +13,9 @@ import numpy as np
 from solidsph.maths.arrays import Array, Indices
 from solidsph_builtin.shapes._libraries import geometry_library
 from solidsph_builtin.shapes._mesh_repair import turned
+
+# Gmsh's own unit, whatever that of the file is [m].
+_UNIT = 1e-3
 
 # Triangles around a full circle.
 _AROUND = 64
@@ -36,11 +42,12 @@ def triangulated(data: bytes, suffix: str) -> tuple[Array, Indices, list[str]]:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _AROUND)
         gmsh.option.setNumber("General.NumThreads", 1)
-        gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"body{suffix}"
             path.write_bytes(data)
-            gmsh.model.occ.importShapes(str(path))
+            with _silent():
+                gmsh.model.occ.importShapes(str(path))
         gmsh.model.occ.synchronize()
         if not gmsh.model.getEntities(3):
             raise ValueError("there is no solid body in it")
@@ -48,17 +55,33 @@ def triangulated(data: bytes, suffix: str) -> tuple[Array, Indices, list[str]]:
         return _triangles(gmsh)
     except ValueError:
         raise
-    except Exception as cause:  # Gmsh raises these themselves
-        raise ValueError(f"Gmsh says: {cause}") from cause
+    except Exception as cause:  # all that Gmsh raises
+        raise ValueError("Gmsh cannot read it; is it complete?") from cause
     finally:
         gmsh.model.remove()
         gmsh.finalize() if ours else gmsh.model.setCurrent(before)
 
 
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keep what the reader of STEP files prints, past Python, off the terminal."""
+    kept = [os.dup(stream) for stream in (1, 2)]
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        for stream in (1, 2):
+            os.dup2(nowhere, stream)
+        yield
+    finally:
+        for stream, own in zip((1, 2), kept, strict=True):
+            os.dup2(own, stream)
+            os.close(own)
+        os.close(nowhere)
+
+
 def _triangles(gmsh: object) -> tuple[Array, Indices, list[str]]:
     mesh, model = gmsh.model.mesh, gmsh.model  # type: ignore[attr-defined]
     tags, coordinates, _ = mesh.getNodes()
-    points = np.asarray(coordinates, dtype=np.float64).reshape(-1, 3)
+    points = _UNIT * np.asarray(coordinates, dtype=np.float64).reshape(-1, 3)
     place = np.zeros(int(tags.max()) + 1, dtype=np.intp)
     place[tags.astype(np.intp)] = np.arange(len(tags))
     corners, groups = [], []
