@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain, compress
 from reprlib import repr as short
 from typing import Any
@@ -15,11 +15,27 @@ from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes._checks import as_tuple, refusal
 from solidsph_builtin.shapes._sampling import unit
+from solidsph_builtin.shapes.named import Named
 
 
 def as_parts(value: Any) -> Any:
-    """One shape, or a list of them, as a tuple; anything else unchanged."""
+    """One shape, a list, or a table of them by name, as a tuple; anything else unchanged."""
+    if isinstance(value, Mapping):
+        return tuple(Named(name, part) for name, part in value.items())
     return (value,) if isinstance(value, Shape) else as_tuple(value, lambda part: part)
+
+
+def as_shape(value: Any) -> Any:
+    """A table with one shape by its name as that; anything else unchanged."""
+    if isinstance(value, Mapping) and len(value) == 1:
+        return as_parts(value)[0]
+    return value
+
+
+def check_shape(shape: Shape, field: attrs.Attribute[Any], value: object) -> None:
+    """Refuse a value that is no shape."""
+    if not isinstance(value, Shape):
+        raise refusal(shape, field.name, "a shape", short(value))
 
 
 def check_parts(shape: Shape, field: attrs.Attribute[Any], value: object) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
+from solidsph.interfaces.shape import Moments
 from solidsph.maths.arrays import Array, Indices
 
 # Pairs of a point and an edge, or of two edges, that are processed together.
@@ -15,20 +16,26 @@ _AT_ONCE = 1 << 20
 
 
 @attrs.frozen(eq=False)
-class Outline:
-    """A closed line of straight edges, searched by a tree of short pieces of them."""
+class ClosedLines:
+    """Closed lines of straight edges, with the body on their left, searched by a tree of short
+    pieces of them."""
 
     starts: Array  # (m, d=2) where each edge starts [m]
     edges: Array  # (m, 2) from there to where the next one starts [m]
+    following: Indices  # (m,) the next edge
+    preceding: Indices  # (m,) the one before
     normals: Array  # (m, 2) outward [-]
     tree: cKDTree  # of the middles of the pieces
     owners: Indices  # (p,) the edge of each piece
     reach: float  # half the length of the longest piece [m]
 
     @classmethod
-    def of(cls, starts: Array, *, counterclockwise: bool) -> Outline:
-        """The outline through corners (m, 2), each joined to the next, the last to the first."""
-        edges = np.roll(starts, -1, axis=0) - starts
+    def of(cls, rings: Sequence[Array]) -> ClosedLines:
+        """The lines through the corners (m, 2) of each ring, joined to the next, the last to the
+        first."""
+        starts = np.concatenate(rings)
+        following = next_of(rings)
+        edges = starts[following] - starts
         lengths = np.hypot(*edges.T)
         # Pieces no longer than an edge is on average: there are at most twice as many.
         counts = np.ceil(lengths / lengths.mean()).astype(np.intp)
@@ -37,7 +44,9 @@ class Outline:
         return cls(
             starts=starts,
             edges=edges,
-            normals=right if counterclockwise else -right,
+            following=following,
+            preceding=np.argsort(following),
+            normals=right,
             tree=cKDTree(middles),
             owners=owners,
             reach=0.5 * float((lengths / counts).max()),
@@ -49,6 +58,24 @@ class Outline:
         for rows, near in self._nearest(points):
             distance[rows] = self._signed(points[rows], near)
         return distance
+
+    def nearest(self, points: Array) -> Array:
+        """The places on the lines nearest to `points` (n, 2), (n, 2) [m]."""
+        feet = np.empty_like(points)
+        for rows, near in self._nearest(points):
+            feet[rows] = points[rows] - self._offsets(points[rows], near)[0]
+        return feet
+
+    def moments(self, about: Array) -> Moments:
+        """Moments of what is enclosed about a point (2,), exact up to rounding."""
+        # Triangles between the point and each edge; the integral of x x^T over one with corners
+        # a, b and 0 is A/12 (a a^T + b b^T + s s^T), s = a + b.
+        a = self.starts - about
+        b = a + self.edges
+        areas = 0.5 * _cross(a, b)
+        total = a + b
+        second = sum(np.einsum("m,mi,mj->ij", areas, x, x) for x in (a, b, total))
+        return Moments(float(areas.sum()), areas @ total / 3.0, np.asarray(second) / 12.0)
 
     def _nearest(self, points: Array) -> Iterator[tuple[Indices, Indices]]:
         """Indices of some of the points, and the edge nearest to each."""
@@ -81,14 +108,21 @@ class Outline:
         gaps, along = self._offsets(points, edges)
         # At a corner the sum of the normals of both edges decides the side (Baerentzen & Aanaes
         # 2005, in the plane).
-        count = len(self.starts)
         normals = self.normals[edges]
-        for end, step in ((0.0, -1), (1.0, 1)):
+        for end, other in ((0.0, self.preceding), (1.0, self.following)):
             at = along == end
-            normals[at] += self.normals[(edges[at] + step) % count]
+            normals[at] += self.normals[other[edges[at]]]
         outside = np.sum(gaps * normals, axis=1) >= 0.0
         distance = np.sqrt(_squared(gaps))
         return np.where(outside, distance, -distance)
+
+
+def next_of(rings: Sequence[Array]) -> Indices:
+    """The corner behind each one along its ring, (m,), of rings of corners (k, 2)."""
+    ends = np.cumsum([len(ring) for ring in rings])
+    following = np.arange(1, int(ends[-1]) + 1)
+    following[ends - 1] = np.concatenate([[0], ends[:-1]])
+    return following
 
 
 def pieces(starts: Array, edges: Array, counts: Indices) -> tuple[Indices, Array]:
@@ -99,12 +133,17 @@ def pieces(starts: Array, edges: Array, counts: Indices) -> tuple[Indices, Array
     return owners, starts[owners] + along[:, np.newaxis] * edges[owners]
 
 
-def first_crossing(starts: Array, ends: Array) -> tuple[int, int] | None:
+def first_crossing(starts: Array, following: Indices) -> tuple[int, int] | None:
     """Two edges that share a point other than the vertex between neighbours, or None.
 
     Of pairs found together these are the lowest; the search ends with them.
+
+    Args:
+        starts: where each edge starts, (m, 2).
+        following: the edge behind each, (m,).
     """
-    edges, count = ends - starts, len(starts)
+    ends = starts[following]
+    edges = ends - starts
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
     for first, second in _overlapping(low, high):
         i, j = np.minimum(first, second), np.maximum(first, second)
@@ -118,7 +157,7 @@ def first_crossing(starts: Array, ends: Array) -> tuple[int, int] | None:
             after = _cross(edges[a], ends[b] - starts[a])
             meets &= before * after <= 0.0
         # Neighbours always meet at their vertex; they only must not fold back onto each other.
-        neighbours = (j == i + 1) | ((i == 0) & (j == count - 1))
+        neighbours = (following[i] == j) | (following[j] == i)
         folded = _cross(edges[i], edges[j]) == 0.0
         folded &= np.sum(edges[i] * edges[j], axis=1) < 0.0
         meets = np.where(neighbours, folded, meets)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from reprlib import repr as short
 from typing import Any, ClassVar
 
 import attrs
@@ -12,12 +11,13 @@ import numpy as np
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes._checks import refusal
-from solidsph_builtin.shapes._composite import as_parts, check_parts, remaining
-
-
-def _check_shape(shape: Shape, field: attrs.Attribute[Any], value: object) -> None:
-    if not isinstance(value, Shape):
-        raise refusal(shape, field.name, "a shape", short(value))
+from solidsph_builtin.shapes._composite import (
+    as_parts,
+    as_shape,
+    check_parts,
+    check_shape,
+    remaining,
+)
 
 
 @attrs.frozen
@@ -25,13 +25,14 @@ class Difference(Shape):
     """The points of the shape `of` that are in none of the shapes `minus`.
 
     A face of a removed shape keeps its name, unless `of` has a face of that name: a box out of a
-    box leaves left and hole-left.
+    box leaves left and hole-left. Shapes in a table have their names in those of their faces:
+    `minus = {hole = {type = "disc", ...}}` leaves hole.rim.
 
     Raises:
         SceneError: a value is not a shape, nothing is removed, or the dimensions differ.
     """
 
-    of: Shape = attrs.field(validator=_check_shape, metadata={"part": "shapes"})
+    of: Shape = attrs.field(converter=as_shape, validator=check_shape, metadata={"part": "shapes"})
     minus: tuple[Shape, ...] = attrs.field(
         converter=as_parts, validator=check_parts, metadata={"part": "shapes"}
     )

@@ -16,7 +16,7 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.shape import Moments, Shape, Surface
 from solidsph.maths.arrays import Array
 from solidsph.system.files import content, located
-from solidsph_builtin.shapes._checks import as_number, is_number, refusal
+from solidsph_builtin.shapes._file_fields import angle_field, path_field
 from solidsph_builtin.shapes._mesh_faults import faults
 from solidsph_builtin.shapes._mesh_files import MOST_BYTES, Soup, read_soup
 from solidsph_builtin.shapes._mesh_repair import merged, proper, repaired
@@ -49,20 +49,6 @@ def _as_rows(value: Any) -> Any:
         return value
 
 
-def _as_text(value: Any) -> Any:
-    return str(value) if isinstance(value, Path) else value
-
-
-def _check_path(shape: Shape, field: attrs.Attribute[Any], value: object) -> None:
-    if not (value is None or isinstance(value, str)):
-        raise refusal(shape, field.name, "the path of a file", short(value))
-
-
-def _check_angle(shape: Shape, field: attrs.Attribute[Any], value: object) -> None:
-    if not (isinstance(value, float) and is_number(value) and 0.0 < value <= 180.0):
-        raise refusal(shape, field.name, "an angle above 0 and up to 180 degrees", short(value))
-
-
 @final
 @attrs.frozen(slots=False)
 class Mesh(Shape):
@@ -87,16 +73,14 @@ class Mesh(Shape):
             or cross each other. All but the last is mended by `repair`.
     """
 
-    file: str | None = attrs.field(default=None, converter=_as_text, validator=_check_path)
+    file: str | None = path_field()
     vertices: tuple[tuple[float, ...], ...] | None = attrs.field(default=None, converter=_as_rows)
     triangles: tuple[tuple[int, ...], ...] | None = attrs.field(default=None, converter=_as_rows)
     unit: str = unit_field()
     scale: float = scale_field()
     rotate: tuple[float, ...] = rotation_field()  # [degrees]
     translate: tuple[float, ...] = translation_field()  # [m]
-    edge_angle: float = attrs.field(  # [degrees]
-        default=30.0, converter=as_number, validator=_check_angle
-    )
+    edge_angle: float = angle_field()  # [degrees]
     repair: bool = attrs.field(default=False, validator=attrs.validators.instance_of(bool))
 
     dimension: ClassVar[int] = 3

@@ -10,10 +10,10 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-from solidsph.interfaces.shape import Shape, Surface
+from solidsph.interfaces.shape import Moments, Shape, Surface
 from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes._checks import as_points, check_coordinates, refusal
-from solidsph_builtin.shapes._outline import Outline, first_crossing, pieces
+from solidsph_builtin.shapes._outline import ClosedLines, first_crossing, next_of, pieces
 from solidsph_builtin.shapes._sampling import ON_LINE, samples_along
 
 
@@ -62,7 +62,7 @@ class Polygon(Shape):
         if self.volume() <= 1e-12 * np.ptp(starts, axis=0).max() ** 2:
             got = f"{self.volume()!r} m^2; use vertices off one line and edges that do not cross"
             raise refusal(self, "vertices", "around an area greater than zero", got)
-        pair = first_crossing(starts, ends)
+        pair = first_crossing(starts, next_of([starts]))
         if pair is not None:
             got = f"one where edge-{pair[0]} meets edge-{pair[1]}; make one shape of each region"
             raise refusal(self, "vertices", "a closed line that never meets itself", got)
@@ -103,9 +103,16 @@ class Polygon(Shape):
     def volume(self) -> float:
         return abs(self._signed_area())
 
+    def moments(self, about: Array) -> Moments:
+        return self._outline.moments(about)
+
+    def nearest(self, points: Array) -> Array:
+        return self._outline.nearest(points)
+
     @cached_property
-    def _outline(self) -> Outline:
-        return Outline.of(self._edges()[0], counterclockwise=self._signed_area() > 0.0)
+    def _outline(self) -> ClosedLines:
+        starts = self._edges()[0]
+        return ClosedLines.of([starts if self._signed_area() > 0.0 else starts[::-1]])
 
     def _edges(self) -> tuple[Array, Array]:
         """Start and end of each edge, each (m, 2) [m]."""

@@ -24,7 +24,9 @@ _TOGETHER = 128
 class Union(Shape):
     """The points in any of the shapes `of`, which may overlap, touch or lie apart.
 
-    Faces keep the names that they have in their shape; equal names become one face.
+    Faces keep the names that they have in their shape; equal names become one face. Shapes in a
+    table have their names in those of their faces: `of = {foot = {type = "box", ...}}` has the
+    face foot.left.
 
     Raises:
         SceneError: there is no shape, a value is not a shape, or their dimensions differ.

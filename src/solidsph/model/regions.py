@@ -27,8 +27,9 @@ EVERYWHERE = "all"
 _OF_EVERY_BODY = (EVERYWHERE, "surface", "interior", "ghosts")
 
 _HYPHENATED = re.compile(r"(?<![\w.])[A-Za-z]\w*(?:-\w+)+")
-_LIKE_OF_A_BODY = re.compile(r"(?<![\w.-])([A-Za-z][\w-]*)\.([A-Za-z][\w-]*)")
-_OF_A_BODY = re.compile(r"(?<![\w.])([A-Za-z_]\w*)\.([A-Za-z_]\w*)")
+# The tag of a body may have a dot itself: two.hole.rim.
+_LIKE_OF_A_BODY = re.compile(r"(?<![\w.-])([A-Za-z][\w-]*)\.([A-Za-z][\w-]*(?:\.[A-Za-z][\w-]*)?)")
+_OF_A_BODY = re.compile(r"(?<![\w.])([A-Za-z_]\w*)\.([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)?)")
 
 
 def select(particles: Particles, where: Where) -> Indices:
@@ -97,6 +98,7 @@ def holds(
             f"where = {where!r} uses t, but particles are chosen once, before the run: use X, Y, "
             "Z and tags here, and t in the formula of what is imposed"
         )
+    used |= {f"{part}.{face}" for part, face in _OF_A_BODY.findall(text)}
     values |= {name: tagged(tag) for name, tag in tags.items() if name in used}
     values |= {name: particles.positions[owners, k] for k, name in enumerate(axes)}
     result = np.asarray(formula(values))
@@ -128,8 +130,9 @@ def _mask(particles: Particles, members: Indices | slice) -> Mask:
 def names_used(particles: Particles, where: str) -> frozenset[str]:
     """Names in a valid condition: coordinates, tags, and tags of a body."""
     text = as_formula(particles, where)
-    dotted = {f"{body}.{tag}" for body, tag in _OF_A_BODY.findall(text)}
     tags = _by_variable(_known(particles))
+    found = (f"{body}.{tag}" for body, tag in _OF_A_BODY.findall(text))
+    dotted = {tags.get(name, name) for name in found}
     return frozenset(tags.get(name, name) for name in names_in(text)) | dotted
 
 
@@ -146,6 +149,7 @@ def as_formula(particles: Particles, where: str) -> str:
     Raises:
         SceneError: a word begins like a tag, and is not one.
     """
+    words = {*particles.bodies, *(word for tag in _known(particles) for word in tag.split("."))}
 
     def renamed(found: re.Match[str]) -> str:
         parts = found.group().split("-")
@@ -153,7 +157,7 @@ def as_formula(particles: Particles, where: str) -> str:
             return found.group()
         for count in range(len(parts), 1, -1):
             name = "-".join(parts[:count])
-            if name in particles.tags or name in particles.bodies or name in particles.faces:
+            if name in words:
                 return "-".join([variable(name), *parts[count:]])
         if parts[0] in particles.tags:
             raise _no_tag(particles, where, found.group())  # sets have no difference
@@ -187,8 +191,10 @@ def _tagged(particles: Particles, tag: str) -> Mask:
 
 def _check_names(particles: Particles, where: str) -> None:
     """Raise SceneError if a condition that cannot be read names an unknown body or tag."""
+    tags = _by_variable(_known(particles))
     for body, tag in _LIKE_OF_A_BODY.findall(where):
-        _check_of_body(particles, where, body, tag)
+        if variable(f"{body}.{tag}") not in tags:
+            _check_of_body(particles, where, body, tag)
     if not any(mark in where for mark in "<>=() "):
         raise _no_tag(particles, where, where)
 

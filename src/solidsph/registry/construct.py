@@ -131,7 +131,18 @@ def _nested(kind: str, value: object, several: object, label: str) -> Any:
         if not re.search(r"tuple|Sequence", str(several)):
             raise SceneError(f"{label} must be one {registry.singular(kind)}, got {value!r}")
         return tuple(construct(kind, item) for item in value)
+    if isinstance(value, Mapping) and "type" not in value and _holds_parts(value, kind):
+        return {name: construct(kind, item) for name, item in value.items()}
     return construct(kind, value)
+
+
+def _holds_parts(value: Mapping[Any, Any], kind: str) -> bool:
+    """Whether a table is one of several parts by name."""
+    expected = registry.interface(kind)
+    return bool(value) and all(
+        isinstance(item, expected) or (isinstance(item, Mapping) and "type" in item)
+        for item in value.values()
+    )
 
 
 def _described(kind: str, value: object) -> Any:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import pickle
 import re
-import time
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -20,8 +19,8 @@ from solidsph_builtin.shapes.mesh import Mesh
 from tests.commands.test_cli import solidsph
 from tests.helpers.mesh_bodies import blob, exported
 
-# What no broken file may take.
-SECONDS, BYTES = 20.0, 1.5e9
+# What no broken file may take: that of ten million triangles has 5e8 bytes.
+BYTES = 1e8
 
 
 def box() -> trimesh.Trimesh:
@@ -129,7 +128,7 @@ BROKEN: dict[str, tuple[str, Callable[[Path], object], str]] = {
     "a pickle": ("a.stl", lambda p: p.write_bytes(pickle.dumps(Bomb())), "no text"),
     "a pickle as obj": ("a.obj", lambda p: p.write_bytes(pickle.dumps(Bomb())), "triangles"),
     "a pickle as msh": ("a.msh", lambda p: p.write_bytes(pickle.dumps(Bomb())), "Error"),
-    "a pickle as vtu": ("a.vtu", lambda p: p.write_bytes(pickle.dumps(Bomb())), "cannot be read as vtu"),
+    "a pickle as vtu": ("a.vtu", lambda p: p.write_bytes(pickle.dumps(Bomb())), "be read as vtu"),
     "a pickle as step": ("a.step", lambda p: p.write_bytes(pickle.dumps(Bomb())), "ISO-10303-21"),
     "no step": ("a.step", lambda p: p.write_text("ISO-10303-21;\nrubbish"), "Gmsh cannot read it"),
     "corners beyond": ("a.obj", beyond_its_points, "Error|corner"),
@@ -156,7 +155,6 @@ def test_broken_files(tmp_path: Path, name: str, capfd: pytest.CaptureFixture[st
     write(tmp_path / file)
     (tmp_path / "scene.toml").write_text(SCENE.format(file))
     tracemalloc.start()
-    begun = time.process_time()
     try:
         result = solidsph("run", "scene.toml", cwd=tmp_path)
         most = tracemalloc.get_traced_memory()[1]
@@ -168,7 +166,6 @@ def test_broken_files(tmp_path: Path, name: str, capfd: pytest.CaptureFixture[st
     assert capfd.readouterr() == ("", "")
     assert said.count("shape 'mesh': file") == 1
     assert "Traceback" not in said
-    assert time.process_time() - begun < SECONDS
     assert most < BYTES
     assert not (tmp_path / "executed").exists()
 

@@ -22,8 +22,12 @@ from solidsph_builtin.shapes.box import Box
 from solidsph_builtin.shapes.cylinder import Cylinder
 from solidsph_builtin.shapes.difference import Difference
 from solidsph_builtin.shapes.disc import Disc
+from solidsph_builtin.shapes.extruded import Extruded
 from solidsph_builtin.shapes.interval import Interval
+from solidsph_builtin.shapes.named import Named
 from solidsph_builtin.shapes.polygon import Polygon
+from solidsph_builtin.shapes.revolved import Revolved
+from solidsph_builtin.shapes.transformed import Transformed
 from solidsph_builtin.shapes.union import Union
 from tests.helpers.examples import examples
 
@@ -393,11 +397,12 @@ def test_lists_become_tuples_and_equal_shapes_are_equal() -> None:
 def test_nested_shapes_are_marked_for_the_builder() -> None:
     marked = {
         (kind, field.name)
-        for kind in (Union, Difference)
+        for kind in (Union, Difference, Transformed, Extruded, Revolved, Named)
         for field in attrs.fields(kind)
         if field.metadata.get("part") == "shapes"
     }
-    assert marked == {(Union, "of"), (Difference, "of"), (Difference, "minus")}
+    of = {(kind, "of") for kind in (Union, Difference, Transformed, Extruded, Revolved, Named)}
+    assert marked == of | {(Difference, "minus")}
 
 
 def make(kind: Callable[..., Shape], *args: Any, **kwargs: Any) -> Callable[[], Shape]:

@@ -48,7 +48,8 @@ class ParticleSetNames:
 def check_names(bodies: Mapping[str, Particles]) -> Iterator[str]:
     """Yield names of bodies, tags and faces that a condition could not distinguish."""
     names = ParticleSetNames()
-    for tag in dict.fromkeys(tag for b in bodies.values() for tag in (*b.tags, *b.faces)):
+    tags = list(dict.fromkeys(tag for b in bodies.values() for tag in (*b.tags, *b.faces)))
+    for tag in tags:
         if names.similar(tag):
             yield f"the face or tag {tag!r} {names.problem(tag)}"
         names.add(tag)
@@ -57,3 +58,9 @@ def check_names(bodies: Mapping[str, Particles]) -> Iterator[str]:
         if problem:
             yield f"body {name!r}: its name {problem}"
         names.add(name)
+        longer = [tag for tag in tags if variable(tag).startswith(f"{variable(name)}.")]
+        if longer:
+            yield (
+                f"body {name!r}: its name is that of a part with the face {longer[0]!r}; choose "
+                "another"
+            )
