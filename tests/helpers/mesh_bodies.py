@@ -12,7 +12,6 @@ import igl
 import numpy as np
 import trimesh
 
-from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes.mesh import Mesh
 
 
@@ -116,7 +115,7 @@ class Body:
 BODIES = {
     "gear": Body(lambda: triangles_of(gear), 0.06),
     "elbow": Body(lambda: triangles_of(elbow), 0.06),
-    "torus": Body(lambda: trimesh.creation.torus(1.0, 0.3, 64, 32), 0.08),
+    "torus": Body(lambda: trimesh.creation.torus(1.0, 0.3, 64, 32), 0.1),
     "bracket": Body(lambda: triangles_of(bracket), 0.04),
     "hollow box": Body(hollow_box, 0.05),
     "coarse sphere": Body(lambda: trimesh.creation.icosphere(2), 0.15),
@@ -130,7 +129,3 @@ def exported(mesh: trimesh.Trimesh, path: Path) -> Path:
     """The mesh in a file of the kind that its name says."""
     mesh.export(path)
     return path
-
-
-def volume_and_centre(mesh: trimesh.Trimesh) -> tuple[float, Array]:
-    return float(mesh.volume), np.asarray(mesh.center_mass)

@@ -47,12 +47,18 @@ def nearest(tree: cKDTree, points: Array) -> Assignment:
 def thinned(points: Array, order: Indices, distance: float) -> Mask:
     """Which of `points` (m, d) stay if each, in this `order`, removes all that are less than
     `distance` away and have not been kept before, (m,)."""
-    stays = np.ones(len(points), dtype=np.bool_)
-    kept = np.zeros(len(points), dtype=np.bool_)
-    close = cKDTree(points).query_ball_point(points, distance)
-    for point in order.tolist():
-        if stays[point]:
-            kept[point] = True
-            others = np.array(close[point])
-            stays[others[~kept[others]]] = False
-    return stays
+    rank = np.empty(len(points), dtype=np.intp)
+    rank[order] = np.arange(len(points))
+    pairs = cKDTree(points).query_pairs(distance, output_type="ndarray")
+    swapped = rank[pairs[:, 0]] > rank[pairs[:, 1]]
+    pairs[swapped] = pairs[swapped, ::-1]
+    open_, kept = np.ones(len(points), dtype=np.bool_), np.zeros(len(points), dtype=np.bool_)
+    # All at once that have none before them any more.
+    while open_.any():
+        pairs = pairs[open_[pairs].all(axis=1)]
+        first = open_.copy()
+        first[pairs[:, 1]] = False
+        kept |= first
+        open_ &= ~first
+        open_[pairs[first[pairs[:, 0]], 1]] = False
+    return kept

@@ -27,6 +27,9 @@ from solidsph_builtin.discretisations.conforming_lattice import outermost
 # In spacings: closer to the boundary there are no particles but those on it, and none closer to
 # one of those.
 _CLEAR = 0.5
+# Further than this from samples of the boundary, in depths, a point is deep: a quarter of a spacing
+# is between samples, so that a point at the depth is up to 1.1 depths away from them.
+_APART = 1.2
 # Depth to which particles move, beside places where the boundary is off the lattice.
 _MOVES = 4.0
 # Steps of particles along a curved surface in space.
@@ -90,8 +93,7 @@ class Fitted(Discretisation):
         off the lattice."""
         distance = in_chunks(grid.size, lambda n: shape.signed_distance(grid.positions(n)))
         outer, at_lattice = _snapped(_outer(shape, grid, distance, spacing, size), grid)
-        inside = np.flatnonzero(distance < -_CLEAR * size)
-        inner = grid.positions(inside)
+        inner = grid.positions(_deep(shape, grid, distance, spacing, _CLEAR * size))
         inner = inner[cKDTree(outer).query(inner)[0] > _CLEAR * size] if len(inner) else inner
         off = outer[~at_lattice]
         X = np.concatenate([outer, inner])
@@ -104,6 +106,18 @@ class Fitted(Discretisation):
             X, onto = X[onto_or_inside], onto[onto_or_inside]
         order = _order(X, grid)
         return X[order], onto[order], bool(len(off))
+
+
+def _deep(shape: Shape, grid: Grid, distance: Array, spacing: float, depth: float) -> Indices:
+    """Numbers of the points of the lattice at least so deep inside [m].
+
+    The `distance` (size,) [m] may be less than that from the boundary, as at a seam of a union:
+    there, that from samples of the boundary decides.
+    """
+    doubtful = np.flatnonzero((distance <= _AT * depth) & (distance >= -depth))
+    samples = cKDTree(shape.surface(spacing).points)
+    apart = samples.query(grid.positions(doubtful), distance_upper_bound=_APART * depth)[0]
+    return np.union1d(np.flatnonzero(distance < -depth), doubtful[apart > _APART * depth])
 
 
 def _outer(shape: Shape, grid: Grid, distance: Array, spacing: float, size: float) -> Array:

@@ -14,8 +14,6 @@ from solidsph_builtin.shapes._triangles import Triangles, area_vectors, pieces_o
 _TOUCHES = 1e-7
 # Part of the size of a triangle from which its inside is looked at.
 _BESIDE = 1e-3
-# Edges whose crossings are searched at once.
-_EDGES_AT_ONCE = 1 << 16
 
 
 def faults(vertices: Array, corners: Indices) -> Iterator[str]:
@@ -138,22 +136,20 @@ def _first_crossing(surface: Triangles) -> Array | None:
     edges = np.unique(edges, axis=0)
     tree = geometry_library("igl").AABB()
     tree.init(vertices, corners)
-    for begin in range(0, len(edges), _EDGES_AT_ONCE):
-        some = edges[begin : begin + _EDGES_AT_ONCE]
-        starts = vertices[some[:, 0]]
-        ways = vertices[some[:, 1]] - starts
-        hits = tree.intersect_ray(vertices, corners, starts, ways)
-        flat = [(e, h[0], h[3]) for e, own in enumerate(hits) for h in own]
-        found = np.array(flat).reshape(-1, 3)
-        found = found[(found[:, 2] > _TOUCHES) & (found[:, 2] < 1.0 - _TOUCHES)]
-        edge, triangle = found[:, 0].astype(np.intp), found[:, 1].astype(np.intp)
-        through = ~(some[edge][:, :, None] == corners[triangle][:, None, :]).any(axis=(1, 2))
-        through &= _on_both_sides(vertices[some[edge]], vertices[corners[triangle]])
-        if through.any():
-            first = int(np.argmax(through))
-            place: Array = starts[edge[first]] + found[first, 2] * ways[edge[first]]
-            return place
-    return None
+    ends = vertices[edges]
+    ways = ends[:, 1] - ends[:, 0]
+    starts = ends[:, 0] + _TOUCHES * ways
+    # The first triangle that an edge meets will do: where surfaces cross, many edges do.
+    found, along, _ = tree.intersect_ray_first(vertices, corners, starts, ways)
+    hit = np.flatnonzero((found >= 0) & (along < 1.0 - 2.0 * _TOUCHES))
+    triangles = corners[found[hit]]
+    through = ~(edges[hit][:, :, None] == triangles[:, None, :]).any(axis=(1, 2))
+    through &= _on_both_sides(ends[hit], vertices[triangles])
+    if not through.any():
+        return None
+    first = hit[np.argmax(through)]
+    place: Array = starts[first] + along[first] * ways[first]
+    return place
 
 
 def _on_both_sides(edges: Array, triangles: Array) -> Array:

@@ -869,3 +869,13 @@ def test_what_no_spacing_fits_is_refused(
 ) -> None:
     with pytest.raises(SceneError, match=words):
         kind().particles(Box(lengths), spacing)
+
+
+@pytest.mark.parametrize("parts", [2, 3])
+def test_fitted_particles_stand_on_the_seam_of_a_union(parts: int) -> None:
+    """Where the distance is zero inside the body: those of one box."""
+    length = 1.2 / parts
+    one = Fitted().particles(Box([1.2, 0.6]), 0.1)
+    union = Union([Box([length, 0.6], [length * n, 0.0]) for n in range(parts)])
+    joined = Fitted().particles(union, 0.1)
+    assert joined.positions == pytest.approx(one.positions, abs=1e-12)
