@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import product
-from math import sqrt
+from math import ceil, sqrt
 
 import attrs
 import numpy as np
@@ -42,7 +42,7 @@ _ENOUGH_ALONG = 4
 # spacings: half a sample along a curve, but not half a spacing down another face.
 _ABOVE = 0.15
 
-# Moments that differ by less, as parts of the volume, are those of the body.
+# Moments that differ by less, as parts of the volume, are those of the body, and volumes are alike.
 _ROUNDING = 1e-12
 
 # Part of its volume that no particle loses for the sake of the moments; where one were to lose much
@@ -120,10 +120,19 @@ def fitted_volumes(
     fit = Fit(positions, spacing, _lattice_of(discretisation, shape, spacing, positions))
     # The function of a particle further inside meets complete neighbourhoods only.
     depth = disturbed + 2.0 * fit.reach
-    near = shape.signed_distance(positions) > -depth
-    points, weights = _quadrature(discretisation, shape, spacing, depth + fit.reach)
+    grid = grid_over(discretisation, shape, spacing)
+    near = _near_surface(shape, spacing, grid, depth)[grid.cell_of(positions)]
+    points, weights = _quadrature(shape, spacing, grid, depth + fit.reach)
     integrated = fit.positive_integrals(points, weights, near)
-    return with_moments(positions, np.where(near, integrated, volumes), near, shape, spacing)
+    changed = near & (np.abs(integrated - volumes) > _ROUNDING * volumes)
+    return with_moments(positions, np.where(changed, integrated, volumes), near, shape, spacing)
+
+
+def _near_surface(shape: Shape, spacing: float, grid: Grid, depth: float) -> Mask:
+    """Which cells of a `grid` are at most so far from those of the surface [m], (size,)."""
+    marked = np.zeros(grid.size, dtype=np.bool_)
+    marked[grid.cell_of(shape.surface(spacing).points)] = True
+    return grid.near(marked, ceil(depth / float(grid.steps.min())))
 
 
 def _lattice_of(
@@ -138,13 +147,13 @@ def _lattice_of(
     return max(grids, key=lambda grid: int(np.sum(grid.has(positions))))
 
 
-def _quadrature(
-    discretisation: Discretisation, shape: Shape, spacing: float, depth: float
-) -> tuple[Array, Array]:
+def _quadrature(shape: Shape, spacing: float, grid: Grid, depth: float) -> tuple[Array, Array]:
     """Points (m, d) [m] and weights (m,) [m^d] of integrals over `shape`, to a depth [m]."""
-    grid = grid_over(discretisation, shape, spacing)
-    distance = in_chunks(grid.size, lambda n: shape.signed_distance(grid.positions(n)))
-    numbers = np.flatnonzero(np.abs(distance + 0.5 * depth) < 0.5 * depth + grid.half_diagonal)
+    reach = 2.0 * grid.half_diagonal
+    distance = in_chunks(grid.size, lambda n: shape.distance_within(grid.positions(n), reach))
+    numbers = np.flatnonzero(
+        (distance < grid.half_diagonal) & _near_surface(shape, spacing, grid, depth)
+    )
     shares = cell_shares(shape, grid, numbers, distance)
     whole, cut = numbers[shares == 1.0], numbers[(shares > 0.0) & (shares < 1.0)]
     gauss = np.array(list(product((-_GAUSS, _GAUSS), repeat=shape.dimension))) * grid.steps

@@ -48,3 +48,6 @@ class _SampledOnce(Shape):
 
     def nearest(self, points: Array) -> Array | None:
         return self.of.nearest(points)
+
+    def distance_within(self, points: Array, reach: float) -> Array:
+        return self.of.distance_within(points, reach)

@@ -91,7 +91,8 @@ class Fitted(Discretisation):
     ) -> tuple[Array, Mask, bool]:
         """Positions (n, d) [m], whether they are on the boundary (n,), and whether any particle is
         off the lattice."""
-        distance = in_chunks(grid.size, lambda n: shape.signed_distance(grid.positions(n)))
+        reach = 2.0 * grid.half_diagonal
+        distance = in_chunks(grid.size, lambda n: shape.distance_within(grid.positions(n), reach))
         outer, at_lattice = _snapped(_outer(shape, grid, distance, spacing, size), grid)
         inner = grid.positions(_deep(shape, grid, distance, spacing, _CLEAR * size))
         inner = inner[cKDTree(outer).query(inner)[0] > _CLEAR * size] if len(inner) else inner
@@ -102,7 +103,7 @@ class Fitted(Discretisation):
             free = ~onto
             free[free] = cKDTree(off).query(inner)[0] < _MOVES * size
             X = relaxed(X, free, size)
-            onto_or_inside = onto | (shape.signed_distance(X) < -_PUSHED_OUT * size)
+            onto_or_inside = onto | (shape.distance_within(X, size) < -_PUSHED_OUT * size)
             X, onto = X[onto_or_inside], onto[onto_or_inside]
         order = _order(X, grid)
         return X[order], onto[order], bool(len(off))

@@ -7,6 +7,7 @@ from typing import Any
 
 import attrs
 import numpy as np
+from scipy.spatial import cKDTree
 
 from solidsph.interfaces.shape import Moments, Surface
 from solidsph.maths.arrays import Array, Indices
@@ -32,6 +33,8 @@ class Triangles:
     corners: Indices  # (k, 3) vertices of each triangle
     names: tuple[str, ...]  # of the faces
     owners: Indices  # (k,) the face that each triangle belongs to
+    # For the last reach that was asked for, middles of pieces of the triangles, and their size [m].
+    _middles: dict[float, tuple[cKDTree, float]] = attrs.field(factory=dict, init=False)
 
     @cached_property
     def areas(self) -> Array:
@@ -68,12 +71,30 @@ class Triangles:
         result: Array = np.copysign(distance, heights)
         return result
 
+    def distance_within(self, points: Array, reach: float) -> Array:
+        """The same, no further than `reach` [m] from 0: few triangles are near points near them."""
+        if reach not in self._middles:
+            pieces, _ = divided(self.vertices[self.corners], reach)
+            middles = pieces.mean(axis=1)
+            size = float(np.linalg.norm(pieces - middles[:, None], axis=2).max())
+            self._middles.clear()
+            self._middles[reach] = cKDTree(middles), size
+        tree, size = self._middles[reach]
+        near = np.isfinite(tree.query(points, distance_upper_bound=reach + size)[0])
+        result = np.full(len(points), reach)
+        result[near] = np.clip(self.signed_distance(points[near]), -reach, reach)
+        far = np.flatnonzero(~near)
+        result[far[self.winding_numbers(points[far]) > 0.5]] = -reach
+        return result
+
     def nearest(self, points: Array) -> Array:
         """The places on the surface nearest to `points` (n, 3), (n, 3) [m]."""
         return self._closest(points)[1] if len(points) else points
 
     def winding_numbers(self, points: Array) -> Array:
         """How often the surface runs around each of `points` (n, 3), (n,)."""
+        if not len(points):
+            return np.zeros(0)
         result: Array = self._winding.winding_number(_rows(points), _ACCURACY)
         return result
 
@@ -118,7 +139,7 @@ class Triangles:
         normals = self.normals[triangles]
         heights = np.einsum("ni,ni->n", points - corners[:, 0], normals)
         feet = points - heights[:, None] * normals
-        above = normals.any(axis=1)
+        above = np.asarray(normals.any(axis=1))
         least = np.full(len(points), np.inf)
         on_edges = feet.copy()
         for k in range(3):

@@ -122,6 +122,9 @@ class Mesh(Shape):
     def moments(self, about: Array) -> Moments:
         return self._surface.moments(about)
 
+    def distance_within(self, points: Array, reach: float) -> Array:
+        return self._surface.distance_within(points, reach)
+
     def nearest(self, points: Array) -> Array:
         return self._surface.nearest(points)
 

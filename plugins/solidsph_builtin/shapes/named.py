@@ -76,5 +76,8 @@ class Named(Shape):
     def moments(self, about: Array) -> Moments | None:
         return self.of.moments(about)
 
+    def distance_within(self, points: Array, reach: float) -> Array:
+        return self.of.distance_within(points, reach)
+
     def nearest(self, points: Array) -> Array | None:
         return self.of.nearest(points)

@@ -87,6 +87,11 @@ class Transformed(Shape):
             factor * self.scale**2 * R @ known.second @ R.T,
         )
 
+    def distance_within(self, points: Array, reach: float) -> Array:
+        return self.scale * self.of.distance_within(
+            self._placement.drawn(points), reach / self.scale
+        )
+
     def nearest(self, points: Array) -> Array | None:
         found = self.of.nearest(self._placement.drawn(points))
         return None if found is None else self._placement.placed(found)

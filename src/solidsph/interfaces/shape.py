@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 
 import attrs
+import numpy as np
 
 from solidsph.interfaces.part import Part
 from solidsph.maths.arrays import Array
@@ -76,3 +77,10 @@ class Shape(Part):
         """The places on the boundary nearest to `points` (n, d), (n, d) [m]; None if they are only
         known by the distance."""
         return None
+
+    def distance_within(self, points: Array, reach: float) -> Array:
+        """`signed_distance` of `points` (n, d), no further than `reach` from 0, (n,) [m].
+
+        A shape for which points far from the boundary cost most answers this more quickly.
+        """
+        return np.clip(self.signed_distance(points), -reach, reach)
