@@ -43,7 +43,7 @@ def check_count(discretisation: Discretisation, count: float) -> None:
         raise refusal(
             discretisation,
             f"this spacing needs a lattice of {count:.3g} points, at most {MOST_PARTICLES:.0e} are "
-            "allowed; use a larger spacing",
+            "allowed; use a larger spacing, or check the unit of the shape",
         )
 
 

@@ -144,7 +144,7 @@ def grid_over(
         raise refusal(
             discretisation,
             f"spacing = {spacing:.4g} m is larger than the shape, of {lengths.max():.4g} m; take a "
-            "sixth of its thickness or less",
+            "sixth of its thickness or less, or check the unit of the shape",
         )
     extra = int(on_boundary) + 2 * beyond
     # In floating point: the product may be too large for an integer.

@@ -14,6 +14,7 @@ from solidsph import Scene, Simulation, resume
 from solidsph.errors import SceneError, SolidsphError
 from solidsph.maths.arrays import Array
 from solidsph.testing import conformance
+from solidsph_builtin.discretisations.fitted import Fitted
 from solidsph_builtin.shapes.mesh import Mesh
 from tests.helpers.mesh_bodies import BODIES, bracket, exported, hollow_box, modelled
 from tests.helpers.resuming import Stop
@@ -108,6 +109,14 @@ def test_unit_scale_turn_and_place(tmp_path: Path) -> None:
     lower, upper = shape.bounds()
     assert lower == pytest.approx([1.0, 2.0, 3.0], abs=1e-9)
     assert upper - lower == pytest.approx(size, rel=1e-6)
+
+
+@pytest.mark.parametrize(("unit", "spacing"), [("m", 1e-3), ("nm", 0.1)])
+def test_a_wrong_unit_is_told(tmp_path: Path, unit: str, spacing: float) -> None:
+    """A box of millimetres read as metres, and one of metres as nanometres."""
+    shape = Mesh(exported(box(), tmp_path / "box.stl"), unit=unit)
+    with pytest.raises(SceneError, match="check the unit of the shape"):
+        Fitted().particles(shape, spacing)
 
 
 def test_edges_part_faces_by_their_angle() -> None:
