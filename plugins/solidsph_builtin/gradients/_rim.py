@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.maths.arrays import Array
+from solidsph.maths.arrays import Array, Mask
 
 # Sums that miss less than this part of the largest are right but for rounding.
 _RIGHT = 1e-10
@@ -16,6 +16,12 @@ _RIGHT = 1e-10
 _WIDTH = {1: np.inf, 2: 3.0, 3: 3.0}
 
 
+def wrong(missing: Array) -> Mask:
+    """Where sums miss (n, ...) more than rounding, (n,)."""
+    size = np.abs(missing).reshape(len(missing), -1).max(axis=1)
+    return np.asarray(size > _RIGHT * size.max())
+
+
 def freedom(missing: Array, positions: Array, spacing: float) -> Array:
     """How freely the weights of each row change, (n,): 1 where sums miss something, 0 deep inside.
 
@@ -24,9 +30,7 @@ def freedom(missing: Array, positions: Array, spacing: float) -> Array:
         positions: of the particles, (n, d) [m].
         spacing: of the particles [m].
     """
-    size = np.abs(missing).reshape(len(missing), -1).max(axis=1)
-    wrong = size > _RIGHT * size.max()
-    away, _ = cKDTree(positions[wrong]).query(positions)
+    away, _ = cKDTree(positions[wrong(missing)]).query(positions)
     part = away / (_WIDTH[positions.shape[1]] * spacing)
     # Its third derivative is small: the sums of changes that vary faster would miss in turn.
     return np.where(part < 1.0, np.cos(0.5 * np.pi * np.minimum(part, 1.0)) ** 4, 0.0)

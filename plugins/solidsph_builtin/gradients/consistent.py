@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import final
 
 import attrs
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array, hstack, vstack
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import SuperLU, splu
 
 from solidsph.errors import BuildError
 from solidsph.interfaces.gradient import Gradient
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
-from solidsph.maths.arrays import Array, Mask
+from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.maths.band import BandFactors, band_factors
+from solidsph.maths.one_thread import one_thread
 from solidsph.model.neighbours import Pairs
 from solidsph.model.particles import Particles
 from solidsph_builtin.gradients._local_fits import LocalFits, closeness, portions
-from solidsph_builtin.gradients._rim import freedom
+from solidsph_builtin.gradients._rim import freedom, wrong
 from solidsph_builtin.gradients._softening import softening
 from solidsph_builtin.gradients.cubic import Cubic
 
@@ -124,7 +126,11 @@ class Consistent(Gradient):
         for face in particles.faces.values():
             surface[face.particles] = True
         degree = self.exact_degree
-        missing[:, 0] = _possible(missing[:, 0], particles.positions, surface, degree)
+        changing = [surface, wrong(missing)]
+        for piece in _pieces(found):
+            allowed = [mask[piece] for mask in changing]
+            X = particles.positions[piece]
+            missing[piece, 0] = _possible(missing[piece, 0], X, allowed, degree)
         if not missing.any():
             return inner
         V = particles.volumes
@@ -137,7 +143,10 @@ class Consistent(Gradient):
             from solidsph_builtin.gradients._iteration import solved  # loads the compiler
 
             close = closeness(slopes, found.distances)
-            multipliers = solved(found, close, particles, free, degree, length, missing, surface)
+            with one_thread():
+                multipliers = solved(
+                    found, close, particles, free, degree, length, missing, surface
+                )
         return _OfBody(inner, V, free, multipliers, length)
 
 
@@ -243,20 +252,34 @@ class _Change:
         return csr_array(y.T @ (diags_array(V**2 * s * w) @ y) - kept.T @ kept)
 
 
-def _possible(missing: Array, positions: Array, surface: Mask, degree: int) -> Array:
-    """`missing` (n, d) with the least change at the surface that makes the system solvable.
+def _pieces(pairs: Pairs) -> Iterator[Indices]:
+    """Particles of each piece of a body: none is a neighbour of another's."""
+    graph = csr_array(
+        (np.ones(pairs.count, dtype=np.int8), pairs.columns, pairs.starts),
+        shape=(pairs.row_count, pairs.row_count),
+    )
+    count, piece_of = connected_components(graph, directed=False)
+    for piece in range(count):
+        yield np.flatnonzero(piece_of == piece)
+
+
+def _possible(missing: Array, positions: Array, allowed: Sequence[Mask], degree: int) -> Array:
+    """`missing` (n, d) of a piece, with the least change that makes the system solvable where it is
+    `allowed` (n,): at the surface, and as far as that is not enough also inside.
 
     Gradients of polynomials do not change, so that the sum of f_p A_p of a polynomial f is the sum
     of V grad f whatever the weights: so far the areas must agree with the volumes.
     """
     X = positions - positions.mean(axis=0)
-    X = X / np.abs(X).max()
+    X = X / max(np.abs(X).max(), _SMALLEST)
     upper = np.triu_indices(X.shape[1])
     squares = X[:, upper[0]] * X[:, upper[1]]
     f = np.hstack([np.ones((len(X), 1)), X, *([squares] if degree > 1 else [])])
-    own = np.where(surface[:, None], f, 0.0)
-    change: Array = own @ np.linalg.lstsq(own.T @ own, f.T @ missing)[0]
-    return missing - change
+    # The surface may be where a polynomial vanishes, as that of a ball.
+    for places in allowed:
+        own = np.where(places[:, None], f, 0.0)
+        missing = missing - own @ np.linalg.lstsq(own.T @ own, f.T @ missing)[0]
+    return missing
 
 
 def _solved(matrix: csr_array, missing: Array, surface: Mask) -> Array:

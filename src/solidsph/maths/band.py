@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
-from functools import cache
-from typing import cast
-
 import attrs
 import numpy as np
 from scipy.linalg.lapack import dpbtrf, dpbtrs
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
-from threadpoolctl import ThreadpoolController
 
 from solidsph.maths.arrays import Array, Indices
+from solidsph.maths.one_thread import one_thread
 
 MOST_IN_BAND = 60_000_000
 """Numbers that are worth their memory, half a gigabyte."""
@@ -32,7 +28,7 @@ class BandFactors:
     def solve(self, values: Array) -> Array:
         """Solution of K x = `values`, (k,) or (k, m)."""
         solution = np.empty_like(values)
-        with _one_thread():
+        with one_thread():
             solution[self.order] = dpbtrs(self.lower, values[self.order], lower=1)[0]
         return solution
 
@@ -59,17 +55,6 @@ def band_factors(matrix: csr_array) -> BandFactors | None:
     band = np.zeros((width + 1, count), order="F")
     lower = below >= 0
     band[below[lower], columns[lower]] = matrix.data[lower]
-    with _one_thread():
+    with one_thread():
         factors, info = dpbtrf(band, lower=1, overwrite_ab=1)
     return None if info else BandFactors(order, factors)
-
-
-def _one_thread() -> AbstractContextManager[object]:
-    """LAPACK splits a band into small steps: where cores are busy, its threads wait for each other
-    a hundred times as long as they work."""
-    return cast("AbstractContextManager[object]", _libraries().limit(limits=1))
-
-
-@cache
-def _libraries() -> ThreadpoolController:
-    return ThreadpoolController()
