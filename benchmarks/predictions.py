@@ -87,11 +87,7 @@ SCENES: Mapping[str, Callable[[], SceneBuilder]] = {
         .outputs(10)
     ),
     "3D float32": lambda: (
-        swinging([0.3, 0.3, 0.5], 0.01)
-        .engine("compiled-float32")
-        .energy_tolerance("off")  # some hundred steps of single precision lose a hundredth
-        .duration(0.1)
-        .outputs(10)
+        swinging([0.3, 0.3, 0.5], 0.01).engine("compiled-float32").duration(0.1).outputs(10)
     ),
     "updated Lagrangian": lambda: (
         swinging([0.5, 0.25], 0.01).formulation("updated-lagrangian").duration(0.3).outputs(20)
