@@ -21,7 +21,7 @@ from solidsph.maths.arrays import Array, Indices
 LANES = register_bytes() // 8
 """Consecutive particles of a bundle, of which some may have no such pair."""
 
-_FEWEST = 3  # pairs for which a bundle pays
+_FEWEST = min(3, LANES)  # pairs for which a bundle pays
 
 # Relative to the largest value of its kind, a difference that is rounding: positions on a lattice
 # are rounded to 1e-16 of the body's size, so their differences to about 1e-14 of the spacing.

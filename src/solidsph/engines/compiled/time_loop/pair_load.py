@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import prange
 
+from solidsph.engines.compiled.fixed import lane_functions as lane_functions  # for formulas
 from solidsph.engines.compiled.fixed.lane_arithmetic import chosen
 from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pair_bundles import PairBundles, pair_bundles, sums_for
