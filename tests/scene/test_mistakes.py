@@ -15,6 +15,7 @@ import pytest
 import solidsph.scene.default_cover
 from solidsph import Scene, Simulation, cli
 from solidsph.commands.target import resolve
+from solidsph.commands.verbosity import say_from
 from solidsph.costs import memory_check
 from solidsph.costs.estimate import estimate_work
 from solidsph.errors import BuildError, SceneError
@@ -396,6 +397,7 @@ def test_a_reader_that_goes_away_fails_no_run(command: str, tmp_path: Path) -> N
 
 
 def test_a_warning_is_told_without_path_and_source(capsys: pytest.CaptureFixture[str]) -> None:
+    say_from(verbose=0, quiet=False)  # as every verb does
     cli._show_warning(UserWarning("few neighbours"), UserWarning, "/some/where.py", 7)
     assert capsys.readouterr().err == "warning: few neighbours\n"
     cli._show_warning(RuntimeWarning("overflow"), RuntimeWarning, "/some/where.py", 7)
