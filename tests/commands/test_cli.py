@@ -108,6 +108,21 @@ def test_explain_runs_nothing_and_names_what_is_not_simulated(scene: Path) -> No
     assert solidsph("explain", scene.name, cwd=scene.parent).returncode == 0
 
 
+def test_explain_lists_sizes_and_faces(scene: Path) -> None:
+    (facts,) = json.loads(solidsph("explain", scene.name, "--json", cwd=scene.parent).stdout)[
+        "scenes"
+    ].values()
+    sizes = {r["quantity"]: r["value"] for r in facts["numbers"] if "size" in r["quantity"]}
+    assert sizes == {"size of block [m]": "1 x 0.5"}
+    faces = {row.pop("face"): row for row in facts["faces"]}
+    assert set(faces) == {"left", "right", "bottom", "top"}
+    assert faces["top"]["area"] == pytest.approx(1.0)
+    assert faces["top"]["centre"] == pytest.approx([0.5, 0.5], abs=0.07)  # half a spacing inside
+    shown = solidsph("explain", scene.name, cwd=scene.parent).stdout
+    assert "length [m]" in shown
+    assert "centre [m]" in shown
+
+
 def test_internals_are_shown_on_request_only(scene: Path) -> None:
     for verb, internals in (
         ("explain", ("MatrixForces", "time loop", "bytes held", "bytes touched in all", "arrays")),

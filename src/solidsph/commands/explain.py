@@ -10,10 +10,11 @@ import click
 
 from solidsph.advice import advise
 from solidsph.commands.console import Table, present
+from solidsph.commands.faces import face_rows, face_text
+from solidsph.commands.numbers import numbers, sizes
 from solidsph.commands.options import Output, flag, option, options, set_option
 from solidsph.commands.prediction import (
     INTERNALS,
-    Row,
     build_timed,
     cluster_rows,
     prediction_rows,
@@ -33,14 +34,9 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.plan import Compilation
 from solidsph.registry import registry
 from solidsph.registry.construct import construct
-from solidsph.run.cfl_step import cfl_step
-from solidsph.scene.default_cover import cover_of
 from solidsph.scene.scene import Scene
 from solidsph.scene.scheme import completed, scheme_of
-from solidsph.scene.static_solver import DIRECT, ITERATIVE, iterates
 from solidsph.simulation import Simulation
-from solidsph.statics import critical_step
-from solidsph.statics.freedoms import freedoms
 from solidsph.studies.case import Case
 from solidsph.studies.part_values import named_parts
 
@@ -105,6 +101,7 @@ def _text(facts: Facts, titles: Mapping[str, str], *, verbose: bool) -> Iterator
             if scene.get(title):
                 shown = [r for r in scene[title] if verbose or r["quantity"] not in INTERNALS]
                 yield Table.of(title, shown, ("quantity", "value", "why"), {"quantity": ""})
+        yield from face_text(scene.get("faces", ()), verbose=verbose)
         yield from _effects_text(scene["effects"], verbose=verbose)
         if scene["probes"]:
             yield Table.of("probes", scene["probes"], ("probe", "measures", "at"))
@@ -206,7 +203,8 @@ def _built(simulation: Simulation, effect_shares: Mapping[str, Share]) -> Facts:
         )
     return {
         "parts": _parts(simulation.scene, simulation.parts),
-        "numbers": _numbers(simulation),
+        "numbers": numbers(simulation),
+        "faces": face_rows(simulation),
         "effects": effects + _other_effects(named, inside),
         "warnings": [
             {"name": a.name, "found": a.finding, "expected": a.expected, "remedy": a.remedy}
@@ -224,6 +222,7 @@ def _on_paper(scene: Scene, prediction: Prediction) -> Facts:
         "parts": _parts(scene, _named_parts(scene)),
         "numbers": rows(
             ("dimensions", work.dimension, "1 is uniaxial strain, 2 is plane strain"),
+            *sizes(scene),
             ("particles", work.particles, "about: volume over the cell, without ghosts"),
             ("steps", work.steps, "about: by wave speed and spacing alone"),
         ),
@@ -290,73 +289,6 @@ def _why_operator(scene: Scene, entry: registry.Entry) -> str:
             if kind == "gradient" and entry.name == scheme.elsewhere:
                 return f"{scheme.name} scheme: {scheme.why['elsewhere']}"
     return "part of the formulation"
-
-
-def _numbers(simulation: Simulation) -> list[Row]:
-    scene, model = simulation.scene, simulation.model
-    particles, internal = model.particles, simulation.dynamics.internal
-    speed = max(body.material.wave_speed for body in model.bodies)
-    cover = "named by the scene"
-    if scene.cover is None:
-        cover = "the kernel's default, the largest that holds neighbours in a row"
-    hidden = sum(len(body.hidden.keys) for body in model.bodies if body.hidden is not None) // 2
-    gaps = ("pairs across gaps", hidden, "near, but not neighbours: the line leaves the body")
-    return rows(
-        ("dimensions", particles.dimension, "1 is uniaxial strain, 2 is plane strain"),
-        ("particles", int((~particles.ghosts).sum()), "from shapes and spacings"),
-        ("ghosts", int(particles.ghosts.sum()), "complete the support of those near a surface"),
-        (
-            "neighbours",
-            internal.pair_count / particles.count - 1.0,
-            "average number within the support",
-        ),
-        ("cover [spacings]", cover_of(scene), f"support radius, {cover}"),
-        *([gaps] if hidden else []),
-        ("confined wave speed [m/s]", speed, "sqrt((lambda + 2 mu) / rho), of the fastest body"),
-        ("engine", type(internal).__name__, f'engine = "{scene.engine}"'),
-        *(_of_motion(simulation) if scene.statics is None else _of_statics(simulation)),
-    )
-
-
-def _of_motion(simulation: Simulation) -> Iterator[tuple[str, Any, str]]:
-    scene = simulation.scene
-    limit = cfl_step(simulation.integrator, simulation.dynamics.loads, simulation.model.bodies)
-    of = "the CFL step, by wave speed and spacing, as the critical step is longer"
-    if simulation.safe is not None and simulation.safe.step <= limit:
-        of = "the critical step"
-    step = f"{scene.time_step_factor:g} of {of}"
-    if scene.time_step is not None:
-        step = "set by the scene"
-    yield "time step [s]", simulation.step_size, f"{step}; cut where bodies grow stiffer"
-    margin = critical_step(simulation).margin
-    source = "from the highest frequency of the discrete system at the start"
-    yield "critical step over it", margin, source
-    yield "steps", simulation.steps, f"for {scene.duration:g} s"
-    if (sleep := scene.sleep) is not None:
-        slow = f"slabs slower than {sleep.tolerance:g} of the largest speed sleep, and cost nothing"
-        yield "sleep", f"up to {sleep.slabs} slabs", slow
-    if simulation.plan.compiles_steps:
-        called = ", ".join(simulation.plan.called)
-        how = f"but for {called}, called at every step" if called else "whole steps"
-        yield "time loop", "compiled", how
-    else:
-        yield "time loop", "step by step", "by the parts themselves, which works for all kinds"
-
-
-def _of_statics(simulation: Simulation) -> Iterator[tuple[str, Any, str]]:
-    statics = simulation.scene.statics
-    assert statics is not None
-    unknowns = freedoms(simulation.dynamics).count
-    yield "free displacements", unknowns, "unknowns of Newton's method"
-    iterated = iterates(statics.solver, simulation.particles.dimension, unknowns)
-    yield (
-        "solver",
-        ITERATIVE if iterated else DIRECT,
-        "of its linear systems; direct in any case with ghosts, or without an energy",
-    )
-    doubled = "" if simulation.remembers else ", doubled on success"
-    yield "load steps", simulation.load_steps, f"at first: halved on failure{doubled}"
-    yield "tolerance", statics.tolerance, "imbalance of forces over loads and reactions"
 
 
 def _effect(
