@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from solidsph.maths.arrays import Array, Indices
+from solidsph.model.regions import is_reserved
 from solidsph_builtin.shapes._triangles import area_vectors, edges_of, groups_of
 
 # So many faces are named; smaller ones are one face together, as of a rough scan.
@@ -48,6 +49,11 @@ def patches(
 
 
 def tag_of(name: str) -> str:
-    """A name as conditions can have it: letters, digits and hyphens, a letter first."""
+    """A name as conditions can have it: letters, digits and hyphens, a letter first.
+
+    With `face-` before it, if it has another meaning there.
+    """
     tag = re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-")
-    return tag if tag[:1].isalpha() else f"face-{tag}" if tag else "face"
+    if not tag:
+        return "face"
+    return tag if tag[0].isalpha() and not is_reserved(tag) else f"face-{tag}"

@@ -105,7 +105,8 @@ def check_placement(
     """Raise SceneError unless angles and way fit the dimension."""
     count = {1: 0, 2: 1, 3: 3}[dimension]
     if len(rotate) not in (0, count):
-        expected = f"{count} angles in degrees, as the shape is {dimension}D"
+        angles = "1 angle" if count == 1 else f"{count} angles"
+        expected = f"{angles} in degrees, as the shape is {dimension}D"
         raise refusal(shape, "rotate", expected, short(list(rotate)))
     if len(translate) not in (0, dimension):
         expected = f"{dimension} coordinates in m, as the shape is {dimension}D"

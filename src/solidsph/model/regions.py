@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
+from keyword import iskeyword
 from typing import TypeAlias
 
 import numpy as np
@@ -19,6 +20,9 @@ Where: TypeAlias = str | Callable[[Array], Mask]
 ("X < 0.1 and not ghosts"), or in Python a function from positions (n, d) to a mask (n,)."""
 
 AXES = ("X", "Y", "Z")
+
+SYMBOLS = (*AXES, "t", "pi", "e")
+"""What is a number in formulas."""
 
 EVERYWHERE = "all"
 """The tag of every particle except the ghosts."""
@@ -153,7 +157,7 @@ def as_formula(particles: Particles, where: str) -> str:
 
     def renamed(found: re.Match[str]) -> str:
         parts = found.group().split("-")
-        if parts[0] in (*AXES, "t", "pi", "e"):
+        if parts[0] in SYMBOLS:
             return found.group()
         for count in range(len(parts), 1, -1):
             name = "-".join(parts[:count])
@@ -165,6 +169,12 @@ def as_formula(particles: Particles, where: str) -> str:
 
     # The part behind the dot of "two.edge-0" is treated by itself.
     return ".".join(_HYPHENATED.sub(renamed, part) for part in where.strip().split("."))
+
+
+def is_reserved(name: str) -> bool:
+    """True if `name` means something else than a face in every condition."""
+    word = variable(name)
+    return word in (*SYMBOLS, *_OF_EVERY_BODY) or iskeyword(word)
 
 
 def described(where: Where) -> str:

@@ -295,3 +295,15 @@ def test_a_run_does_not_go_on_with_another_file(
             continue
         with pytest.raises(SolidsphError, match=message):
             resume("run.h5", force=force)
+
+
+@pytest.mark.parametrize("word", ["surface", "interior", "all", "ghosts", "X", "t", "pi", "not"])
+def test_a_group_named_as_a_word_of_conditions(word: str, tmp_path: Path) -> None:
+    """Conditions keep the meaning of such words, and the group is found under a longer name."""
+    box = trimesh.creation.box([1.0, 1.0, 1.0])
+    lines = ["v {} {} {}".format(*vertex) for vertex in box.vertices]
+    for number, corners in enumerate(box.faces + 1):
+        lines += [f"g {word if number < 2 else 'rest'}", "f {} {} {}".format(*corners)]
+    path = tmp_path / "box.obj"
+    path.write_text("\n".join(lines))
+    assert set(Mesh(file=str(path)).surface(0.2).faces) == {f"face-{word}", "rest"}

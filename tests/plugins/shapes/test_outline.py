@@ -182,7 +182,7 @@ def test_broken_drawings(tmp_path: Path, name: str) -> None:
         ({"file": "a.csv", "rings": [SQUARE]}, "got both"),
         ({"rings": []}, "there are no rings"),
         ({"rings": [[[0.0, 0.0, 0.0]]]}, "lists of points with two finite coordinates"),
-        ({"rings": [SQUARE], "rotate": [1.0, 2.0]}, "rotate must be 1 angles in degrees"),
+        ({"rings": [SQUARE], "rotate": [1.0, 2.0]}, "rotate must be 1 angle in degrees"),
     ],
 )
 def test_parameters_that_are_refused(parameters: dict[str, Any], message: str) -> None:

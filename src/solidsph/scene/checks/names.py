@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from keyword import iskeyword
 
 from solidsph.model.particles import Particles
-from solidsph.model.regions import AXES, EVERYWHERE, variable
+from solidsph.model.regions import EVERYWHERE, SYMBOLS, variable
 
 
 class ParticleSetNames:
@@ -30,7 +30,7 @@ class ParticleSetNames:
             return (
                 "must begin with a letter and contain only letters, digits, '-' and '_'; change it"
             )
-        if variable(name) in (*AXES, "t", "pi", "e"):
+        if variable(name) in SYMBOLS:
             return "is a variable or constant of formulas; choose another"
         if iskeyword(variable(name)):
             return "is a keyword of Python, so no condition could contain it; choose another"
@@ -50,7 +50,7 @@ def check_names(bodies: Mapping[str, Particles]) -> Iterator[str]:
     names = ParticleSetNames()
     tags = list(dict.fromkeys(tag for b in bodies.values() for tag in (*b.tags, *b.faces)))
     for tag in tags:
-        if names.similar(tag):
+        if names.similar(tag) or variable(tag) in SYMBOLS or iskeyword(variable(tag)):
             yield f"the face or tag {tag!r} {names.problem(tag)}"
         names.add(tag)
     for name in bodies:
