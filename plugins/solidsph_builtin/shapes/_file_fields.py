@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 
 from solidsph.interfaces.shape import Shape
+from solidsph.system.files import content, located, working_folder
 from solidsph_builtin.shapes._checks import as_number, is_number, refusal
 
 
@@ -20,6 +21,19 @@ def path_field() -> Any:
 def angle_field() -> Any:
     """An attrs field that holds the angle from which an edge or a corner is sharp [degrees]."""
     return attrs.field(default=30.0, converter=as_number, validator=_check_angle)
+
+
+def read_bytes(path: str, most: int) -> bytes:
+    """The content of the file of a shape.
+
+    Raises:
+        OSError: it is not there, cannot be read, or has more than `most` bytes.
+    """
+    try:
+        return content(located(path), most)
+    except FileNotFoundError as cause:
+        begin = "" if Path(path).is_absolute() else f"; its path begins in {working_folder()}"
+        raise FileNotFoundError(f"No such file{begin}") from cause
 
 
 def _as_text(value: Any) -> Any:

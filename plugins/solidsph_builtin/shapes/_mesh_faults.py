@@ -98,6 +98,11 @@ def _wrong_sides(surface: Triangles) -> Iterator[str]:
                 f"it is inverted: seen from outside, its triangles run clockwise, as at {place}; "
                 "set repair = true, or flip its normals where it was drawn"
             )
+        elif (behind, ahead) == (1, 1):
+            yield (
+                f"two closed parts of it touch at {place}; unite them where it was drawn (in a "
+                "scene: one mesh each, and the shape 'union')"
+            )
         elif (behind, ahead) != (1, 0):
             yield (
                 f"a closed part of it lies within another, with normals that say it is no hole, or "

@@ -94,7 +94,9 @@ def _with_body_behind(vertices: Array, corners: Indices) -> Indices:
             corners[part] = corners[part][:, ::-1]
     for part in parts:
         surface = Triangles(vertices, corners, ("all",), np.zeros(len(corners), dtype=np.intp))
-        # Every part encloses something now: within an odd number of others it is a hole.
-        if sides(surface, part)[1] % 2 == 1:
+        # Every part encloses something now: within an odd number of others it is a hole. Against
+        # another it has as much in front as behind.
+        behind, ahead = sides(surface, part)
+        if ahead % 2 == 1 and behind > ahead:
             corners[part] = corners[part][:, ::-1]
     return corners

@@ -15,8 +15,7 @@ import numpy as np
 from solidsph.errors import SceneError
 from solidsph.interfaces.shape import Moments, Shape, Surface
 from solidsph.maths.arrays import Array
-from solidsph.system.files import content, located
-from solidsph_builtin.shapes._file_fields import angle_field, path_field
+from solidsph_builtin.shapes._file_fields import angle_field, path_field, read_bytes
 from solidsph_builtin.shapes._mesh_faults import faults
 from solidsph_builtin.shapes._mesh_files import MOST_BYTES, Soup, read_soup
 from solidsph_builtin.shapes._mesh_repair import merged, proper, repaired
@@ -137,7 +136,7 @@ class Mesh(Shape):
             suffix = Path(self.file).suffix.lower()
             if suffix in (".step", ".stp") and self.unit != "m":
                 raise ValueError(f"it holds its own unit; leave out unit = {self.unit!r}")
-            data = content(located(self.file), MOST_BYTES)
+            data = read_bytes(self.file, MOST_BYTES)
             key = (hashlib.sha256(data).hexdigest(), suffix, *self._parameters())
             if key not in _known:
                 while len(_known) >= _MOST_KNOWN:

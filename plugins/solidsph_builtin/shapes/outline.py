@@ -13,10 +13,9 @@ import numpy as np
 from solidsph.errors import SceneError
 from solidsph.interfaces.shape import Moments, Shape, Surface
 from solidsph.maths.arrays import Array
-from solidsph.system.files import content, located
 from solidsph_builtin.shapes._checks import as_points, as_tuple
 from solidsph_builtin.shapes._drawing_files import MOST_BYTES, Line, read_lines
-from solidsph_builtin.shapes._file_fields import angle_field, path_field
+from solidsph_builtin.shapes._file_fields import angle_field, path_field, read_bytes
 from solidsph_builtin.shapes._outline import ClosedLines, pieces
 from solidsph_builtin.shapes._placement import (
     UNITS,
@@ -134,7 +133,7 @@ class Outline(Shape):
 
     def _drawn(self) -> list[Line]:
         if self.file is not None:
-            data = content(located(self.file), MOST_BYTES)
+            data = read_bytes(self.file, MOST_BYTES)
             return read_lines(data, Path(self.file).suffix.lower(), self.unit)
         lines = []
         for ring in self.rings or ():

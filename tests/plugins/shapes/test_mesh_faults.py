@@ -204,3 +204,19 @@ def test_sound_surfaces_of_many_triangles_are_not_refused() -> None:
     mesh = blob(5)
     shape = Mesh(vertices=mesh.vertices, triangles=mesh.faces)
     assert shape.volume() == pytest.approx(mesh.volume, rel=1e-12)
+
+
+@pytest.mark.parametrize("repair", [False, True])
+def test_bodies_that_touch_are_no_hole(repair: bool) -> None:
+    beside = trimesh.creation.box([1.0, 1.0, 1.0]).apply_translation([1.0, 0.0, 0.0])
+    both = trimesh.util.concatenate([trimesh.creation.box([1.0, 1.0, 1.0]), beside])
+    with pytest.raises(SceneError, match=r"parts of it touch at \(0\.5, .* the shape 'union'"):
+        Mesh(vertices=both.vertices, triangles=both.faces, repair=repair)
+
+
+def test_a_file_that_is_not_there_is_told_with_the_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SceneError, match=f"No such file; its path begins in {tmp_path}"):
+        Mesh(file="a.stl")
