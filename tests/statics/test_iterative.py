@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -87,6 +88,21 @@ def test_a_plane_of_symmetry_and_an_imposed_motion() -> None:
         beam(3, 4)
         .boundary("symmetry", axis="z")
         .boundary("prescribed-motion", where="right", displacement={"y": "0.3 * t"})
+    )
+
+
+def test_particles_alone_in_a_cell_of_the_grid() -> None:
+    """Five corners of this torus stand alone in a cell, and turn there without stiffness."""
+    torus = trimesh.creation.torus(1.0, 0.4, major_sections=12, minor_sections=8)
+    mesh = {"type": "mesh", "vertices": torus.vertices, "triangles": torus.faces}
+    compared(
+        Simulation.builder()
+        .body("torus", shape=mesh, spacing=0.15)
+        .material("neo-hookean", **SOFT)
+        .formulation("total-lagrangian", gradient="corrected")
+        .boundary("clamp", where="X > 0.8")
+        .boundary("traction", where="surface and X < -1", traction={"x": -3e3})
+        .duration(1.0)
     )
 
 

@@ -17,6 +17,7 @@ from solidsph.statics.alternation import alternating_signs
 from solidsph.statics.coarse_space import CoarseSpace, Fineness
 from solidsph.statics.factors import Factors, SingularError, factorise
 from solidsph.statics.freedoms import Freedoms
+from solidsph.statics.held_in_body import held_in_body
 from solidsph.statics.increment import Increment
 from solidsph.statics.lead import Lead
 from solidsph.statics.linearised import Linearised, LinearSolver, UnsolvedError
@@ -242,6 +243,10 @@ class IterativeSolver(LinearSolver):
         try:
             return factorise(matrix, symmetric=True)
         except SingularError as error:
+            own = self.product(moduli, of_loads)
+            held = held_in_body(space, pattern, matrix, self.freedoms.free, own)
+            if held is not None:
+                return held
             if error.freedom is None:
                 raise
             moved = np.abs(space.matrix(pattern)[:, [error.freedom]].toarray()).ravel()
