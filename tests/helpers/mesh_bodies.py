@@ -129,3 +129,18 @@ def exported(mesh: trimesh.Trimesh, path: Path) -> Path:
     """The mesh in a file of the kind that its name says."""
     mesh.export(path)
     return path
+
+
+def file_scene(shape: str, file: str) -> str:
+    """A scene of one body whose shape is read from a file."""
+    return f"""
+duration = 1.0
+[body.part]
+spacing = 0.1
+shape = {{type = "{shape}", file = "{file}"}}
+[material]
+type = "linear-elastic"
+youngs_modulus = 1e6
+poissons_ratio = 0.3
+density = 1000.0
+"""

@@ -17,7 +17,7 @@ from solidsph.errors import SceneError
 from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes.mesh import Mesh
 from tests.commands.test_cli import solidsph
-from tests.helpers.mesh_bodies import blob, exported
+from tests.helpers.mesh_bodies import blob, exported, file_scene
 
 # What no broken file may take: that of ten million triangles has 5e8 bytes.
 BYTES = 1e8
@@ -136,24 +136,12 @@ BROKEN: dict[str, tuple[str, Callable[[Path], object], str]] = {
     "abaqus without cells": ("a.inp", lambda p: p.write_text("*NODE\n1, 0, 0, 0\n"), "triangles"),
 }  # fmt: skip
 
-SCENE = """
-duration = 1.0
-[body.part]
-spacing = 0.1
-shape = {{type = "mesh", file = "{}"}}
-[material]
-type = "linear-elastic"
-youngs_modulus = 1e6
-poissons_ratio = 0.3
-density = 1000.0
-"""
-
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_broken_files(tmp_path: Path, name: str, capfd: pytest.CaptureFixture[str]) -> None:
     file, write, message = BROKEN[name]
     write(tmp_path / file)
-    (tmp_path / "scene.toml").write_text(SCENE.format(file))
+    (tmp_path / "scene.toml").write_text(file_scene("mesh", file))
     tracemalloc.start()
     try:
         result = solidsph("run", "scene.toml", cwd=tmp_path)

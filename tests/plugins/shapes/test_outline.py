@@ -18,6 +18,7 @@ from solidsph_builtin.shapes.difference import Difference
 from solidsph_builtin.shapes.outline import Outline
 from solidsph_builtin.shapes.polygon import Polygon
 from tests.commands.test_cli import solidsph
+from tests.helpers.mesh_bodies import file_scene
 
 SQUARE = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]
 SLOT = [[0.5, 0.4], [1.5, 0.4], [1.5, 0.6], [0.5, 0.6]]
@@ -147,26 +148,13 @@ def _dxf(points: list[tuple[float, float]], units: int = 0) -> str:
     return text.getvalue()
 
 
-SCENE = """
-duration = 1.0
-[body.part]
-spacing = 0.1
-shape = {{type = "outline", file = "{}"}}
-[material]
-type = "linear-elastic"
-youngs_modulus = 1e6
-poissons_ratio = 0.3
-density = 1000.0
-"""
-
-
 @pytest.mark.parametrize("name", BROKEN)
 def test_broken_drawings(tmp_path: Path, name: str) -> None:
     file, made, message = BROKEN[name]
     content = made()
     data = content if isinstance(content, bytes) else content.encode()
     (tmp_path / file).write_bytes(data)
-    (tmp_path / "scene.toml").write_text(SCENE.format(file))
+    (tmp_path / "scene.toml").write_text(file_scene("outline", file))
     result = solidsph("run", "scene.toml", cwd=tmp_path)
     assert result.returncode == 2
     said = " ".join((result.stdout + result.stderr).split())
