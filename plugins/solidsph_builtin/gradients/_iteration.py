@@ -1,7 +1,8 @@
 """The sums of `consistent` for many particles, by conjugate gradients over the fixed pairs.
 
 A factorisation couples neighbours of neighbours: in space some 600 particles a particle. Here each
-step is one pass over the pairs, and nothing is stored but a small matrix a particle.
+step is one pass over the pairs and one over small blocks of particles, whose inverses take some 4
+kilobytes a particle in space.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ def solved(
         return result
 
     reached = np.flatnonzero(diagonal[:, 0] > 0.0)
-    diagonal[diagonal[:, 0] == 0.0, 0] = 1.0
+    diagonal[diagonal[:, 0] == 0.0, 0] = 1.0  # sums that no change of the weights reaches
     inverses = np.linalg.inv(blocks)
     near = OverlappingBlocks.of(sums, compiled, reached, soft[:, 0])
     of_moments = np.linalg.inv(blocks[:, 1:, 1:])
@@ -88,9 +89,9 @@ def solved(
     def sums_by_blocks(r: Array) -> Array:
         return near.solve(r[:, 0])[:, None]
 
-    pairs_passed = len(sums.columns)
-    most = min(_MOST, int(_PAIR_STEPS / pairs_passed))
-    most_of_sums = int(np.clip(_PAIR_STEPS_OF_SUMS / pairs_passed, _LEAST_OF_SUMS, _MOST))
+    count = len(sums.columns)
+    most = min(_MOST, int(_PAIR_STEPS / count))
+    most_of_sums = int(np.clip(_PAIR_STEPS_OF_SUMS / count, _LEAST_OF_SUMS, _MOST))
     largest = float(np.abs(missing).max())
     allowed, exact = _LEFT * largest, _LEFT_OF_SUMS * largest
     multipliers = _conjugate_gradients(softened, by_particles, missing, allowed, _FIRST)
