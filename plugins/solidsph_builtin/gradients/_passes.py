@@ -37,13 +37,14 @@ class Passes(NamedTuple):
     # (sums, multipliers (n, 1 + d, d)) -> what they add to the sums, the same shape;
     # of multipliers (n, 1, d), l alone, to the sums without their first moments.
     product: Any
-    # (sums, places (n,)) -> the rows that change, with a neighbour whose place is >= 0, or one.
+    # (sums, particles) -> the rows that change and that are or have one of these.
     rows_beside: Any
     # (sums, rows (r,), places (n,), block (m, m)): block += what these rows add to the part of the
-    # matrix of l alone that couples the particles with a place in the block, >= 0.
+    # matrix of l alone that couples the particles with a place in the block, >= 0; its lower
+    # triangle. Places ascend with the numbers of particles.
     add_block: Any
-    # (sums, functions of the particles (n, c) by their rows' starts, columns and values, matrix
-    # (c, c)): matrix += that of l alone between the functions.
+    # (sums, rows (r,), functions of the particles (n, c) by their rows' starts, columns and values,
+    # matrix (c, c)): matrix += that of l alone between the functions, from these rows.
     add_functions: Any
     # (ends (b + 1,) of the blocks among their members, members, inverses of their matrices one
     # after the other, r (n, d), z (n, d)): z += the solutions of all blocks.
@@ -177,16 +178,16 @@ def passes(dimension: int, degree: int) -> Passes:
         return out
 
     @njit
-    def rows_beside(sums, places):
-        n = len(sums.starts) - 1
-        beside = np.zeros(n, np.bool_)
-        for p in range(n):  # pairs are symmetric
-            if places[p] >= 0:
-                beside[p] = sums.shares[p] > 0.0
-                for m in range(sums.starts[p], sums.starts[p + 1]):
-                    q = sums.columns[m]
-                    beside[q] = sums.shares[q] > 0.0
-        return np.flatnonzero(beside)
+    def rows_beside(sums, particles):
+        rows = set()
+        for p in particles:  # pairs are symmetric
+            if sums.shares[p] > 0.0:
+                rows.add(p)
+            for m in range(sums.starts[p], sums.starts[p + 1]):
+                q = np.int64(sums.columns[m])
+                if sums.shares[q] > 0.0:
+                    rows.add(q)
+        return np.sort(np.array(list(rows)))
 
     # y of a row is l of the neighbours less its own. `inside` are the neighbours in the block.
     @njit(fastmath=_FAST)
@@ -226,7 +227,7 @@ def passes(dimension: int, degree: int) -> Passes:
             for a in range(members):
                 at = inside[a]
                 change = own * kept[a]
-                gained[:] = 0.0
+                gained[: a + 1] = 0.0
                 for i in range(k):
                     value = 0.0
                     for j in range(k):
@@ -234,25 +235,23 @@ def passes(dimension: int, degree: int) -> Passes:
                     value *= own
                     change -= value * held[i]
                     wi = weighted[i]
-                    for c in range(members):
+                    for c in range(a + 1):
                         gained[c] += value * wi[c]
                 line = block[at]
                 line[at] += own * kept[a]
-                for c in range(members):
+                for c in range(a + 1):
                     line[inside[c]] -= gained[c]
                 if here >= 0:
-                    line[here] -= change
-                    block[here, at] -= change
+                    block[max(here, at), min(here, at)] -= change
 
     @njit(fastmath=_FAST)
-    def add_functions(sums, functions, matrix):
+    def add_functions(sums, rows, functions, matrix):
         starts, columns, values = functions
-        n = len(sums.starts) - 1
         w, x, b = scratch(sums.starts)
         t, part = np.empty(k), np.empty(k)
         # The functions beside a row, at most those of all its neighbours.
         most = 0
-        for p in range(n):
+        for p in rows:
             total = starts[p + 1] - starts[p]
             for m in range(sums.starts[p], sums.starts[p + 1]):
                 total += starts[sums.columns[m] + 1] - starts[sums.columns[m]]
@@ -260,9 +259,7 @@ def passes(dimension: int, degree: int) -> Passes:
         most = min(most, len(matrix))
         found, slots = np.empty(most, np.int64), np.full(len(matrix), -1)
         y, rest = np.zeros((most, len(w))), np.zeros((most, len(w)))
-        for p in range(n):
-            if sums.shares[p] == 0.0:
-                continue
+        for p in rows:
             begin, count, whole = row(sums, p, w, x, b)
             size = 0
             for m in range(-1, count):

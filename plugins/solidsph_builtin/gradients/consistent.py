@@ -72,9 +72,8 @@ class Consistent(Gradient):
 
     The system is solved once, when the body is built: by a factorisation if it is small, else by
     conjugate gradients over the fixed pairs. They leave a tenth of what the first moments lack. Of
-    the sums they leave 1e-7 of it up to some 60 000 particles in space, and 1e-4 in a cube of
-    97 000; in the plane, where long rims are slow, 0.001 in a plate with a hole of 23 000 and 0.02
-    in a ring of 95 000.
+    the sums they leave 1e-7 of it up to some 100 000 particles in space; in the plane, where long
+    rims are slow, 4e-4 in a plate with a hole of 13 000 and 0.002 in a ring of 95 000.
     """
 
     of: Gradient = attrs.field(factory=Cubic, metadata={"part": "gradients"})
