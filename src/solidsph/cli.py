@@ -28,7 +28,7 @@ VERBS: Mapping[str, str] = {
     "cases": "List the cases with their parameters.",
     "plugins": "List the installed parts and where they come from.",
     "check": "Check a part, or certify a scheme.",
-    "plot": "Draw the pictures of a record, or of all in a FOLDER.",
+    "plot": "Draw a scene before it runs, or the pictures of a record or of all in a FOLDER.",
     "view": "Show a record in 3D, with sliders for time and deformation.",
     "reproduce": "Reproduce figures of the paper.",
     "cost": "Show the time that accuracy costs for a scene or a case.",

@@ -28,6 +28,16 @@ from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.interfaces.integrator import Integrator, PointwiseIntegrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.law import Law, memory_name
+from solidsph.interfaces.marks import (
+    Arrows,
+    Held,
+    Links,
+    Mark,
+    Plane,
+    field_arrows,
+    largest_arrows,
+    marks_of,
+)
 from solidsph.interfaces.material import Material
 from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.pair_table import PairTable
@@ -98,6 +108,7 @@ __all__ = [
     "AXES",
     "EVERYWHERE",
     "Array",
+    "Arrows",
     "Body",
     "BodySize",
     "BoundaryHandler",
@@ -124,6 +135,7 @@ __all__ = [
     "Formulation",
     "GhostConstraint",
     "Gradient",
+    "Held",
     "History",
     "HistoryMaterial",
     "Indices",
@@ -132,7 +144,9 @@ __all__ = [
     "Kernel",
     "Law",
     "LinearExtension",
+    "Links",
     "Load",
+    "Mark",
     "Mask",
     "Material",
     "Measurement",
@@ -147,6 +161,7 @@ __all__ = [
     "Pairs",
     "Particles",
     "Plan",
+    "Plane",
     "PluginError",
     "PointwiseDivergence",
     "PointwiseGradient",
@@ -189,14 +204,17 @@ __all__ = [
     "decoded",
     "determinant",
     "dot",
+    "field_arrows",
     "formula",
     "green_lagrange",
     "hookimpl",
     "identity",
     "inverse",
     "inverse_transpose",
+    "largest_arrows",
     "lattice_frequency",
     "located",
+    "marks_of",
     "memory_name",
     "neighbour_pairs",
     "number",

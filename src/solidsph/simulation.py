@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import attrs
 
@@ -23,6 +23,9 @@ from solidsph.run.session import exclusive
 from solidsph.scene.scene import Scene
 from solidsph.watch.soundness import Soundness
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 @final
 @attrs.frozen(eq=False, repr=False)
@@ -33,6 +36,14 @@ class Simulation(BuiltScene):
     def builder(cls, scene: Scene | None = None) -> Builder[Simulation]:
         """Builder of a simulation, empty or with the contents of `scene`."""
         return Builder(cls, scene)
+
+    def plot(self) -> Figure:
+        """A picture of the scene before it runs; `Simulation.builder(scene).plot()` draws it
+        without building the rest."""
+        from solidsph.assembly.arrangement import arrangement_of_built
+        from solidsph.results.arrangement_picture import arrangement_figure  # imports Matplotlib
+
+        return arrangement_figure(arrangement_of_built(self))
 
     def time_loop(self) -> TimeLoop:
         """Loop that computes the steps."""

@@ -28,7 +28,19 @@ CASES = {
     ("plot", "none.h5"): "there is no record none.h5; check the path, or run the scene first",
     ("view", "none.h5"): "there is no record none.h5; check the path, or run the scene first",
     ("resume", "none.h5"): "there is no record none.h5; check the path, or run the scene first",
-    ("plot", "s.toml"): "s.toml is not an HDF5 file, so no record of solidsph",
+    ("plot", "note.h5"): "note.h5 is not an HDF5 file, so no record of solidsph",
+    # Pictures of scenes
+    (
+        "plot",
+        "note.txt",
+    ): "'note.txt' is no record, and no scene either: note.txt is not",
+    ("plot", "broken.toml"): "broken.toml is not valid TOML",
+    ("plot", "s.toml", "--set", "spacing=-2"): "spacing must be a length in metres, got -2",
+    ("plot", "s.toml", "--output", "s.gif"): "a picture ends in .png, .svg, .pdf",
+    ("plot", "s.toml", "--output", "s.toml/x.png"): "check the path, its permissions and the disk",
+    ("plot", "s.toml", "--field", "velocity"): "--field colours a record, and 's.toml' is a scene",
+    ("plot", "note.h5", "--set", "spacing=1"): "--set changes a scene, and 'note.h5' holds records",
+    ("plot", "falling-edge"): "the case 'falling-edge' has no scene to draw",
     ("plot", "folder.toml"): "there is no record (*.h5) in the folder folder.toml; check the path",
     ("run", "s.toml", "-q", "--output", "note.h5"): "it is not replaced: choose another place",
     ("run", "s.toml", "-q", "--output", "s.toml/x"): "choose a path in a folder that you may write",
@@ -55,6 +67,7 @@ def folder(tmp_path: Path) -> Path:
         "word.toml": SCENE_TOML.replace("duration", "duraton"),
         "type.toml": SCENE_TOML.replace("duration = 0.01", 'duration = "long"'),
         "note.h5": "a note",
+        "note.txt": "a note",
     }
     for name, text in files.items():
         (tmp_path / name).write_text(text)

@@ -12,6 +12,7 @@ from scipy.sparse.linalg import SuperLU
 
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.marks import Mark, field_arrows
 from solidsph.interfaces.terms import Observation, StressTerm, Term
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField
@@ -44,10 +45,7 @@ class ApproximateNeumann(BoundaryHandler):
     example: ClassVar[Mapping[str, Any]] = {"where": "left", "traction": {"x": "1e3*sin(300*t)"}}
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
-        particles = model.particles
-        field = VectorField.of(self.traction, "approximate-neumann: traction", end=model.end)
-        field.check_dimension(particles.dimension, "approximate-neumann")
-        face = model.surface(self.where)
+        particles, field, face = model.particles, self._field(model), model.surface(self.where)
         boundary, area_vectors = face.particles, face.area_vectors
         ghosts = chosen_ghosts(model, self.ghosts, "approximate-neumann")
         normals = area_vectors / np.linalg.norm(area_vectors, axis=1)[:, None]
@@ -70,6 +68,16 @@ class ApproximateNeumann(BoundaryHandler):
                 images=interpolation(particles, particles.images[ghosts]),
             )
         ]
+
+    def marks(self, model: DiscreteModel, label: str) -> Sequence[Mark]:
+        owners = model.surface(self.where).particles
+        X = model.particles.positions[owners]
+        return (field_arrows(self._field(model), X, "traction", "Pa"),)
+
+    def _field(self, model: DiscreteModel) -> VectorField:
+        field = VectorField.of(self.traction, "approximate-neumann: traction", end=model.end)
+        field.check_dimension(model.particles.dimension, "approximate-neumann")
+        return field
 
 
 @final

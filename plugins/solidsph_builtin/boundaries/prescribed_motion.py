@@ -9,11 +9,12 @@ import attrs
 
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.marks import Mark, field_arrows, marks_of
 from solidsph.interfaces.terms import Term
 from solidsph.model.fields import Component, VectorField
 from solidsph.model.regions import Where
 from solidsph.registry.parameters import formula
-from solidsph_builtin.boundaries._imposed import imposed_motion
+from solidsph_builtin.boundaries._imposed import ImposedMotion, imposed_motion
 
 
 @final
@@ -40,3 +41,12 @@ class PrescribedMotion(BoundaryHandler):
         for axis in field.components:  # refuses a formula out of its domain now, not in the run
             field.values(axis, model.particles.positions[indices], 0.0)
         return [imposed_motion(model, label, indices, field, self.where)]
+
+    def marks(self, model: DiscreteModel, label: str) -> Sequence[Mark]:
+        (imposed,) = self.bind(model, label)
+        assert isinstance(imposed, ImposedMotion)
+        X = model.particles.positions[imposed.indices]
+        return (
+            *marks_of([imposed], model.particles, model.end),
+            field_arrows(imposed.field, X, "displacement", "m"),
+        )

@@ -13,6 +13,7 @@ from scipy.sparse import block_diag, csr_array, diags_array, kron
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.deformation_load import DeformationLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.marks import Mark, largest_arrows
 from solidsph.interfaces.terms import Observation, SurfaceLoad, Term
 from solidsph.maths.arrays import Array, Indices, Scalar, Tensor, Vector
 from solidsph.maths.tensors import cofactor, dot, scaled
@@ -43,7 +44,7 @@ class Pressure(BoundaryHandler):
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
         particles = model.particles
         in_the_reference(model, "pressure")
-        field = VectorField.of({"x": self.pressure}, "pressure: pressure", end=model.end)
+        field = self._field(model)
         face = model.surface(self.where)
         field.values(0, particles.positions[face.particles], 0.0)
         return [
@@ -56,6 +57,21 @@ class Pressure(BoundaryHandler):
                 gradients=_gradients(model, face.particles),
             )
         ]
+
+    def marks(self, model: DiscreteModel, label: str) -> Sequence[Mark]:
+        field, face = self._field(model), model.surface(self.where)
+        X, N = model.particles.positions[face.particles], face.area_vectors
+        lengths = np.linalg.norm(N, axis=1, keepdims=True)  # 0 where opposite faces meet
+        normals = np.divide(N, lengths, out=np.zeros_like(N), where=lengths > 0.0)
+
+        def vectors(time: float) -> Array:
+            return np.asarray(-field.values(0, X, time)[:, None] * normals)
+
+        end = model.end if field.varies(0) else 0.0
+        return (largest_arrows(vectors, end, X, "pressure", "Pa"),)
+
+    def _field(self, model: DiscreteModel) -> VectorField:
+        return VectorField.of({"x": self.pressure}, "pressure: pressure", end=model.end)
 
 
 def _gradients(model: DiscreteModel, chosen: Indices) -> Sequence[csr_array]:

@@ -13,6 +13,7 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.compilable_terms import LinearExtension
 from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.marks import Mark, Plane, marks_of
 from solidsph.interfaces.terms import Observation, Term
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import VectorField
@@ -77,6 +78,16 @@ class Symmetry(BoundaryHandler):
                 )
             )
         return terms
+
+    def marks(self, model: DiscreteModel, label: str) -> Sequence[Mark]:
+        held = tuple(marks_of(self.bind(model, label), model.particles, model.end))
+        if held:
+            return held
+        particles = model.particles
+        direction = np.eye(particles.dimension)[COMPONENTS.index(self.axis)]
+        # The normal points to the side of the body, whatever that is.
+        side = np.sign(particles.positions[~particles.ghosts].mean(axis=0) @ direction - self.at)
+        return (Plane(self.at * direction, side * direction),)
 
 
 def _on_plane_tolerance(model: DiscreteModel) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.compilable_terms import ScheduledLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.marks import Mark, field_arrows
 from solidsph.interfaces.terms import Observation, SurfaceLoad, Term
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField, scheduled_forces
@@ -41,10 +42,7 @@ class Traction(BoundaryHandler):
     example: ClassVar[Mapping[str, Any]] = {"where": "left", "traction": {"x": "1e3*sin(300*t)"}}
 
     def bind(self, model: DiscreteModel, label: str) -> Sequence[Term]:
-        particles = model.particles
-        field = VectorField.of(self.traction, "traction: traction", end=model.end)
-        field.check_dimension(particles.dimension, "traction")
-        face = model.surface(self.where)
+        particles, field, face = model.particles, self._field(model), model.surface(self.where)
         indices = face.particles
         for axis in field.components:
             field.values(axis, particles.positions[indices], 0.0)
@@ -57,6 +55,16 @@ class Traction(BoundaryHandler):
                 field=field,
             )
         ]
+
+    def marks(self, model: DiscreteModel, label: str) -> Sequence[Mark]:
+        owners = model.surface(self.where).particles
+        X = model.particles.positions[owners]
+        return (field_arrows(self._field(model), X, "traction", "Pa"),)
+
+    def _field(self, model: DiscreteModel) -> VectorField:
+        field = VectorField.of(self.traction, "traction: traction", end=model.end)
+        field.check_dimension(model.particles.dimension, "traction")
+        return field
 
 
 @final

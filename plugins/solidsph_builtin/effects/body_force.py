@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, final
 
 import attrs
@@ -10,6 +10,7 @@ import attrs
 from solidsph.interfaces.compilable_terms import ScheduledLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.marks import Mark, field_arrows
 from solidsph.interfaces.terms import Load
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.fields import Component, VectorField, scheduled_forces
@@ -30,16 +31,23 @@ class BodyForce(Effect):
     example: ClassVar[Mapping[str, Any]] = {"acceleration": {"x": "-9.81*cos(50*t)"}}
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
-        field = VectorField.of(self.acceleration, "body-force: acceleration", end=model.end)
-        field.check_dimension(model.particles.dimension, "body-force")
         indices = model.select(self.where)
         return _MassTimesField(
             label=label,
             particles=indices,
             positions=model.particles.positions[indices],
             masses=model.masses[indices],
-            field=field,
+            field=self._field(model),
         )
+
+    def marks(self, model: DiscreteModel, label: str) -> Sequence[Mark]:
+        X = model.particles.positions[model.select(self.where)]
+        return (field_arrows(self._field(model), X, "body force", "m/s^2"),)
+
+    def _field(self, model: DiscreteModel) -> VectorField:
+        field = VectorField.of(self.acceleration, "body-force: acceleration", end=model.end)
+        field.check_dimension(model.particles.dimension, "body-force")
+        return field
 
 
 @final

@@ -16,6 +16,7 @@ from solidsph.interfaces.body import Body
 from solidsph.interfaces.compilable_terms import PairLoad
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.marks import Links, Mark
 from solidsph.interfaces.pair_table import PairTable
 from solidsph.interfaces.terms import EnergyTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices, Scalar, Vector
@@ -66,6 +67,10 @@ class Joint(Effect):
             reference=model.particles.positions,
             stiffness_rate=springs.highest_frequency(model.masses),
         )
+
+    def marks(self, model: DiscreteModel, label: str) -> Sequence[Mark]:
+        springs, X = self._springs(model.bodies), model.particles.positions
+        return (Links(np.stack([X[springs.one], X[springs.other]], axis=1)),)
 
     def pair_work(self, particles: float, pairs: float) -> float:
         return 0.0  # few, at the faces, and not known before they are searched

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite, sqrt
 from typing import Any, ClassVar, final
 
@@ -13,6 +13,7 @@ from scipy.sparse import bsr_array, csr_array
 from solidsph.errors import SceneError
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
+from solidsph.interfaces.marks import Mark, Plane
 from solidsph.interfaces.memory import Memory
 from solidsph.interfaces.terms import EnergyTerm, FieldTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices
@@ -109,6 +110,11 @@ class RigidWall(Effect):
         )
         wall.motion(0.0)  # a formula outside its domain raises now, not during the run
         return wall
+
+    def marks(self, model: DiscreteModel, label: str) -> Sequence[Mark]:
+        d = model.particles.dimension
+        normal = _vector("normal", self.normal, d)
+        return (Plane(_vector("point", self.point, d), normal / np.linalg.norm(normal)),)
 
 
 def _depths(model: DiscreteModel) -> Array:

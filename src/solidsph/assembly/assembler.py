@@ -77,6 +77,7 @@ class Assembler:
             model=model,
             dynamics=dynamics,
             terms=tuple(terms),
+            handlers=self._parts.handlers,
             effects=self._parts.effects,
             integrator=self._problems.settled(self._parts.integrator),
             engine=self._problems.settled(self._parts.engine),

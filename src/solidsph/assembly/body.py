@@ -11,16 +11,19 @@ from solidsph.interfaces.smoothing_kernel import smoothing_kernel
 from solidsph.scene.part_maker import Parts
 
 
-def make_body(name: str, parts: Parts, extent: slice) -> Body:
-    """Body `name` of complete `parts`, with the rows `extent` of all particles."""
+def plain_body(name: str, parts: Parts, extent: slice) -> Body:
+    """Body `name` of complete `parts`, with the rows `extent` of all particles.
+
+    Without lines of sight and with the gradient that the scene names, whose weights are not formed:
+    what a picture of the scene needs.
+    """
     kernel, cover, formulation = parts.kernel, parts.cover, parts.formulation
     assert kernel is not None
     assert cover is not None
     assert formulation is not None
     shape, particles = parts.shapes[name], parts.sets[name]
     radius = cover * float(particles.spacings.max())
-    moving = formulation.configuration is Configuration.CURRENT
-    body = Body(
+    return Body(
         name=name,
         shape=shape,
         extent=extent,
@@ -28,8 +31,16 @@ def make_body(name: str, parts: Parts, extent: slice) -> Body:
         smoothing=smoothing_kernel(kernel, particles.dimension, radius),
         material=parts.materials[name],
         formulation=formulation,
-        hidden=hidden_pairs(shape, particles, radius, moving=moving),
     )
+
+
+def make_body(name: str, parts: Parts, extent: slice) -> Body:
+    """The body as a run needs it; arguments as for `plain_body`."""
+    body = plain_body(name, parts, extent)
+    formulation, particles = body.formulation, body.particles
+    moving = formulation.configuration is Configuration.CURRENT
+    hidden = hidden_pairs(body.shape, particles, body.smoothing.support_radius, moving=moving)
+    body = attrs.evolve(body, hidden=hidden)
     gradient = formulation.gradient.of_body(
         name, particles, body.smoothing, body.pairs, moving=moving
     )

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import logging
 import time as clock
-from typing import Generic, TypeVar, final
+from typing import TYPE_CHECKING, Generic, TypeVar, final
 
 from solidsph.assembly.assembler import Assembler
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.hooks import load_hook_plugins
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_builder import SceneBuilder
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LOG = logging.getLogger(__name__)
 
@@ -40,3 +43,16 @@ class Builder(SceneBuilder, Generic[S]):
         count = built.particles.count
         LOG.info("built %d particles with %d pairs in %.3g s", count, pairs, seconds)
         return built
+
+    def plot(self) -> Figure:
+        """A picture of the scene before it runs: bodies, particles, named faces and tags, who is
+        held, loads and probes. Of the simulation only what it shows is built.
+
+        Raises:
+            BuildError: with all problems, each with its remedy.
+        """
+        from solidsph.assembly.arrangement import arrangement_of
+        from solidsph.results.arrangement_picture import arrangement_figure  # imports Matplotlib
+
+        load_hook_plugins().hook.solidsph_configure(builder=self)
+        return arrangement_figure(arrangement_of(self.scene()))

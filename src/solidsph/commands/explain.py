@@ -22,6 +22,7 @@ from solidsph.commands.prediction import (
     this_machine,
     work_rows,
 )
+from solidsph.commands.quality import quality_rows, quality_text
 from solidsph.commands.target import parameters, resolve, target_argument
 from solidsph.costs.calibration import Calibration
 from solidsph.costs.cluster import Cluster
@@ -102,6 +103,7 @@ def _text(facts: Facts, titles: Mapping[str, str], *, verbose: bool) -> Iterator
                 shown = [r for r in scene[title] if verbose or r["quantity"] not in INTERNALS]
                 yield Table.of(title, shown, ("quantity", "value", "why"), {"quantity": ""})
         yield from face_text(scene.get("faces", ()), verbose=verbose)
+        yield from quality_text(scene.get("particles", ()))
         yield from _effects_text(scene["effects"], verbose=verbose)
         if scene["probes"]:
             yield Table.of("probes", scene["probes"], ("probe", "measures", "at"))
@@ -205,6 +207,7 @@ def _built(simulation: Simulation, effect_shares: Mapping[str, Share]) -> Facts:
         "parts": _parts(simulation.scene, simulation.parts),
         "numbers": numbers(simulation),
         "faces": face_rows(simulation),
+        "particles": quality_rows(simulation),
         "effects": effects + _other_effects(named, inside),
         "warnings": [
             {"name": a.name, "found": a.finding, "expected": a.expected, "remedy": a.remedy}

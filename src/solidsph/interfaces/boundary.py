@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.marks import Mark, marks_of
 from solidsph.interfaces.part import Part
 from solidsph.interfaces.terms import Term
 
@@ -27,3 +28,13 @@ class BoundaryHandler(Part):
         Raises:
             SceneError: it matches no particle, or cannot be imposed on those that it matches.
         """
+
+    def marks(self, model: DiscreteModel, label: str) -> Sequence[Mark]:
+        """What a picture of the scene shows of it: by default what its terms hold, and their loads.
+
+        A handler whose terms take long to form overrides this.
+
+        Raises:
+            SceneError: as `bind`.
+        """
+        return tuple(marks_of(self.bind(model, label), model.particles, model.end))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from enum import Enum
 from typing import ClassVar
 
 from solidsph.interfaces.discrete_model import DiscreteModel
+from solidsph.interfaces.marks import Mark
 from solidsph.interfaces.part import Part
 from solidsph.interfaces.terms import Load
 
@@ -50,6 +52,14 @@ class Effect(Part):
         Raises:
             SceneError: it matches no particle, or its parameters do not fit the model.
         """
+
+    def marks(self, model: DiscreteModel, label: str) -> Sequence[Mark]:
+        """What a picture of the scene shows of it; nothing by default.
+
+        Raises:
+            SceneError: as `bind`.
+        """
+        return ()
 
     def pair_work(self, particles: float, pairs: float) -> float:
         """Estimated number of pairs that one evaluation of its forces visits, for cost estimates.

@@ -14,6 +14,7 @@ import pluggy
 from numpy.typing import ArrayLike
 
 from solidsph.errors import BuildError, DivergedError, SceneError
+from solidsph.interfaces.boundary import BoundaryHandler
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.engine import Engine
@@ -45,6 +46,7 @@ class BuiltScene(ABC):
     model: DiscreteModel
     dynamics: Dynamics
     terms: Sequence[Term]
+    handlers: Mapping[str, BoundaryHandler]
     effects: Mapping[str, Effect]
     integrator: Integrator
     engine: Engine
