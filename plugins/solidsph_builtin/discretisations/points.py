@@ -55,8 +55,8 @@ class Points(Discretisation):
 
     They are either listed as `positions`, or read from a `file` with a row for each point and a
     column for each dimension: .npy, .csv with commas, or text with blanks; comments begin
-    with #. It is a regular file of up to 4 GiB. A relative path is relative to the working
-    directory; in a resumed run, to that in which the run was started.
+    with #. It is a regular file of up to 4 GiB. A relative path begins in the
+    folder of the scene file, in Python in the working folder.
 
     Without given `volumes` that of a point is the part of the shape nearest to it, found by
     sampling and scaled to the exact total if the shape knows its volume. Each sample of the surface

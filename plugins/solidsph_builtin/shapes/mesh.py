@@ -56,8 +56,7 @@ class Mesh(Shape):
     They come from a `file`, whose name says what it is: STL, OBJ or PLY; Gmsh (.msh), Abaqus
     (.inp) or VTU, of whose solid cells the outer faces count; STEP (.step, .stp). Or they are given
     as `vertices` and `triangles`, three numbers of vertices each, counterclockwise from outside.
-    A relative path is relative to the working directory; in a resumed run, to that in which the run
-    was started.
+    A relative path begins in the folder of the scene file, in Python in the working folder.
 
     Lengths are in the `unit` of the file, times `scale`; the body is then turned by `rotate`, about
     the axes x, y and z, one after the other, and moved by `translate`.

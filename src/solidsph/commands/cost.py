@@ -309,7 +309,7 @@ def _write_scenes(target: str, folder: Path, case: Case, result: SearchResult) -
     heading = "".join(f"# {line}\n" for line in evidence)
     for name, scene in scenes.items():
         path = folder / (f"{target}.toml" if len(scenes) == 1 else f"{target}-{name}.toml")
-        path.write_text(f"{heading}\n{scene.to_toml()}", encoding="utf-8")
+        path.write_text(f"{heading}\n{scene.to_toml(path.parent)}", encoding="utf-8")
         yield path
 
 

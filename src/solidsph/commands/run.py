@@ -169,7 +169,7 @@ def _write(wanted: Scene | Case, path: Path, *, as_json: bool) -> None:
     for name, scene in scenes.items():
         file = path if len(scenes) == 1 else path.with_stem(f"{path.stem}-{name}")
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(scene.to_toml(), encoding="utf-8")
+        file.write_text(scene.to_toml(file.parent), encoding="utf-8")
         written.append(str(file))
     facts = {"outcome": "written", "exit code": 0, "files": written}
     present(facts, [f"wrote {file}" for file in written], as_json=as_json)

@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from solidsph.scene.named_files import FILE as FILE_KEY
 from solidsph.system.files import content
 
 _MOST_BYTES = 2**32
@@ -44,5 +45,5 @@ def _entries(value: Any) -> Iterator[str]:
     for key, entry in items:
         if isinstance(entry, (dict, list)):
             yield from _entries(entry)
-        elif key == "file" and isinstance(entry, str):
+        elif key == FILE_KEY and isinstance(entry, str):
             yield entry

@@ -19,16 +19,17 @@ class Scene(SceneData):
 
     @classmethod
     def read(cls, path: Path | str) -> Scene:
-        """Read a TOML file.
+        """Read a TOML file. Paths in it begin in its folder.
 
         Raises:
             SceneError: the file is missing, is not TOML, or has mistakes.
         """
-        return cls.from_toml(read_text(Path(path)), str(path))
+        file = Path(path)
+        return cls(**read_values(read_text(file), str(path), file.parent))
 
     @classmethod
     def from_toml(cls, text: str, origin: str = "scene") -> Scene:
-        """Read TOML text; errors name `origin`.
+        """Read TOML text; errors name `origin`. Paths in it begin in the working folder.
 
         Raises:
             SceneError: the text is not TOML or has mistakes. The parts and places of the scene are
@@ -36,10 +37,13 @@ class Scene(SceneData):
         """
         return cls(**read_values(text, origin))
 
-    def to_toml(self) -> str:
+    def to_toml(self, folder: Path | None = None) -> str:
         """TOML text from which an equal scene is read.
+
+        Args:
+            folder: where the text will stand in a file, for `read`; None for `from_toml`.
 
         Raises:
             SceneError: the scene holds objects or functions that cannot be written to a file.
         """
-        return toml_of(self)
+        return toml_of(self, folder)

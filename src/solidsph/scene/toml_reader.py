@@ -16,6 +16,7 @@ import attrs
 from solidsph.errors import SceneError
 from solidsph.registry.construct import construct
 from solidsph.registry.problems import Problems, listed
+from solidsph.scene.named_files import read_in
 from solidsph.scene.placed_parts import further_problems
 from solidsph.scene.scene_data import (
     BodyScene,
@@ -90,8 +91,13 @@ def similar_names(wanted: str, *others: str) -> str:
     return f"; did you mean {' or '.join(map(repr, list(close)[:3]))}?" if close else ""
 
 
-def read_values(text: str, origin: str) -> dict[str, Any]:
+def read_values(text: str, origin: str, folder: Path | None = None) -> dict[str, Any]:
     """Values of the fields of a scene from TOML text; errors name `origin`.
+
+    Args:
+        text: of the scene.
+        origin: where it is from.
+        folder: of the file that it is from; None if it is from no file.
 
     Raises:
         SceneError: as `Scene.from_toml`.
@@ -105,7 +111,7 @@ def read_values(text: str, origin: str) -> dict[str, Any]:
     except (ValueError, RecursionError) as cause:
         raise SceneError(f"{origin} is not valid TOML: {cause}") from None
     problems = Problems()
-    values, complete = _scene(table, problems)
+    values, complete = _scene(table if folder is None else read_in(table, folder), problems)
     if problems.found:
         problems.add(further_problems(SceneData(**values), complete=complete))
         raise SceneError(listed(origin, problems.found))

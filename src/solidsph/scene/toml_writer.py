@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import attrs
@@ -10,6 +11,7 @@ import tomli_w
 
 from solidsph.errors import SceneError
 from solidsph.registry.construct import describe
+from solidsph.scene.named_files import written_to
 from solidsph.scene.scene_data import (
     RECOMMENDED,
     BodyScene,
@@ -20,8 +22,12 @@ from solidsph.scene.scene_data import (
 )
 
 
-def toml_of(scene: SceneData) -> str:
+def toml_of(scene: SceneData, folder: Path | None = None) -> str:
     """TOML text from which an equal scene is read.
+
+    Args:
+        scene: to write.
+        folder: of the file that the text is for; None for no file.
 
     Raises:
         SceneError: the scene holds objects or functions that cannot be written to a file.
@@ -49,7 +55,8 @@ def toml_of(scene: SceneData) -> str:
         "probe": [attrs.asdict(entry) for entry in scene.probes] or None,
         "reference": [_reference(entry) for entry in scene.references] or None,
     }
-    return tomli_w.dumps({key: _plain(v, key) for key, v in table.items() if v is not None})
+    plain = {key: _plain(v, key) for key, v in table.items() if v is not None}
+    return tomli_w.dumps(plain if folder is None else written_to(plain, folder))
 
 
 def _body(body: BodyScene) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from solidsph.results.record import Record
 from solidsph.studies.case import Measurement
 from solidsph.studies.quantity import Quantity
 from solidsph.system.encoding import decoded
-from solidsph.system.files import content
+from solidsph.system.files import content, located
 
 _MOST_BYTES = 2**26  # of a file of measurements
 
@@ -74,7 +74,7 @@ class Reference:
             SceneError: it is none of these, or the file has no such columns.
         """
         if isinstance(given, str) and Path(given).suffix.lower() in (".csv", ".txt", ".dat"):
-            path = (folder or Path()) / given
+            path = located(given) if folder is None else folder / given
             return cls(quantity, "", _read(path), source or given, tolerance)
         text = str(given)
         value = Expression.parse(text, [_TIME])({_TIME: 0.0})
