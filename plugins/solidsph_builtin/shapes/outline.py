@@ -86,18 +86,18 @@ class Outline(Shape):
 
     def signed_distance(self, points: Array) -> Array:
         """The distance, exact everywhere."""
-        return self._lines.signed_distance(points)
+        return self.outline.signed_distance(points)
 
     @property
     def convex(self) -> bool:
         """True if there is one ring that turns the same way at every corner."""
-        ways, other = self._lines.edges, self._lines.edges[self._lines.following]
+        ways, other = self.outline.edges, self.outline.edges[self.outline.following]
         turns = ways[:, 0] * other[:, 1] - ways[:, 1] * other[:, 0]
         return len(self._rings) == 1 and bool(np.all(turns >= 0.0))
 
     def surface(self, spacing: float) -> Surface:
         """Samples with the exact length and normal of every edge."""
-        lines = self._lines
+        lines = self.outline
         lengths = np.linalg.norm(lines.edges, axis=1)
         counts = np.array([samples_along(one, spacing, ON_LINE) for one in lengths.tolist()])
         owners, middles = pieces(lines.starts, lines.edges, counts)
@@ -108,13 +108,14 @@ class Outline(Shape):
         return self.moments(self.bounds()[0]).volume
 
     def moments(self, about: Array) -> Moments:
-        return self._lines.moments(about)
+        return self.outline.moments(about)
 
     def nearest(self, points: Array) -> Array:
-        return self._lines.nearest(points)
+        return self.outline.nearest(points)
 
     @cached_property
-    def _lines(self) -> ClosedLines:
+    def outline(self) -> ClosedLines:
+        """Its edges, counterclockwise around the inside."""
         return ClosedLines.of([ring.corners for ring in self._rings])
 
     @cached_property

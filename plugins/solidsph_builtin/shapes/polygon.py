@@ -83,7 +83,7 @@ class Polygon(Shape):
 
     def signed_distance(self, points: Array) -> Array:
         """The distance, exact everywhere."""
-        return self._outline.signed_distance(points)
+        return self.outline.signed_distance(points)
 
     def surface(self, spacing: float) -> Surface:
         """Samples with the exact length and normal of every edge."""
@@ -104,13 +104,14 @@ class Polygon(Shape):
         return abs(self._signed_area())
 
     def moments(self, about: Array) -> Moments:
-        return self._outline.moments(about)
+        return self.outline.moments(about)
 
     def nearest(self, points: Array) -> Array:
-        return self._outline.nearest(points)
+        return self.outline.nearest(points)
 
     @cached_property
-    def _outline(self) -> ClosedLines:
+    def outline(self) -> ClosedLines:
+        """Its edges, counterclockwise."""
         starts = self._edges()[0]
         return ClosedLines.of([starts if self._signed_area() > 0.0 else starts[::-1]])
 

@@ -11,12 +11,13 @@ from typing import Any, ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.interfaces.shape import Shape, Surface
+from solidsph.interfaces.shape import Moments, Shape, Surface
 from solidsph.maths.arrays import Array
 from solidsph_builtin.shapes._checks import as_number, is_number, refusal
 from solidsph_builtin.shapes._composite import as_shape, check_shape
 from solidsph_builtin.shapes._flat import flat
 from solidsph_builtin.shapes._sampling import ON_LINE, ON_SURFACE, Piece, joined
+from solidsph_builtin.shapes._straight import right_integral, straight_outline
 
 # Samples along the longest side for the check that a shape is its own mirror image, and how far it
 # may be from that, in sizes.
@@ -122,15 +123,16 @@ class Revolved(Shape):
         rows = np.repeat(np.arange(len(points)), counts)
         within = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
         step = self._turn / counts[rows]
-        angle = (within + 0.5) * step
+        # Samples are in pairs. Of a part of a turn they stand so far apart that both the area and
+        # the integral of the normal are exact: the surface closes.
+        apart = 0.5 * step if self._whole else np.arccos(np.sinc(step / math.pi))
+        angle = (2 * (within // 2) + 1) * step + np.where(within % 2, apart, -apart)
         c, s = np.cos(angle), np.sin(angle)
         r, z = points[rows].T
         flux = areas[rows] * (r * step)[:, None]
-        # Of a part of a turn the exact integral of the normal, so that the surface closes.
-        radial = flux[:, 0] if self._whole else flux[:, 0] * np.sinc(0.5 * step / math.pi)
         ring = Surface(
             np.column_stack([r * c, r * s, z]),
-            np.column_stack([radial * c, radial * s, flux[:, 1]]),
+            np.column_stack([flux[:, 0] * c, flux[:, 0] * s, flux[:, 1]]),
             tuple(names[rows].tolist()),
         )
         if self._whole:
@@ -154,11 +156,39 @@ class Revolved(Shape):
         return pieces
 
     def volume(self) -> float | None:
-        """By Pappus' theorem, for a full turn of a shape beside the axis whose centre is known."""
+        """By Pappus' theorem, for a shape of straight edges, or beside the axis with a known
+        centre."""
+        lines = straight_outline(self.of)
+        if lines is not None:
+            return self._turn * right_integral(lines, 1, 0, 0.0)
         known = self.of.moments(np.zeros(2))
-        if known is None or not self._whole or self.of.bounds()[0][0] <= 0.0:
+        if known is None or self.of.bounds()[0][0] <= 0.0:
             return None
         return self._turn * float(known.first[0])
+
+    def moments(self, about: Array) -> Moments | None:
+        """For a shape of straight edges."""
+        lines = straight_outline(self.of)
+        if lines is None:
+            return None
+
+        def of_shape(p: int, q: int) -> float:
+            return right_integral(lines, p, q, float(about[2]))
+
+        c, s, t = math.sin(self._turn), 1.0 - math.cos(self._turn), self._turn
+        twice = 0.5 * math.sin(t) * math.cos(t)
+        volume = t * of_shape(1, 0)
+        first = np.array([c * of_shape(2, 0), s * of_shape(2, 0), t * of_shape(1, 1)])
+        second = np.zeros((3, 3))
+        second[:2, :2] = of_shape(3, 0) * np.array(
+            [[0.5 * t + twice, 0.5 * c**2], [0.5 * c**2, 0.5 * t - twice]]
+        )
+        second[:2, 2] = second[2, :2] = np.array([c, s]) * of_shape(2, 1)
+        second[2, 2] = t * of_shape(1, 2)
+        # From the axis to the point.
+        aside = np.append(about[:2], 0.0)
+        second -= np.outer(first, aside) + np.outer(aside, first) - volume * np.outer(aside, aside)
+        return Moments(volume, first - volume * aside, second)
 
     def nearest(self, points: Array) -> Array | None:
         """In the half plane of each point, for a full turn."""
