@@ -39,6 +39,25 @@ traction = {{x = "5e3*min(t/0.02, 1)"}}
     ),
     Flawed(
         "several-faces",
+        "where = 'top and (surface and Y > 0.09)'",
+        f"""
+title = "a load on the surface above a height, the rims of both sides included"
+duration = 0.05
+material = {RUBBER}
+[body.block]
+shape = {{type = "box", lengths = [0.2, 0.1]}}
+spacing = 0.01
+[[boundary]]
+type = "clamp"
+where = "bottom"
+[[boundary]]
+type = "traction"
+where = "surface and Y > 0.09"
+traction = {{x = "5e3*min(t/0.02, 1)"}}
+""",
+    ),
+    Flawed(
+        "several-faces",
         "where = 'right and (corner)'",
         f"""
 title = "a load on a corner that is a tag of coordinates"
@@ -1127,7 +1146,7 @@ shape = {{type = "polygon", vertices = [[0, 0], [0.2, 0], [0.2, 0.1], [0, 0.05]]
 spacing = 0.005
 [[boundary]]
 type = "traction"
-where = "surface and X < 1e-2"
+where = "(edge-0 or edge-2 or edge-3) and X < 1e-2"
 traction = {{x = "1e7*sin(pi*min(t/4e-5, 1))**2"}}
 """,
     f"""

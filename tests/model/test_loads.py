@@ -190,9 +190,9 @@ def test_everything_else_takes_the_face_of_one_body() -> None:
 @pytest.mark.parametrize(
     ("where", "told"),
     [
-        ("plate-2.rigth", "body 'plate-2' has no 'rigth'; did you mean 'plate-2.right'?"),
+        ("plate-2.rigth", "body 'plate-2' has no 'rigth'; did you mean 'plate-2.right'? it has "),
         ("plate-2.rigth and X > 0", "did you mean 'plate-2.right'"),
-        ("plat-2.right", "there is no body 'plat-2'; did you mean 'plate-2'?"),
+        ("plat-2.right", "there is no body 'plat-2'; did you mean 'plate-2'? bodies: "),
         ("plat.right and Y > 0.1", "there is no body 'plat'"),
         ("plate-2.one", "body 'plate-2' has no 'one'"),
         ("plate-2.right-ghosts", "'right-ghosts' is neither a tag nor a condition"),

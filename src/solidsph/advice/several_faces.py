@@ -29,9 +29,10 @@ _SAME, _OPPOSITE = 1e-3, 0.5
 def several_faces(facts: SceneFacts) -> Iterator[Advice]:
     """Compare the areas that a load takes of each face.
 
-    A corner that is picked by coordinates owns some of every face that meets there. A condition
-    with "surface", or of names alone, such as "not left", means all of it. So does the name of a
-    face that several bodies have, unless one such face lies against another body.
+    A corner that is picked by coordinates owns some of every face that meets there, and so do the
+    rims of "surface and Z > 0.1". A condition of names alone, such as "surface" or "not left",
+    means all of it. So does the name of a face that several bodies have, unless one such face lies
+    against another body.
     """
     pieces = facts.simulation.model.pieces()
     for entry in facts.scene.boundaries:
@@ -43,8 +44,7 @@ def several_faces(facts: SceneFacts) -> Iterator[Advice]:
         chosen = pieces.at(where) & (pieces.areas > 0.0)
         loose = pieces.unnamed(where) & chosen
         shares = _shares(pieces, chosen)
-        picked = names & {*AXES} and "surface" not in {name.split(".")[-1] for name in names}
-        if loose.any() and len(shares) > 1 and picked:
+        if loose.any() and len(shares) > 1 and names & {*AXES}:
             none = loose.sum() == chosen.sum()
             why = "names no face" if none else "names one face, and meets more"
         elif _in_several_bodies(pieces, chosen, names) and _covered(pieces, chosen):

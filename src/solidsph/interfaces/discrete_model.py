@@ -12,7 +12,7 @@ from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
 from solidsph.maths.arrays import Array, Indices
 from solidsph.model.particles import Face, Particles
-from solidsph.model.regions import Where, described, select
+from solidsph.model.regions import Where, described, select, some_of
 from solidsph.model.surface import Conditions, Pieces
 
 
@@ -46,7 +46,7 @@ class DiscreteModel:
             self.select(where)  # raises if there is no particle either
             raise SceneError(
                 f"no particle at {described(where)} lies on the surface; name a face: "
-                f"{', '.join(pieces.names) or 'there is none'} ('or' joins two of them; no surface "
+                f"{some_of(pieces.names) or 'there is none'} ('or' joins two of them; no surface "
                 "is on both)"
             )
         return pieces.owned(chosen)

@@ -27,6 +27,9 @@ SYMBOLS = (*AXES, "t", "pi", "e")
 EVERYWHERE = "all"
 """The tag of every particle except the ghosts."""
 
+# Names that a message lists.
+_LISTED = 10
+
 # Tags of every body, even if no particle has them.
 _OF_EVERY_BODY = (EVERYWHERE, "surface", "interior", "ghosts")
 
@@ -212,7 +215,8 @@ def _check_names(particles: Particles, where: str) -> None:
 def _no_tag(particles: Particles, where: str, name: str) -> SceneError:
     known = _known(particles)
     near = difflib.get_close_matches(name, known, 1)
-    hint = f"did you mean {near[0]!r}?" if near else f"known tags: {_some(known)}"
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    hint += f"known tags: {some_of(known)}"
     what = "" if name == where else f": {name!r}"
     return SceneError(f"where = {where!r}{what} is neither a tag nor a condition; {hint}")
 
@@ -221,12 +225,14 @@ def _check_of_body(particles: Particles, where: str, body: str, tag: str) -> Non
     """Raise SceneError unless there is such a body and it has such a tag."""
     if body not in particles.bodies:
         near = difflib.get_close_matches(body, particles.bodies, 1)
-        hint = f"did you mean {near[0]!r}?" if near else f"bodies: {_some(particles.bodies)}"
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        hint += f"bodies: {some_of(particles.bodies)}"
         raise SceneError(f"where = {where!r}: there is no body {body!r}; {hint}")
     tags = list(_of_body(particles, body))
     if tag not in tags:
         near = difflib.get_close_matches(tag, tags, 1)
-        hint = f"did you mean '{body}.{near[0]}'?" if near else f"it has {_some(tags)}"
+        hint = f"did you mean '{body}.{near[0]}'? " if near else ""
+        hint += f"it has {some_of(tags)}"
         raise SceneError(f"where = {where!r}: body {body!r} has no {tag!r}; {hint}")
 
 
@@ -237,7 +243,8 @@ def _of_body(particles: Particles, body: str) -> Iterator[str]:
             yield tag
 
 
-def _some(names: Collection[str]) -> str:
+def some_of(names: Collection[str]) -> str:
+    """The first of several names for a message, and how many others there are."""
     listed = list(names)
-    rest = f" and {len(listed) - 12} more" if len(listed) > 12 else ""
-    return ", ".join(listed[:12]) + rest
+    rest = f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else ""
+    return ", ".join(listed[:_LISTED]) + rest
