@@ -7,11 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from solidsph.maths.arrays import Array, Indices, Mask
-from solidsph_builtin.shapes._libraries import geometry_library
+from solidsph_builtin.shapes._mesh_crossings import first_meetings
 from solidsph_builtin.shapes._triangles import Triangles, area_vectors, pieces_of
 
-# Part of the length of an edge, from either end, where a triangle may touch it: rounding.
-_TOUCHES = 1e-7
 # Part of the size of a triangle from which its inside is looked at.
 _BESIDE = 1e-3
 
@@ -28,8 +26,19 @@ def faults(vertices: Array, corners: Indices) -> Iterator[str]:
     yield from _open(vertices, corners)
     yield from _turned(vertices, corners)
     surface = Triangles(vertices, corners, ("all",), np.zeros(len(corners), dtype=np.intp))
-    yield from _crossing(surface)
+    meetings = first_meetings(vertices, corners)
+    if meetings.crossing is not None:
+        yield (
+            f"it crosses itself at {_numbers(meetings.crossing)} m; cut it there, or unite its "
+            "parts where it was drawn (in a scene: one mesh each, and the shape 'union')"
+        )
     yield from _wrong_sides(surface)
+    if meetings.overlap is not None:
+        yield (
+            f"two triangles lie on each other at {_numbers(meetings.overlap)} m; remove the fold, "
+            "or unite its parts where it was drawn (in a scene: one mesh each, and the shape "
+            "'union')"
+        )
 
 
 def _not_finite(vertices: Array, corners: Indices) -> Iterator[str]:
@@ -123,49 +132,6 @@ def sides(surface: Triangles, part: Indices) -> tuple[int, int]:
     middle = triangles[largest].mean(axis=0)
     behind, ahead = np.rint(surface.winding_numbers(np.stack([middle - step, middle + step])))
     return int(behind), int(ahead)
-
-
-def _crossing(surface: Triangles) -> Iterator[str]:
-    crossing = _first_crossing(surface)
-    if crossing is not None:
-        yield (
-            f"it crosses itself at {_numbers(crossing)} m; cut it there, or unite its parts where "
-            "it was drawn (in a scene: one mesh each, and the shape 'union')"
-        )
-
-
-def _first_crossing(surface: Triangles) -> Array | None:
-    """A place where an edge goes through a triangle that it does not belong to."""
-    vertices, corners = surface.vertices, surface.corners
-    edges = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2))
-    edges = np.unique(edges, axis=0)
-    tree = geometry_library("igl").AABB()
-    tree.init(vertices, corners)
-    ends = vertices[edges]
-    ways = ends[:, 1] - ends[:, 0]
-    starts = ends[:, 0] + _TOUCHES * ways
-    # The first triangle that an edge meets will do: where surfaces cross, many edges do.
-    found, along, _ = tree.intersect_ray_first(vertices, corners, starts, ways)
-    hit = np.flatnonzero((found >= 0) & (along < 1.0 - 2.0 * _TOUCHES))
-    triangles = corners[found[hit]]
-    through = ~(edges[hit][:, :, None] == triangles[:, None, :]).any(axis=(1, 2))
-    through &= _on_both_sides(ends[hit], vertices[triangles])
-    if not through.any():
-        return None
-    first = hit[np.argmax(through)]
-    place: Array = starts[first] + along[first] * ways[first]
-    return place
-
-
-def _on_both_sides(edges: Array, triangles: Array) -> Array:
-    """Whether edges (m, 2, 3) end clearly on both sides of the planes of triangles (m, 3, 3)."""
-    areas = area_vectors(triangles)
-    sizes = np.linalg.norm(areas, axis=1)
-    normals = areas / np.where(sizes > 0.0, sizes, 1.0)[:, None]
-    heights = np.einsum("mei,mi->me", edges - triangles[:, :1], normals)
-    lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
-    clear = np.abs(heights).min(axis=1, initial=np.inf) > _TOUCHES * lengths
-    return np.asarray(clear & (heights[:, 0] * heights[:, 1] < 0.0))
 
 
 def _count(mask: Mask) -> int:

@@ -29,13 +29,16 @@ from solidsph_builtin.shapes._placement import (
     translation_field,
     unit_field,
 )
+from solidsph_builtin.shapes._recent_values import RecentValues
 from solidsph_builtin.shapes._triangles import Triangles
 
-# Surfaces by the content of their file and the parameters, as a shape is made several times while
-# a scene is built.
-_known: dict[tuple[Any, ...], Triangles] = {}
-_MOST_KNOWN = 8
+_RECENT: RecentValues[Triangles] = RecentValues(8)
+"""Surfaces by the content of their file and the parameters.
 
+A scene makes a shape several times: as it is read, estimated and built, and again for every
+spacing of a search. To check a mesh of 3e5 triangles takes ten seconds. A surface is never changed,
+and its key is all that it depends on, so that who has it already cannot be seen.
+"""
 
 _SOURCES = ("file", "vertices", "triangles")
 
@@ -137,11 +140,7 @@ class Mesh(Shape):
                 raise ValueError(f"it holds its own unit; leave out unit = {self.unit!r}")
             data = read_bytes(self.file, MOST_BYTES)
             key = (hashlib.sha256(data).hexdigest(), suffix, *self._parameters())
-            if key not in _known:
-                while len(_known) >= _MOST_KNOWN:
-                    _known.pop(next(iter(_known)))
-                _known[key] = self._enclosed(read_soup(data, suffix))
-            return _known[key]
+            return _RECENT.value(key, lambda: self._enclosed(read_soup(data, suffix)))
         except (OSError, ValueError, MemoryError) as cause:
             raise SceneError(f"{what}: {cause}") from cause
 
