@@ -16,6 +16,8 @@ _MOST = 30
 
 _NEAR = 0.05  # distance of names that are written as one, over the size of the scene
 
+_TOGETHER = 3  # names in one place, at most
+
 
 @final
 @attrs.frozen(eq=False)
@@ -55,13 +57,15 @@ def named_places(model: DiscreteModel) -> Sequence[NamedPlace]:
 
 
 def _apart(places: Sequence[NamedPlace], distance: float) -> Sequence[NamedPlace]:
-    """The places, with those closer together than `distance` [m] and on one side made one."""
+    """The places, with those closer together than `distance` [m] and on one side made one, which
+    has the names of the largest."""
     found: list[NamedPlace] = []
     for one in places:
         for k, other in enumerate(found):
             near = float(np.linalg.norm(one.place - other.place)) < distance
             if near and float(one.outward @ other.outward) > 0.5:
-                found[k] = attrs.evolve(other, name=f"{other.name}, {one.name}")
+                if other.name.count(",") < _TOGETHER - 1:
+                    found[k] = attrs.evolve(other, name=f"{other.name}, {one.name}")
                 break
         else:
             found.append(one)
