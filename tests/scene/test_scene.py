@@ -250,6 +250,16 @@ def test_builder_without_anything() -> None:
     assert len(caught.value.problems) == 2
 
 
+def test_an_equilibrium_needs_no_duration() -> None:
+    """Constant loads are the same whatever it is."""
+    body = Simulation.builder().body("bar", shape={"type": "interval", "length": 1.0}, spacing=0.1)
+    body = body.material("neo-hookean", youngs_modulus=1e6, poissons_ratio=0.3, density=1e3)
+    scene = body.statics().scene()
+    text = "\n".join(x for x in scene.to_toml().splitlines() if not x.startswith("duration"))
+    assert Scene.from_toml(text) == scene
+    assert scene.duration == 1.0
+
+
 def test_a_part_of_the_wrong_kind() -> None:
     with pytest.raises(BuildError, match="expected a name, a table with a `type`, or a Material"):
         box(2).material(Gaussian()).build()

@@ -95,7 +95,7 @@ def _of_scenes(target: str, options: _Options) -> Iterator[Path]:
     ):
         figure = Simulation.builder(scene).plot()
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=150)
+        figure.savefig(path, dpi=150, bbox_inches="tight")
         yield path
 
 

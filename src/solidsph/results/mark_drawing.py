@@ -26,6 +26,7 @@ COLOURS = ("#cb181d", "#6a51a3", "#006d2c", "#d94801", "#08519c", "#ae017e")
 _LONGEST = 0.12  # of arrows, over the size of the bodies
 _ACROSS = 14  # arrows along the longest side, at most
 _ACROSS_VOLUME = 4  # the same where they fill a body
+_ROUNDING = 1e-6
 _THICKNESS = 0.03  # of planes as they are drawn, over the size of the bodies
 _IN_FRONT = 3.0  # drawn after the particles
 _FAINT = 0.35  # of what is on a far side
@@ -230,17 +231,14 @@ class Painter:
         return np.asarray(self.particles.area_vectors[owners])
 
     def _spread(self, places: Array, across: int) -> Array:
-        """Numbers of evenly spread places: the one nearest to the middle of each cell of a grid."""
-        start, extent = places.min(axis=0), np.ptp(places, axis=0)
-        counts = np.maximum(np.ceil(extent / (self.size / across)), 1.0)
-        scaled = np.divide(
-            counts * (places - start), extent, out=np.full(places.shape, 0.5), where=extent > 0.0
-        )
-        cells = np.minimum(np.floor(scaled), counts - 1.0)
-        off = np.linalg.norm(scaled - cells - 0.5, axis=1)
-        order = np.argsort(off, kind="stable")
-        _, first = np.unique(cells[order], axis=0, return_index=True)
-        return np.asarray(order[np.sort(first)])
+        """Numbers of evenly spread places: in order, each that is far enough from those before."""
+        apart = (1.0 - _ROUNDING) * self.size / across
+        tree, free, chosen = cKDTree(places), np.ones(len(places), dtype=np.bool_), []
+        for place in np.lexsort(np.round(places / self.size, 9).T[::-1]):
+            if free[place]:
+                chosen.append(place)
+                free[tree.query_ball_point(places[place], apart)] = False
+        return np.array(chosen)
 
 
 _PAPER = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.7}

@@ -13,6 +13,7 @@ from solidsph.model.fields import Component
 from solidsph.model.regions import EVERYWHERE, Where
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import (
+    DURATION_OF_EQUILIBRIA,
     BodyScene,
     ImposedScene,
     InitialScene,
@@ -139,7 +140,7 @@ class SceneBuilder(ABC):
         return self._set(sleep=SleepScene(tolerance, slabs))
 
     def duration(self, duration: float) -> Self:
-        """Set the simulated time [s]."""
+        """Set the simulated time [s]; with `statics` it is 1 s unless given."""
         return self._set(duration=duration)
 
     def outputs(self, count: int) -> Self:
@@ -167,11 +168,11 @@ class SceneBuilder(ABC):
         problems = []
         if not self._values.get("bodies"):
             problems.append("there is no body; add one with .body(name, shape=..., spacing=...)")
-        if "duration" not in self._values:
+        if not {"duration", "statics"} & set(self._values):
             problems.append("there is no duration; add .duration(seconds)")
         if problems:
             raise BuildError(problems)
-        return Scene(**self._values)
+        return Scene(**{"duration": DURATION_OF_EQUILIBRIA, **self._values})
 
     @abstractmethod
     def build(self) -> object:

@@ -121,6 +121,10 @@ OFF = "off"
 """The `energy_tolerance` of a scene whose energies are not judged."""
 
 
+DURATION_OF_EQUILIBRIA = 1.0
+"""Duration of a scene with `statics` that gives none [s]."""
+
+
 @attrs.frozen
 class SceneData:
     """Everything that a scene specifies."""

@@ -19,6 +19,7 @@ from solidsph.registry.problems import Problems, listed
 from solidsph.scene.named_files import read_in
 from solidsph.scene.placed_parts import further_problems
 from solidsph.scene.scene_data import (
+    DURATION_OF_EQUILIBRIA,
     BodyScene,
     ImposedScene,
     InitialScene,
@@ -121,7 +122,8 @@ def read_values(text: str, origin: str, folder: Path | None = None) -> dict[str,
 def _scene(table: Mapping[str, Any], problems: Problems) -> tuple[dict[str, Any], bool]:
     """All values that can be read, and whether all bodies are among them."""
     _check_keys(table, _KEYS, "scene", problems)
-    if "duration" not in table and not _is_mistyped(table, "duration", _KEYS):
+    given = {"duration", "statics"} & set(table)
+    if not given and not _is_mistyped(table, "duration", _KEYS):
         problems.add(["no duration; add duration = ... in seconds"])
     bodies = problems.attempt(_mapping, table.get("body", {}), "body") or {}
     missing = not bodies and not isinstance(table.get("body"), list)
@@ -130,7 +132,7 @@ def _scene(table: Mapping[str, Any], problems: Problems) -> tuple[dict[str, Any]
     before = len(problems.found)
     read = {name: problems.attempt(_body, name, body, problems) for name, body in bodies.items()}
     values = {
-        "duration": 1.0,
+        "duration": DURATION_OF_EQUILIBRIA,
         "bodies": {name: body for name, body in read.items() if body is not None},
     }
     complete = bool(bodies) and len(problems.found) == before
