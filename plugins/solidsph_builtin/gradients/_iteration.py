@@ -78,7 +78,7 @@ def solved(
     reached = np.flatnonzero(diagonal[:, 0] > 0.0)
     diagonal[diagonal[:, 0] == 0.0, 0] = 1.0  # sums that no change of the weights reaches
     inverses = np.linalg.inv(blocks)
-    splines = Splines.of(sums, compiled, reached, soft[:, 0])
+    splines = Splines.of(sums, compiled, reached, soft[:, 0], particles.spacings)
     near = OverlappingBlocks.of(sums, compiled, reached, soft[:, 0])
 
     def by_particles(r: Array) -> Array:

@@ -7,13 +7,14 @@ for the smooth ones. They must have two continuous derivatives: what changes wei
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import product
 from typing import final
 
 import attrs
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, hstack
 
 from solidsph.maths.arrays import Array, Indices
 from solidsph_builtin.gradients._passes import Passes, Sums
@@ -22,6 +23,10 @@ from solidsph_builtin.gradients._passes import Passes, Sums
 # In a cube of 46 particles a side 44 steps leave 1e-7 with 4, 58 leave 7e-7 with 6.
 _APART, _MOST = 4.0, 4000
 _WIDER = 1.2
+
+# Where the spacing varies there are splines of half the knots' distance, and so on, where the mean
+# spacing is less than this part of what would suit them.
+_FINER, _SUITS = 0.5, 1.5
 
 # Functions with less than this part of the largest norm, which reach only a corner of the body, are
 # left out.
@@ -44,7 +49,9 @@ class Splines:
     factors: tuple[Array, bool]  # of the matrix, (c, c)
 
     @classmethod
-    def of(cls, sums: Sums, passes: Passes, reached: Indices, soft: Array) -> Splines:
+    def of(
+        cls, sums: Sums, passes: Passes, reached: Indices, soft: Array, spacings: Array
+    ) -> Splines:
         """At the particles that a change of the weights reaches.
 
         Args:
@@ -52,8 +59,9 @@ class Splines:
             passes: over the pairs.
             reached: these particles (r,).
             soft: added to the diagonal of the matrix of the particles, (n,).
+            spacings: of the particles, (n,) [m].
         """
-        functions = _functions(sums.positions, sums.length, reached)
+        functions = _functions(sums.positions, spacings, reached)
         matrix = _matrix_of(sums, passes, functions, soft)
         return cls(functions, cho_factor(matrix, overwrite_a=True))
 
@@ -81,17 +89,35 @@ def _matrix_of(sums: Sums, passes: Passes, functions: csr_array, soft: Array) ->
     return matrix
 
 
-def _functions(X: Array, spacing: float, reached: Indices) -> csr_array:
+def _functions(X: Array, spacings: Array, reached: Indices) -> csr_array:
     """B-splines at the `reached` particles (r,) of X (n, d) [m], 0 at others, (n, c).
 
-    Their knots are a grid over the bounding box. The functions have the norm 1.
+    Their knots are grids over the bounding box. The functions have the norm 1.
+
+    Args:
+        X: places of all particles.
+        spacings: of all particles, (n,) [m].
+        reached: the particles.
     """
     apart = _APART
     while True:
-        functions = _with_knots(X, reached, apart * spacing)
+        functions = csr_array(hstack(list(_levels(X, spacings, reached, apart)), format="csr"))
         if functions.shape[1] <= _MOST:
             return functions
         apart *= _WIDER
+
+
+def _levels(X: Array, spacings: Array, reached: Indices, apart: float) -> Iterator[csr_array]:
+    """B-splines with knots `apart` [spacings], the coarsest first."""
+    suited = float(spacings[reached].max())
+    yield _with_knots(X, reached, apart * suited)
+    while True:
+        suited *= _FINER
+        if not (spacings[reached] < _SUITS * suited).any():
+            return
+        finer = _with_knots(X, reached, apart * suited)
+        mean = finer.power(2).T @ spacings
+        yield finer[:, np.flatnonzero(mean < _SUITS * suited)]
 
 
 def _with_knots(X: Array, reached: Indices, apart: float) -> csr_array:
