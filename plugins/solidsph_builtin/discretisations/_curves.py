@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array, Indices
+from solidsph.model.spacing import SpacingField
 from solidsph_builtin.discretisations._features import meetings, smooth
 from solidsph_builtin.discretisations._feet import on_boundary
 from solidsph_builtin.discretisations._nearest import thinned
@@ -49,6 +50,34 @@ def even_points(shape: Shape, spacing: float) -> Array:
     # Corners come first, so that they stay.
     points = points[thinned(points / spacing, np.arange(len(points)), _CLOSEST)]
     return on_boundary(shape, surface, points, spacing)
+
+
+def graded_points(shape: Shape, spacing: SpacingField) -> Array:
+    """Points on the boundary of a plane `shape`, as far apart as a spacing that varies says, (m, 2)
+    [m]; each corner has one."""
+    surface = shape.surface(spacing.least / _FINER)
+    lengths = np.linalg.norm(surface.area_vectors, axis=1)
+    corners = meetings(smooth(surface), float(lengths.max())).points
+    rows = [corners]
+    for curve in _curves(surface, lengths):
+        line = _with_ends(surface, lengths, curve, corners)
+        rows.append(graded_steps(line, spacing, closed=_is_closed(line, lengths[curve])))
+    points = np.concatenate(rows)
+    points = points[thinned(points, np.arange(len(points)), _CLOSEST * spacing.least)]
+    return on_boundary(shape, surface, points, spacing.least)
+
+
+def graded_steps(line: Array, spacing: SpacingField, *, closed: bool) -> Array:
+    """Points along a polygonal `line` (m, d) in steps that follow a spacing that varies, its ends
+    included, (k, d) [m]."""
+    lengths = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    steps = lengths / spacing.at(0.5 * (line[1:] + line[:-1]))
+    way = np.concatenate([[0.0], np.cumsum(steps)])
+    count = cells_along(float(way[-1]), 1.0)
+    if closed:
+        count = 4 * max(1, floor(float(way[-1]) / 4.0 + _UP))
+    places = np.linspace(0.0, way[-1], count + 1)[: count + (not closed)]
+    return np.stack([np.interp(places, way, x) for x in line.T], axis=1)
 
 
 def _curves(surface: Surface, lengths: Array) -> list[Indices]:

@@ -6,7 +6,7 @@ The volume of a particle is the integral of the function that it has in a moving
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import product
 from math import ceil, sqrt
 
@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.interfaces.discretisation import Discretisation
-from solidsph.interfaces.shape import Shape
+from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.particles import Face, Particles
 from solidsph_builtin.discretisations._cells import cell_shares
@@ -26,14 +26,15 @@ from solidsph_builtin.discretisations._reproducing import Fit
 from solidsph_builtin.discretisations._sampled_once import sampled_once
 from solidsph_builtin.discretisations._surface import area_vectors, sampled
 
-# Samples of the surface along a spacing, over those that an assignment to particles needs.
-_FINER = {1: 1.0, 2: 4.0, 3: 1.0}
+FINER = {1: 1.0, 2: 4.0, 3: 1.0}
+"""Samples of the surface along a spacing, over those that an assignment to particles needs, by
+dimension."""
 
-# How often a cell that the surface cuts is halved.
-_HALVINGS = {1: 3, 2: 3, 3: 2}
+HALVINGS = {1: 3, 2: 3, 3: 2}
+"""How often a cell that the surface cuts is halved, by dimension."""
 
-# Particles this close to the boundary, in spacings, are on it.
-_ON_BOUNDARY = 1e-6
+ON_BOUNDARY = 1e-6
+"""Particles this close to the boundary, in spacings, are on it."""
 
 # Particles along a face for functions of its own.
 _ENOUGH_ALONG = 4
@@ -89,7 +90,7 @@ def fitted(
     faces = given.faces
     owners = np.unique(np.concatenate([face.particles for face in faces.values()]))
     # Areas of particles inside are those of whom the surface is nearest to.
-    if np.abs(shape.signed_distance(X[owners])).max(initial=0.0) <= _ON_BOUNDARY * spacing:
+    if np.abs(shape.signed_distance(X[owners])).max(initial=0.0) <= ON_BOUNDARY * spacing:
         faces = fitted_faces(discretisation, shape, spacing, X, faces)
         faces = agreeing(faces, X[real], volumes[real])
     areas = area_vectors(faces, given.count, shape.dimension)
@@ -156,15 +157,20 @@ def _quadrature(shape: Shape, spacing: float, grid: Grid, depth: float) -> tuple
     )
     shares = cell_shares(shape, grid, numbers, distance)
     whole, cut = numbers[shares == 1.0], numbers[(shares > 0.0) & (shares < 1.0)]
-    gauss = np.array(list(product((-_GAUSS, _GAUSS), repeat=shape.dimension))) * grid.steps
+    gauss = gauss_points(shape.dimension) * grid.steps
     points = [(grid.positions(whole)[:, None, :] + gauss).reshape(-1, shape.dimension)]
     weights = [np.full(len(points[0]), 1.0 / len(gauss))]
     for start in range(0, cut.size, _CELLS_AT_ONCE):
         some = cut[start : start + _CELLS_AT_ONCE]
-        found = finest_pieces(shape, grid.positions(some), grid.steps, _HALVINGS[shape.dimension])
+        found = finest_pieces(shape, grid.positions(some), grid.steps, HALVINGS[shape.dimension])
         points.append(found.points)
         weights.append(found.shares)
     return np.concatenate(points), grid.cell_volume * np.concatenate(weights)
+
+
+def gauss_points(dimension: int) -> Array:
+    """Points of Gauss's rule in a cell of size 1 about the origin, (2^d, d)."""
+    return np.array(list(product((-_GAUSS, _GAUSS), repeat=dimension)))
 
 
 def fitted_faces(
@@ -181,16 +187,32 @@ def fitted_faces(
     would be pushed as that part is, but not held as the face is by a plane of symmetry. Those on
     smaller faces, such as the sides of an outline, are of the whole surface.
     """
-    d = shape.dimension
-    surface = sampled(discretisation, shape, spacing / _FINER[d])
+    surface = sampled(discretisation, shape, spacing / FINER[shape.dimension])
+    grid = _lattice_of(discretisation, shape, spacing, positions)
+    spacings = np.full(len(positions), spacing)
+    return faces_by(surface, positions, spacings, given, lambda X: Fit(X, spacing, grid))
+
+
+def faces_by(
+    surface: Surface,
+    positions: Array,
+    spacings: Array,
+    given: Mapping[str, Face],
+    fit_of: Callable[[Array], Fit],
+) -> dict[str, Face]:
+    """Faces by samples of the surface, with the functions that `fit_of` makes of particles (k, d).
+
+    The particles are at `positions` (n, d), with their `spacings` (n,) [m].
+    """
+    d = positions.shape[1]
     names = np.array(surface.faces)
     outer = np.unique(np.concatenate([face.particles for face in given.values()]))
-    grid = _lattice_of(discretisation, shape, spacing, positions)
     faces = {}
     for name, face in given.items():
         samples = np.flatnonzero(names == name)
         points, area = surface.points[samples], surface.area_vectors[samples]
-        owners = face.particles[_on_face(positions[face.particles], points, area, spacing)]
+        own = face.particles
+        owners = own[_on_face(positions[own], points, area, spacings[own])]
         if len(owners) < _ENOUGH_ALONG ** (d - 1):
             owners = outer
         X = positions[owners]
@@ -200,7 +222,7 @@ def fitted_faces(
         products = (area[:, :, None] * x[:, None, :]).reshape(len(x), d * d)
         sizes = np.linalg.norm(area, axis=1)
         weights = np.column_stack([area, products, sizes])
-        found = Fit(X, spacing, grid).integrals(points, weights, sizes)
+        found = fit_of(X).integrals(points, weights, sizes)
         some = np.flatnonzero(np.abs(found[:, -1]) > _ROUNDING * np.abs(found[:, -1]).max())
         vectors, about_middle = found[some, :d], found[some, d:-1].reshape(-1, d, d)
         moments = about_middle - vectors[:, :, None] * (X[some] - middle)[:, None, :]
@@ -208,13 +230,13 @@ def fitted_faces(
     return faces
 
 
-def _on_face(positions: Array, points: Array, areas: Array, spacing: float) -> Mask:
+def _on_face(positions: Array, points: Array, areas: Array, spacings: Array) -> Mask:
     """Which of the particles at `positions` (n, d) are on a face with samples at `points` (m, d),
-    whose area vectors are `areas` (m, d), (n,)."""
+    whose area vectors are `areas` (m, d), by their `spacings` (n,) [m], (n,)."""
     nearest = cKDTree(points).query(positions)[1]
     normals = areas[nearest] / np.linalg.norm(areas[nearest], axis=1, keepdims=True)
     above = np.einsum("ni,ni->n", positions - points[nearest], normals)
-    return np.asarray(np.abs(above) < _ABOVE * spacing, dtype=np.bool_)
+    return np.asarray(np.abs(above) < _ABOVE * spacings, dtype=np.bool_)
 
 
 def agreeing(faces: Mapping[str, Face], positions: Array, volumes: Array) -> dict[str, Face]:
@@ -275,7 +297,7 @@ def with_moments(
     """
     d = positions.shape[1]
     basis, centre, scale = _quadratics(positions, volumes)
-    missing = _moments(shape, centre, scale, spacing / _FINER[d]) - volumes @ basis
+    missing = _moments(shape, centre, scale, spacing / FINER[d]) - volumes @ basis
     if np.abs(missing).max() <= _ROUNDING * volumes.sum():
         return volumes
     free = np.where(near, volumes, 0.0)

@@ -47,12 +47,17 @@ def nearest(tree: cKDTree, points: Array) -> Assignment:
 def thinned(points: Array, order: Indices, distance: float) -> Mask:
     """Which of `points` (m, d) stay if each, in this `order`, removes all that are less than
     `distance` away and have not been kept before, (m,)."""
-    rank = np.empty(len(points), dtype=np.intp)
-    rank[order] = np.arange(len(points))
-    pairs = cKDTree(points).query_pairs(distance, output_type="ndarray")
+    return thinned_pairs(cKDTree(points).query_pairs(distance, output_type="ndarray"), order)
+
+
+def thinned_pairs(pairs: Indices, order: Indices) -> Mask:
+    """The same of points that are too close in `pairs` (m, 2), which are changed."""
+    count = len(order)
+    rank = np.empty(count, dtype=np.intp)
+    rank[order] = np.arange(count)
     swapped = rank[pairs[:, 0]] > rank[pairs[:, 1]]
     pairs[swapped] = pairs[swapped, ::-1]
-    open_, kept = np.ones(len(points), dtype=np.bool_), np.zeros(len(points), dtype=np.bool_)
+    open_, kept = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
     # All at once that have none before them any more.
     while open_.any():
         pairs = pairs[open_[pairs].all(axis=1)]

@@ -7,7 +7,7 @@ second degree as far as the particles near x determine one safely.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache, cached_property
 from itertools import product
 from math import ceil
@@ -81,8 +81,8 @@ class Fit:
     """The functions N_p of particles."""
 
     particles: Array  # positions (n, d) [m]
-    spacing: float  # of the particles [m]
-    grid: Grid  # a lattice that many of the particles belong to
+    spacing: float | Callable[[Array], Array]  # of the particles, one or at X (m, d), (m,) [m]
+    grid: Grid | None  # a lattice that many of the particles belong to, if there is one
 
     @cached_property
     def _tree(self) -> cKDTree:
@@ -128,7 +128,8 @@ class Fit:
             return integrals
         rule = attrs.evolve(self._rule, largest_sum=_FAR)
         tree, degree = cKDTree(self.particles[rich]), np.full(poor.size, rule.degree)
-        parts, near = _functions(tree, rule, self.spacing, self.particles[poor], degree)
+        at = self.particles[poor]
+        parts, near = _functions(tree, rule, self._spacing_at(at), at, degree)
         gain = (least - integrals)[poor]
         result = integrals.copy()
         result[poor] += gain
@@ -147,8 +148,7 @@ class Fit:
             poor = np.flatnonzero(result[:, 0] <= least)
             if not poor.size:
                 break
-            close = cKDTree(points).query_ball_point(self.particles[poor], self.reach)
-            around = np.unique(np.concatenate(close)).astype(np.intp)
+            around = self._depending_on(points, poor)
             some = points[around], weights[around]
             result -= self._integrals(*some, degree[around])
             degree[around] = lower
@@ -158,22 +158,35 @@ class Fit:
     @cached_property
     def _rule(self) -> Rule:
         # One for the whole body: where two meet, the sums of `consistent` would be wrong.
-        in_lattice = self.grid.has(self.particles).all()
+        in_lattice = self.grid is not None and self.grid.has(self.particles).all()
         return IN_LATTICE if in_lattice else SCATTERED[self._tree.m]
+
+    def _spacing_at(self, points: Array) -> Array | float:
+        return self.spacing(points) if callable(self.spacing) else self.spacing
+
+    def _depending_on(self, points: Array, particles: Indices) -> Indices:
+        """The `points` (m, d) near which some of the particles are, (k,)."""
+        if not callable(self.spacing):
+            close = cKDTree(points).query_ball_point(self.particles[particles], self.reach)
+            return np.unique(np.concatenate(close)).astype(np.intp)
+        away = cKDTree(self.particles[particles]).query(points)[0]
+        return np.flatnonzero(away < self._rule.radius * self.spacing(points))
 
     @property
     def reach(self) -> float:
-        """Distance up to which particles count [m]."""
+        """Distance up to which particles count, if there is one spacing [m]."""
+        assert not callable(self.spacing)
         return self._rule.radius * self.spacing
 
     @cached_property
     def _lattice(self) -> Surroundings:
+        assert self.grid is not None
         return Surroundings.of(self.particles, self.grid, ceil(self._rule.radius))
 
     def _integrals(self, points: Array, weights: Array, degree: Indices) -> Array:
         result = np.zeros((len(self.particles), weights.shape[1]))
         regular = degree == self._rule.degree
-        regular &= self._lattice.regular(points, self.reach)
+        regular &= self.grid is not None and self._lattice.regular(points, self.reach)
         elsewhere = np.flatnonzero(~regular)
         for start in range(0, elsewhere.size, _POINTS_AT_ONCE):
             some = elsewhere[start : start + _POINTS_AT_ONCE]
@@ -217,17 +230,21 @@ class Fit:
         return sums
 
     def _functions(self, points: Array, degree: Indices) -> tuple[Array, Indices]:
-        return _functions(self._tree, self._rule, self.spacing, points, degree)
+        return _functions(self._tree, self._rule, self._spacing_at(points), points, degree)
 
 
 def _functions(
-    tree: cKDTree, rule: Rule, spacing: float, points: Array, degree: Indices
+    tree: cKDTree, rule: Rule, spacing: Array | float, points: Array, degree: Indices
 ) -> tuple[Array, Indices]:
     """N_p at `points` (m, d) by fits up to some `degree` (m,), both (m, k): the values and the
     particles p."""
     count, radius = min(_MOST[tree.m], tree.n), rule.radius * spacing
-    found, near = tree.query(points, k=np.arange(1, count + 1), distance_upper_bound=radius)
+    bound = float(np.max(radius))
+    found, near = tree.query(points, k=np.arange(1, count + 1), distance_upper_bound=bound)
     distances, near = np.asarray(found), np.asarray(near)
+    if isinstance(radius, np.ndarray):
+        radius = radius[:, None]
+        distances = np.where(distances < radius, distances, np.inf)
     # The nearest particle counts however far it is.
     alone = ~np.isfinite(distances[:, 0])
     if alone.any():

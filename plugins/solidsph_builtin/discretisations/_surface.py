@@ -115,14 +115,14 @@ def tags(faces: Mapping[str, Face], ghosts: Mask, nearest_faces: Sequence[str]) 
 
 
 def without_ghosts(
-    positions: Array, volumes: Array, spacing: float, faces: Mapping[str, Face]
+    positions: Array, volumes: Array, spacing: Array | float, faces: Mapping[str, Face]
 ) -> Particles:
     """Particles at `positions` (n, d), their own images, that own these `faces`.
 
     Args:
         positions: of the particles [m].
         volumes: (n,) [m^d].
-        spacing: that they are said to have [m].
+        spacing: that they are said to have, (n,) or one [m].
         faces: the particles on each face.
     """
     count, d = positions.shape

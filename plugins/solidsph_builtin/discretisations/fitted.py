@@ -8,15 +8,17 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.graded_discretisation import GradedDiscretisation
 from solidsph.interfaces.shape import Shape
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.particles import Particles
+from solidsph.model.spacing import SpacingField
 from solidsph_builtin.discretisations._cells import mean_spacing
 from solidsph_builtin.discretisations._checks import check_spacing
 from solidsph_builtin.discretisations._curves import even_points
 from solidsph_builtin.discretisations._feet import on_boundary
 from solidsph_builtin.discretisations._fitting import fitted
+from solidsph_builtin.discretisations._graded import graded
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._nearest import nearest
 from solidsph_builtin.discretisations._relaxation import relaxed
@@ -47,7 +49,7 @@ _ON_SURFACE = 1.0 / 3.0
 
 @final
 @attrs.frozen
-class Fitted(Discretisation):
+class Fitted(GradedDiscretisation):
     """Particles on the surface in even steps, and a lattice inside that adapts to them.
 
     Each corner and edge has particles. Inside are the points of a lattice over the bounding box;
@@ -81,6 +83,15 @@ class Fitted(Discretisation):
             return fitted(self, shape, spacing, given)
         cells = np.where(onto, _ON_SURFACE * grid.cell_volume, grid.cell_volume)
         return attrs.evolve(fitted(self, shape, spacing, given, _MOVES * size), cells=cells)
+
+    def graded_particles(self, shape: Shape, spacing: SpacingField) -> Particles:
+        """Particles on the surface and inside that repel each other until their distances are even
+        and follow the spacing.
+
+        Raises:
+            SceneError: there would be too many, or none inside the surface.
+        """
+        return graded(self, shape, spacing)
 
     def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
         """True: this is what it is for."""

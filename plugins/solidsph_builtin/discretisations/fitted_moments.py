@@ -8,14 +8,18 @@ from typing import Any, ClassVar, final
 import attrs
 
 from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.graded_discretisation import GradedDiscretisation
 from solidsph.interfaces.shape import Shape
 from solidsph.model.particles import Particles
+from solidsph.model.spacing import SpacingField
+from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations._fitting import fitted
+from solidsph_builtin.discretisations._graded_fitting import graded_fit
 
 
 @final
 @attrs.frozen
-class FittedMoments(Discretisation):
+class FittedMoments(GradedDiscretisation):
     """Another discretisation with volumes, and areas of particles on the boundary, that integrate
     polynomials of the second degree.
 
@@ -41,6 +45,16 @@ class FittedMoments(Discretisation):
             SceneError: the fit would make a volume negative.
         """
         return fitted(self, shape, spacing, self.of.particles(shape, spacing))
+
+    def graded_particles(self, shape: Shape, spacing: SpacingField) -> Particles:
+        """The same where the spacing varies, if the wrapped discretisation can follow it.
+
+        Raises:
+            SceneError: as of `particles`, or the wrapped one cannot.
+        """
+        if not isinstance(self.of, GradedDiscretisation):
+            raise refusal(self, "the spacing varies, which `of` does not follow; use 'points'")
+        return graded_fit(self, shape, spacing, self.of.graded_particles(shape, spacing))
 
     def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
         """Where those of the wrapped discretisation do."""

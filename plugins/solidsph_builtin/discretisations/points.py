@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from reprlib import repr as short
 from typing import Any, ClassVar
@@ -13,13 +13,15 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
-from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.graded_discretisation import GradedDiscretisation
 from solidsph.interfaces.shape import Shape
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import Particles
+from solidsph.model.spacing import SpacingField
 from solidsph.system.encoding import decoded
 from solidsph.system.files import content, located
 from solidsph_builtin.discretisations._checks import check_spacing, refusal
+from solidsph_builtin.discretisations._graded_fitting import graded_fit
 from solidsph_builtin.discretisations._grid import Grid, grid_over
 from solidsph_builtin.discretisations._nearest import nearest
 from solidsph_builtin.discretisations._surface import faces, sampled, without_ghosts
@@ -50,7 +52,7 @@ def _as_array(value: Any) -> Any:
 
 
 @attrs.frozen(eq=False)
-class Points(Discretisation):
+class Points(GradedDiscretisation):
     """Given points, in the order in which they are given.
 
     They are either listed as `positions`, or read from a `file` with a row for each point and a
@@ -60,7 +62,9 @@ class Points(Discretisation):
 
     Without given `volumes` that of a point is the part of the shape nearest to it, found by
     sampling and scaled to the exact total if the shape knows its volume. Each sample of the surface
-    belongs to the nearest point. Tags are those of a lattice. There are no ghosts.
+    belongs to the nearest point. Tags are those of a lattice. There are no ghosts. A spacing that
+    varies is to tell how far apart the points are: the support of each follows it, and volumes
+    that are not given integrate polynomials, as those of `fitted-moments` do.
 
     Raises:
         SceneError: not exactly one of `positions` and `file` is given, or one cannot be read.
@@ -91,12 +95,36 @@ class Points(Discretisation):
                 finite, outside the shape, at the same place as another, or without a volume.
         """
         spacing = check_spacing(self, spacing)
+        return self._made(shape, spacing, lambda tree: self._nearest_volumes(shape, tree, spacing))
+
+    def graded_particles(self, shape: Shape, spacing: SpacingField) -> Particles:
+        """The points as particles, with the spacing that the field has where they are.
+
+        Raises:
+            SceneError: as of `particles`.
+        """
+        made = self._made(shape, spacing.least, lambda tree: np.ones(tree.n))
+        made = attrs.evolve(made, spacings=spacing.at(made.positions))
+        return made if self.volumes is not None else graded_fit(self, shape, spacing, made)
+
+    def _made(
+        self, shape: Shape, spacing: float, volumes: Callable[[cKDTree], Array]
+    ) -> Particles:
+        """The points as particles with one spacing, and `volumes` (n,) where none are given."""
         positions = self._positions(shape.dimension)
         self._check_places(shape, positions, spacing)
         tree = cKDTree(positions)
         surface = sampled(self, shape, spacing)
         owned = faces(surface, nearest(tree, surface.points), positions)
-        return without_ghosts(positions, self._volumes(shape, tree, spacing), spacing, owned)
+        own = volumes(tree) if self.volumes is None else self._given_volumes(tree)
+        if not np.all(own > 0.0):
+            point = int(np.argmin(own > 0.0))
+            raise refusal(
+                self,
+                f"point {point} is too close to others to be given a volume at a spacing of "
+                f"{spacing:g} m; use a smaller spacing, or give volumes",
+            )
+        return without_ghosts(positions, own, spacing, owned)
 
     def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
         """True if most of the surface is nearest to points on it.
@@ -163,9 +191,8 @@ class Points(Discretisation):
                 f"points {a} and {b} are at the same place, {positions[a].tolist()} m; drop one",
             )
 
-    def _volumes(self, shape: Shape, tree: cKDTree, spacing: float) -> Array:
-        if self.volumes is None:
-            return self._nearest_volumes(shape, tree, spacing)
+    def _given_volumes(self, tree: cKDTree) -> Array:
+        assert self.volumes is not None
         if self.volumes.shape != (tree.n,):
             raise refusal(
                 self,
@@ -195,13 +222,6 @@ class Points(Discretisation):
             points = samples.positions(np.arange(start, min(start + _CHUNK, samples.size)))
             points = points[shape.signed_distance(points) <= 0.0]
             hits += nearest(tree, points).sums(np.ones(len(points)), tree.n)
-        if not hits.all():
-            point = int(np.argmin(hits > 0.0))
-            raise refusal(
-                self,
-                f"point {point} is too close to others to be given a volume at a spacing of "
-                f"{spacing:g} m; use a smaller spacing, or give volumes",
-            )
         total = shape.volume()
         volumes: Array = hits * (samples.cell_volume if total is None else total / hits.sum())
         return volumes

@@ -146,7 +146,7 @@ class Bonds:
     def _undetermined(self, flags: Array, particles: Indices) -> Mask:
         """Whether the bonds of particles (k,) no longer determine a gradient."""
         where, rows = self.pairs.chosen(particles)
-        weights = self.body.smoothing.gradient(rows.offsets, rows.distances)
+        weights = self.body.smoothing.gradients_of(rows)
         weights *= (flags[where] * self.body.particles.cells[rows.columns])[:, None]
         moments = rows.row_sums(rows.offsets[:, :, None] * weights[:, None, :])
         least = np.linalg.svd(moments, compute_uv=False)[:, -1]
@@ -158,7 +158,7 @@ class Bonds:
         Where no gradient is determined, none is formed: such a particle stays unstrained.
         """
         body, undetermined = self.body, alone[rows.rows]
-        acting = body.smoothing.gradient(rows.offsets, rows.distances)
+        acting = body.smoothing.gradients_of(rows)
         acting *= np.where(undetermined, 1.0, flags[where])[:, None]
         weights = body.formulation.gradient.weights(rows, acting, body.particles.cells)
         return np.where(undetermined[:, None], 0.0, weights)

@@ -81,7 +81,8 @@ class ArtificialViscosity(Effect):
         acts = np.flatnonzero(real_pairs(body, pairs))
         a, b, R = pairs.rows[acts], pairs.columns[acts], pairs.distances[acts]
         V, spacing = particles.volumes, 0.5 * (particles.spacings[a] + particles.spacings[b])
-        weight = V[a] * V[b] * body.material.density * np.abs(body.smoothing.slope(R))
+        slopes = np.abs(body.smoothing.slope(R, body.smoothing.between(a, b)))
+        weight = V[a] * V[b] * body.material.density * slopes
         values = [
             self.linear * body.material.wave_speed * spacing * weight,
             self.quadratic * spacing**2 * weight,
@@ -95,9 +96,10 @@ class ArtificialViscosity(Effect):
         pairs, particles = body.pairs(), body.particles
         apart = pairs.distances > 0.0
         rates = np.zeros(pairs.count)
-        R, b = pairs.distances[apart], pairs.columns[apart]
-        slopes = np.abs(body.smoothing.slope(R))
-        rates[apart] = particles.volumes[b] * particles.spacings[b] * slopes / R
+        R, a, b = pairs.distances[apart], pairs.rows[apart], pairs.columns[apart]
+        slopes = np.abs(body.smoothing.slope(R, body.smoothing.between(a, b)))
+        spacing = 0.5 * (particles.spacings[a] + particles.spacings[b])
+        rates[apart] = particles.volumes[b] * spacing * slopes / R
         strength = self.linear + _APPROACH * self.quadratic
         return 2.0 * strength * body.material.wave_speed * float(pairs.row_sums(rates).max())
 

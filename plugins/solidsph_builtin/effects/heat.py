@@ -148,7 +148,8 @@ def _conduction(bodies: Sequence[Body], conductivity: float) -> csr_array:
         pairs, particles = body.pairs(), body.particles
         acts = real_pairs(body, pairs)
         a, b, R = pairs.rows[acts], pairs.columns[acts], pairs.distances[acts]
-        V, slope = particles.volumes, np.abs(body.smoothing.slope(R))
+        V, H = particles.volumes, body.smoothing.between(a, b)
+        slope = np.abs(body.smoothing.slope(R, H))
         # The second moment of a full neighbourhood, of which the integral is 1.
         moments = np.bincount(a, V[b] * slope * R, particles.count) / particles.dimension
         rows.append(a + body.extent.start)

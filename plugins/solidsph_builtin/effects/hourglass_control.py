@@ -80,7 +80,8 @@ def penalised(body: Body, strength: float) -> HourglassPairs:
     r, a, b = pairs.distances[apart], pairs.rows[apart], pairs.columns[apart]
     _, mu = body.material.lame_parameters
     V = particles.volumes
-    weights[apart] = strength * mu * (V[a] * V[b]) * body.smoothing.value(r) / r**2
+    W = body.smoothing.value(r, body.smoothing.between(a, b))
+    weights[apart] = strength * mu * (V[a] * V[b]) * W / r**2
     return HourglassPairs.of(body, pairs, weights)
 
 

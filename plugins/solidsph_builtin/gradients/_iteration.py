@@ -46,6 +46,7 @@ def solved(
     length: float,
     missing: Array,
     surface: Mask,
+    sizes: Array,
 ) -> Array:
     """Multipliers (n, 1 + d, d) whose change of the weights adds `missing` (n, 1 + d, d).
 
@@ -58,13 +59,14 @@ def solved(
         length: unit of the offsets that L is multiplied by [m].
         missing: from the sums, (n, 1 + d, d).
         surface: the particles on the surface, (n,).
+        sizes: spacings in units of the length, (n,).
     """
     d = particles.dimension
     compiled = passes(d, degree)
     sums = _sums(pairs, close, particles, free, degree, length)
     blocks = compiled.diagonal_blocks(sums)
     diagonal = np.einsum("nii->ni", blocks)
-    soft = softening(diagonal, surface)
+    soft = softening(diagonal, surface, sizes)
     diagonal += soft
 
     def softened(x: Array) -> Array:
@@ -79,7 +81,7 @@ def solved(
     diagonal[diagonal[:, 0] == 0.0, 0] = 1.0  # sums that no change of the weights reaches
     inverses = np.linalg.inv(blocks)
     splines = Splines.of(sums, compiled, reached, soft[:, 0], particles.spacings)
-    near = OverlappingBlocks.of(sums, compiled, reached, soft[:, 0])
+    near = OverlappingBlocks.of(sums, compiled, reached, soft[:, 0], particles.spacings)
 
     def by_particles(r: Array) -> Array:
         result: Array = inverses @ r

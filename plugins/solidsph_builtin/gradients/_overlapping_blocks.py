@@ -38,7 +38,9 @@ class OverlappingBlocks:
     inverses: NDArray[np.float32]  # of the blocks' matrices (m', m'), one after the other
 
     @classmethod
-    def of(cls, sums: Sums, passes: Passes, reached: Indices, soft: Array) -> OverlappingBlocks:
+    def of(
+        cls, sums: Sums, passes: Passes, reached: Indices, soft: Array, spacings: Array
+    ) -> OverlappingBlocks:
         """Of the particles that a change of the weights reaches.
 
         Args:
@@ -46,8 +48,9 @@ class OverlappingBlocks:
             passes: over the pairs.
             reached: these particles (r,).
             soft: added to the diagonal of the matrix, (n,).
+            spacings: of the particles, (n,) [m].
         """
-        blocks = list(_overlapping(sums.positions, reached, _OVERLAP * sums.length))
+        blocks = list(_overlapping(sums.positions, reached, _OVERLAP * spacings))
         ends = np.cumsum([0, *map(len, blocks)])
         inverses = _inverses(sums, passes, blocks, soft)
         return cls(passes, ends, np.concatenate(blocks), inverses)
@@ -57,12 +60,13 @@ class OverlappingBlocks:
         self.passes.add_solutions(self.ends, self.members, self.inverses, r, z)
 
 
-def _overlapping(X: Array, reached: Indices, overlap: float) -> Iterator[Indices]:
+def _overlapping(X: Array, reached: Indices, overlaps: Array) -> Iterator[Indices]:
     """Blocks of at most so many of the `reached` particles (r,) of X (n, d) and what of them is
-    within the `overlap` [m]."""
+    within their `overlaps` (n,) [m]."""
     tree = cKDTree(X[reached])
     for core in _halved(X[reached], np.arange(len(reached))):
-        near = tree.query_ball_point(X[reached[core]], overlap)
+        own = reached[core]
+        near = tree.query_ball_point(X[own], overlaps[own])
         yield reached[np.unique(np.concatenate([np.asarray(one, dtype=np.intp) for one in near]))]
 
 

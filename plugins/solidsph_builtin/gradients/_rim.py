@@ -22,15 +22,15 @@ def wrong(missing: Array) -> Mask:
     return np.asarray(size > _RIGHT * size.max())
 
 
-def freedom(missing: Array, positions: Array, spacing: float) -> Array:
+def freedom(missing: Array, positions: Array, spacings: Array) -> Array:
     """How freely the weights of each row change, (n,): 1 where sums miss something, 0 deep inside.
 
     Args:
         missing: what the sums lack, (n, ...).
         positions: of the particles, (n, d) [m].
-        spacing: of the particles [m].
+        spacings: of the particles, (n,) [m].
     """
     away, _ = cKDTree(positions[wrong(missing)]).query(positions)
-    part = away / (_WIDTH[positions.shape[1]] * spacing)
+    part = away / (_WIDTH[positions.shape[1]] * spacings)
     # Its third derivative is small: the sums of changes that vary faster would miss in turn.
     return np.where(part < 1.0, np.cos(0.5 * np.pi * np.minimum(part, 1.0)) ** 4, 0.0)

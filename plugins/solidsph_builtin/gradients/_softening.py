@@ -19,12 +19,19 @@ _AT_SURFACE = 1e-11
 _MOMENTS = 1e-3
 
 
-def softening(diagonal: Array, surface: Mask) -> Array:
+def softening(diagonal: Array, surface: Mask, sizes: Array) -> Array:
     """What to add to the `diagonal` of the system, both (n, 1 + d): for l, then for the rows of L.
 
-    `surface` (n,) tells the particles on the surface.
+    Args:
+        diagonal: of the system.
+        surface: tells the particles on the surface, (n,).
+        sizes: spacings, in units of the length that L is multiplied by, (n,).
     """
-    changed = diagonal[diagonal[:, 0] > 0.0]  # the sums that a change of the weights reaches
+    d = diagonal.shape[1] - 1
+    # As V^2 w grows with the spacing; the rows of L have an arm more on both sides.
+    scales = np.column_stack([sizes ** (2 * d - 2), *d * [sizes ** (2 * d)]])
+    # The sums that a change of the weights reaches.
+    changed = (diagonal / scales)[diagonal[:, 0] > 0.0]
     soft = np.full(diagonal.shape, _MOMENTS * float(changed[:, 1:].mean()))
     soft[:, 0] = np.where(surface, _AT_SURFACE * float(np.median(changed[:, 0])), 0.0)
-    return soft
+    return np.asarray(soft * scales)

@@ -118,7 +118,7 @@ class Consistent(Gradient):
             )
         inner = self.of.of_body(body, particles, smoothing, pairs, moving=moving)
         found = pairs()
-        slopes = smoothing.gradient(found.offsets, found.distances)
+        slopes = smoothing.gradients_of(found)
         length = float(particles.spacings.mean())
         plain = inner.weights(found, slopes, particles.cells)
         missing = _missing(particles, found, plain, length)
@@ -134,18 +134,19 @@ class Consistent(Gradient):
         if not missing.any():
             return inner
         V = particles.volumes
-        free = freedom(missing, particles.positions, length)
+        sizes = particles.spacings / length if particles.graded else np.ones(particles.count)
+        free = freedom(missing, particles.positions, length * sizes)
         if missing.shape[0] * missing.shape[1] <= _FACTORISED[particles.dimension]:
             fits = LocalFits.of_gradient(found, slopes, particles.cells, degree)
             change = _Change.of(fits, V, free, length)
-            multipliers = _solved(change.matrix(), missing, surface)
+            multipliers = _solved(change.matrix(), missing, surface, sizes)
         else:
             from solidsph_builtin.gradients._iteration import solved  # loads the compiler
 
             close = closeness(slopes, found.distances)
             with one_thread():
                 multipliers = solved(
-                    found, close, particles, free, degree, length, missing, surface
+                    found, close, particles, free, degree, length, missing, surface, sizes
                 )
         return _OfBody(inner, V, free, multipliers, length)
 
@@ -282,14 +283,14 @@ def _possible(missing: Array, positions: Array, allowed: Sequence[Mask], degree:
     return missing
 
 
-def _solved(matrix: csr_array, missing: Array, surface: Mask) -> Array:
+def _solved(matrix: csr_array, missing: Array, surface: Mask, sizes: Array) -> Array:
     """Multipliers (n, 1 + d, d) whose change of the weights adds `missing` (n, 1 + d, d)."""
     n, kinds, d = missing.shape
     diagonal = matrix.diagonal().reshape(kinds, n)
     if not diagonal[0].any():
         raise _unsolved(1.0)
     size = float(np.median(diagonal[0][diagonal[0] > 0.0]))
-    soft = softening(diagonal.T, surface).T.ravel()
+    soft = softening(diagonal.T, surface, sizes).T.ravel()
     softened = csr_array(matrix + diags_array(soft))
     factors = _factors(csr_array(softened + diags_array(np.full(n * kinds, _REGULAR * size))))
     wanted = missing.transpose(1, 0, 2).reshape(n * kinds, d)

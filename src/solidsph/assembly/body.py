@@ -5,6 +5,7 @@ from __future__ import annotations
 import attrs
 
 from solidsph.assembly.visibility import hidden_pairs
+from solidsph.errors import BuildError
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.smoothing_kernel import smoothing_kernel
@@ -23,12 +24,13 @@ def plain_body(name: str, parts: Parts, extent: slice) -> Body:
     assert formulation is not None
     shape, particles = parts.shapes[name], parts.sets[name]
     radius = cover * float(particles.spacings.max())
+    radii = cover * particles.spacings if particles.graded else None
     return Body(
         name=name,
         shape=shape,
         extent=extent,
         particles=particles,
-        smoothing=smoothing_kernel(kernel, particles.dimension, radius),
+        smoothing=smoothing_kernel(kernel, particles.dimension, radius, radii),
         material=parts.materials[name],
         formulation=formulation,
     )
@@ -39,7 +41,17 @@ def make_body(name: str, parts: Parts, extent: slice) -> Body:
     body = plain_body(name, parts, extent)
     formulation, particles = body.formulation, body.particles
     moving = formulation.configuration is Configuration.CURRENT
-    hidden = hidden_pairs(body.shape, particles, body.smoothing.support_radius, moving=moving)
+    smoothing = body.smoothing
+    if moving and smoothing.radii is not None:
+        raise BuildError(
+            [
+                f"body {name!r}: its spacing varies, from {particles.spacings.min():.4g} to "
+                f"{particles.spacings.max():.4g} m, which sums in the current configuration do not "
+                "follow; use the formulation 'total-lagrangian', or one spacing"
+            ]
+        )
+    reach = smoothing.support_radius if smoothing.radii is None else smoothing.radii
+    hidden = hidden_pairs(body.shape, particles, reach, moving=moving)
     body = attrs.evolve(body, hidden=hidden)
     gradient = formulation.gradient.of_body(
         name, particles, body.smoothing, body.pairs, moving=moving

@@ -109,7 +109,7 @@ def operators(body: Body, pairs: Pairs, crowding: Array | float = 1.0) -> Operat
     Raises:
         BuildError: the neighbours of a particle do not determine a gradient.
     """
-    kernel_gradients = body.smoothing.gradient(pairs.offsets, pairs.distances)
+    kernel_gradients = body.smoothing.gradients_of(pairs)
     cells, volumes = body.particles.cells * crowding, body.particles.volumes * crowding
     gradient = body.formulation.gradient.weights(pairs, kernel_gradients, cells)
     force = body.formulation.divergence.weights(pairs, gradient, volumes)
@@ -176,7 +176,7 @@ class _MovingBody:
 
 def kernel_sums(body: Body, pairs: Pairs) -> Array:
     """Sum over neighbours of W_pq by reference cells, (n,) [-]."""
-    weights = body.smoothing.value(pairs.distances) * body.particles.cells[pairs.columns]
+    weights = body.smoothing.values_of(pairs) * body.particles.cells[pairs.columns]
     return pairs.row_sums(weights)
 
 

@@ -39,17 +39,31 @@ class Body:
         Each call searches again; a caller keeps what it needs.
 
         Args:
-            radius: largest distance [m], at most the support radius, which is the default.
+            radius: largest distance [m], at most the support radius, which is the default. Where
+                the spacing varies it is that in the coarsest part, and smaller in proportion.
         """
-        within = self.smoothing.support_radius if radius is None else radius
-        return neighbour_pairs(self.particles.positions, within, self.hidden)
+        H, radii = self.smoothing.support_radius, self.smoothing.radii
+        within = H if radius is None else radius
+        if radii is None:
+            return neighbour_pairs(self.particles.positions, within, self.hidden)
+        return neighbour_pairs(self.particles.positions, radii * (within / H), self.hidden)
+
+    @property
+    def radii(self) -> Array:
+        """Support radius of every particle, (n,) [m]."""
+        own = self.smoothing.radii
+        return np.full(self.particles.count, self.smoothing.support_radius) if own is None else own
 
     @cached_property
     def nearest_pairs(self) -> tuple[Indices, Indices]:
         """Particles (m,) and (m,) at most 1.2 spacings apart in the reference, each pair once."""
         particles = self.particles
-        reach = _NEAREST * float(particles.spacings.max())
-        pairs = cKDTree(particles.positions).query_pairs(reach, output_type="ndarray")
+        if particles.graded:
+            found = neighbour_pairs(particles.positions, _NEAREST * particles.spacings)
+            pairs = np.column_stack([found.rows, found.columns])[found.rows < found.columns]
+        else:
+            reach = _NEAREST * float(particles.spacings.max())
+            pairs = cKDTree(particles.positions).query_pairs(reach, output_type="ndarray")
         pairs = pairs[~particles.ghosts[pairs].any(axis=1)]
         if self.hidden is not None:
             pairs = pairs[~self.hidden.between(pairs[:, 0], pairs[:, 1])]
@@ -66,5 +80,10 @@ def part_of(body: Body, chosen: Indices) -> Body:
     """The body of the chosen particles (k,) alone, renumbered in order, without faces and tags."""
     names = ("positions", "volumes", "spacings", "area_vectors", "ghosts", "images", "cells")
     particles = Particles(**{name: getattr(body.particles, name)[chosen] for name in names})
-    hidden = None if body.hidden is None else body.hidden.part(chosen)
-    return attrs.evolve(body, particles=particles, extent=slice(0, len(chosen)), hidden=hidden)
+    return attrs.evolve(
+        body,
+        particles=particles,
+        extent=slice(0, len(chosen)),
+        smoothing=body.smoothing.of_part(chosen),
+        hidden=None if body.hidden is None else body.hidden.part(chosen),
+    )

@@ -62,5 +62,5 @@ class DiscreteModel:
 
 def _smoothing(body: Body) -> csr_array:
     pairs = body.pairs()
-    weights = body.smoothing.value(pairs.distances)
+    weights = body.smoothing.values_of(pairs)
     return pairs.matrix(weights * body.particles.cells[pairs.columns])

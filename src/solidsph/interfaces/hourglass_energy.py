@@ -193,7 +193,7 @@ class HourglassProducts(HourglassOperator):
 def _jet(body: Body) -> csr_array:
     """J, ((1 + d) n, n): a field, then its derivative along each axis."""
     pairs, particles = body.pairs(), body.particles
-    kernel_gradients = body.smoothing.gradient(pairs.offsets, pairs.distances)
+    kernel_gradients = body.smoothing.gradients_of(pairs)
     weights = body.formulation.gradient.weights(pairs, kernel_gradients, particles.cells)
     along = [pairs.matrix(weights[:, axis]) for axis in range(weights.shape[1])]
     return csr_array(vstack([eye_array(pairs.row_count, format="csr"), *along], format="csr"))

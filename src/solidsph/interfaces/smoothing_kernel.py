@@ -1,4 +1,8 @@
-"""SmoothingKernel: a kernel normalised in one dimension and cut off at its support radius."""
+"""SmoothingKernel: a kernel normalised in one dimension and cut off at its support radius.
+
+Where the spacing varies, so does the radius. That of a pair is the mean of the two particles', so
+that a pair has one kernel value, and pair forces stay equal and opposite.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,8 @@ import numpy as np
 
 from solidsph.errors import PluginError
 from solidsph.interfaces.kernel import Kernel
-from solidsph.maths.arrays import Array
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.neighbours import Pairs
 
 UNIT_SPHERE = {1: 2.0, 2: 2.0 * pi, 3: 4.0 * pi}
 """Surface of the unit sphere, by dimension."""
@@ -29,32 +34,55 @@ class SmoothingKernel:
 
     kernel: Kernel
     dimension: int
-    support_radius: float  # H [m]
+    support_radius: float  # H, the largest of the body [m]
     normalisation: float  # sigma_d [-]
+    radii: Array | None = None  # (n,) H of each particle, where the spacing varies [m]
 
-    def value(self, distances: Array) -> Array:
-        """W(r) at distances r (m,) [m], (m,) [m^-d]."""
-        q = np.asarray(distances) / self.support_radius
+    def between(self, a: Indices, b: Indices) -> Array | float:
+        """H of pairs of particles a and b (m,), the mean of the two: (m,), or one number [m]."""
+        if self.radii is None:
+            return self.support_radius
+        return np.asarray(0.5 * (self.radii[a] + self.radii[b]))
+
+    def value(self, distances: Array, radius: Array | float | None = None) -> Array:
+        """W(r) at distances r (m,) [m], (m,) [m^-d]; `radius` is H of each, the largest if None."""
+        H = self.support_radius if radius is None else radius
+        q = np.asarray(distances) / H
         inside = q < 1.0
         w = self.kernel.profile(np.where(inside, q, 0.0), self.kernel.params)
-        return np.where(inside, w, 0.0) * (self.normalisation / self.support_radius**self.dimension)
+        return np.where(inside, w, 0.0) * (self.normalisation / H**self.dimension)
 
-    def slope(self, distances: Array) -> Array:
-        """dW/dr at distances r (m,) [m], (m,) [m^-(d+1)]."""
-        q = np.asarray(distances) / self.support_radius
+    def slope(self, distances: Array, radius: Array | float | None = None) -> Array:
+        """dW/dr at distances r (m,) [m], (m,) [m^-(d+1)]; `radius` as of `value`."""
+        H = self.support_radius if radius is None else radius
+        q = np.asarray(distances) / H
         inside = q < 1.0
         dw = profile_slope(self.kernel, np.where(inside, q, 0.0))
-        factor = self.normalisation / self.support_radius ** (self.dimension + 1)
-        return np.where(inside, dw, 0.0) * factor
+        return np.where(inside, dw, 0.0) * (self.normalisation / H ** (self.dimension + 1))
 
-    def gradient(self, offsets: Array, distances: Array) -> Array:
+    def gradient(
+        self, offsets: Array, distances: Array, radius: Array | float | None = None
+    ) -> Array:
         """Derivative of W(x_p - x_q) by x_p, (m, d) [m^-(d+1)], from offsets x_q - x_p [m]."""
-        return -self.slope_by_distance(distances)[:, None] * offsets
+        return -self.slope_by_distance(distances, radius)[:, None] * offsets
 
-    def slope_by_distance(self, distances: Array) -> Array:
+    def slope_by_distance(self, distances: Array, radius: Array | float | None = None) -> Array:
         """dW/dr / r at distances r (m,) [m], (m,) [m^-(d+2)]; 0 at r = 0."""
         safe = np.where(distances > 0.0, distances, 1.0)
-        return np.where(distances > 0.0, self.slope(distances) / safe, 0.0)
+        return np.where(distances > 0.0, self.slope(distances, radius) / safe, 0.0)
+
+    def values_of(self, pairs: Pairs) -> Array:
+        """W of all pairs (m,) [m^-d]."""
+        return self.value(pairs.distances, self.between(pairs.rows, pairs.columns))
+
+    def gradients_of(self, pairs: Pairs) -> Array:
+        """Derivative of W of all pairs by the place of the first particle, (m, d) [m^-(d+1)]."""
+        radius = self.between(pairs.rows, pairs.columns)
+        return self.gradient(pairs.offsets, pairs.distances, radius)
+
+    def of_part(self, chosen: Indices) -> SmoothingKernel:
+        """That of the chosen particles (k,) alone, renumbered in order."""
+        return self if self.radii is None else attrs.evolve(self, radii=self.radii[chosen])
 
 
 def profile_slope(kernel: Kernel, q: Array) -> Array:
@@ -161,8 +189,12 @@ def _check_slope(kernel: Kernel, name: str, q: Array, w: Array) -> None:
         )
 
 
-def smoothing_kernel(kernel: Kernel, dimension: int, support_radius: float) -> SmoothingKernel:
+def smoothing_kernel(
+    kernel: Kernel, dimension: int, support_radius: float, radii: Array | None = None
+) -> SmoothingKernel:
     """Normalise `kernel` for one dimension and support radius [m].
+
+    `radii` (n,) [m] are those of the particles, where they differ; the largest is the other.
 
     Raises:
         PluginError: the profile is not a weight, or its closed normalisation is wrong.
@@ -175,4 +207,4 @@ def smoothing_kernel(kernel: Kernel, dimension: int, support_radius: float) -> S
             f"kernel {type(kernel).__name__}: closed_normalisation({dimension}) = {closed:.15g}, "
             f"but quadrature gives {sigma:.15g}; correct the formula or leave it out"
         )
-    return SmoothingKernel(kernel, dimension, support_radius, sigma)
+    return SmoothingKernel(kernel, dimension, support_radius, sigma, radii)

@@ -54,7 +54,7 @@ class ShapeFunctions:
 
 def shape_functions(
     particles: Array,
-    spacing: float,
+    spacing: Array | float,
     points: Array,
     sees: Sees | None = None,
     *,
@@ -67,7 +67,7 @@ def shape_functions(
 
     Args:
         particles: positions (n, d) [m].
-        spacing: of the particles [m].
+        spacing: of the particles, one or that of each (n,) [m].
         points: (m, d) [m].
         sees: which particles a point depends on; all near ones if None.
         slopes: whether slopes are wanted.
@@ -83,7 +83,7 @@ def shape_functions(
 
 
 def _functions(
-    tree: cKDTree, spacing: float, points: Array, sees: Sees | None
+    tree: cKDTree, spacing: Array | float, points: Array, sees: Sees | None
 ) -> Sequence[csr_array]:
     """N_p and its slopes at a few points, (1 + d) times (m, n)."""
     m, d = points.shape
@@ -96,7 +96,8 @@ def _functions(
         seen[:, 0] |= ~seen.any(axis=1)
         distances = np.where(seen, distances, np.inf)
     # Beyond the surface there is nobody, so there the fit reaches further.
-    reach = _RADIUS * spacing + distances.min(axis=1)
+    there = spacing[near[:, 0]] if isinstance(spacing, np.ndarray) else spacing
+    reach = _RADIUS * there + distances.min(axis=1)
     offsets = tree.data[near] - points[:, None, :]
     fitted = np.zeros((m, 1 + d, count))
     left = np.arange(m)

@@ -35,16 +35,18 @@ _ATTEMPTS = 8
 _LINES_AT_ONCE = 1 << 15
 
 
-def line_ends(distance: SignedDistance, X: Array, spacing: float) -> tuple[Array, Array]:
+def line_ends(
+    distance: SignedDistance, X: Array, spacing: Array | float
+) -> tuple[Array, Array]:
     """Ends of lines from particles at X (n, d), (n, d), and their depths, (n,) [m]."""
     points, depths = X.copy(), -distance(X)
-    wanted, share = DEPTH * spacing, np.ones(len(X))
+    wanted, share = np.full(len(X), DEPTH * spacing), np.ones(len(X))
     for _ in range(_ATTEMPTS):
         near = np.flatnonzero(depths < (1.0 - 1e-9) * wanted)
         if not near.size:
             break
-        inwards = _inwards(distance, points[near], _STEP * spacing)
-        way = share[near] * (wanted - depths[near])
+        inwards = _inwards(distance, points[near], _STEP * float(np.min(spacing)))
+        way = share[near] * (wanted[near] - depths[near])
         moved = points[near] + way[:, None] * inwards
         reached = -distance(moved)
         # A step towards a corner gains least: 1 / sqrt(3) of its length in 3D.

@@ -11,6 +11,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.spatial import cKDTree
 
 from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.model.pair_search import PairSearch
 
 
 @attrs.frozen(eq=False)
@@ -126,13 +127,18 @@ class Hidden:
         return Hidden(keys, len(chosen), None if self.pieces is None else self.pieces[chosen])
 
 
-def neighbour_pairs(positions: Array, radius: float, hidden: Hidden | None = None) -> Pairs:
+def neighbour_pairs(
+    positions: Array, radius: Array | float, hidden: Hidden | None = None
+) -> Pairs:
     """All pairs closer than `radius` [m] among `positions` (n, d), self pairs included, hidden
-    pairs excluded."""
+    pairs excluded. If each particle has its own radius (n,), that of a pair is their mean."""
+    n = len(positions)
+    if isinstance(radius, np.ndarray):
+        rows, columns = PairSearch.of(positions, radius).near(np.arange(n))
+        return listed_pairs(positions, rows, columns, n, hidden)
     near = cKDTree(positions).query_pairs(radius, output_type="ndarray")
     if hidden is not None:
         near = near[~hidden.between(near[:, 0], near[:, 1])]
-    n = len(positions)
     itself = np.arange(n, dtype=np.intp)
     rows = np.concatenate([near[:, 0], near[:, 1], itself])
     columns = np.concatenate([near[:, 1], near[:, 0], itself])
@@ -145,6 +151,37 @@ def neighbour_pairs(positions: Array, radius: float, hidden: Hidden | None = Non
     return Pairs(
         starts=there.indptr.astype(np.intp),
         rows=rows,
+        columns=columns,
+        offsets=offsets,
+        distances=np.linalg.norm(offsets, axis=1),
+    )
+
+
+def listed_pairs(
+    positions: Array,
+    rows: Indices,
+    columns: Indices,
+    count: int,
+    hidden: Hidden | None = None,
+    first: int = 0,
+) -> Pairs:
+    """The pairs of `count` particles from the `first` on, hidden ones excluded.
+
+    Args:
+        positions: of all particles (n, d) [m].
+        rows: of each pair, counted from the first, rising (m,).
+        columns: the neighbours (m,), rising within a row.
+        count: number of rows.
+        hidden: pairs that are none.
+        first: particle of the first row.
+    """
+    if hidden is not None:
+        seen = ~hidden.between(rows + first, columns)
+        rows, columns = rows[seen], columns[seen]
+    offsets = positions[columns] - positions[rows + first]
+    return Pairs(
+        starts=np.searchsorted(rows, np.arange(count + 1)).astype(np.intp),
+        rows=rows + first,
         columns=columns,
         offsets=offsets,
         distances=np.linalg.norm(offsets, axis=1),

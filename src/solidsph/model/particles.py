@@ -48,7 +48,7 @@ class Particles:
 
     positions: Array  # (n, d) reference positions X [m]
     volumes: Array  # (n,) share of the body, for masses and energies [m^d]
-    spacings: Array  # (n,) particle spacing of the body that a particle belongs to [m]
+    spacings: Array  # (n,) particle spacing of the body there [m]
     area_vectors: Array  # (n, d) outward surface area that a particle owns, 0 inside [m^(d-1)]
     ghosts: Mask  # (n,)
     images: Array  # (n, d) mirror image of a ghost through the surface; otherwise X itself [m]
@@ -66,6 +66,12 @@ class Particles:
     def count(self) -> int:
         """Number of particles n, ghosts included."""
         return int(self.positions.shape[0])
+
+    @property
+    def graded(self) -> bool:
+        """Whether the spacing of particles of one body differs."""
+        parts = self.bodies.values() or (slice(None),)
+        return any(bool(np.ptp(self.spacings[part]) > 0.0) for part in parts)
 
     @property
     def dimension(self) -> int:

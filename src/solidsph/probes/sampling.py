@@ -57,7 +57,9 @@ class Sampling:
                 continue
             extent = particles.bodies[name]
             own = np.flatnonzero(~particles.ghosts[extent]) + extent.start
-            X, spacing = particles.positions[own], float(particles.spacings[own].max())
+            X, spacing = particles.positions[own], particles.spacings[own]
+            if not particles.graded:
+                spacing = spacing.max()
             sees = None if shape.convex else _sees(shape, X, spacing)
             functions = shape_functions(X, spacing, points[chosen], sees, slopes=slopes)
             # The matrices have their entries in the same places.
@@ -136,21 +138,25 @@ def _checked(points: Any, dimension: int) -> Array:
     return X
 
 
-def _sees(shape: Shape, X: Array, spacing: float) -> Sees:
-    """Whether points see the particles at X (n, d), along lines inside the shape."""
-    distance = shape.signed_distance
+def _sees(shape: Shape, X: Array, spacing: Array | float) -> Sees:
+    """Whether points see the particles at X (n, d), along lines inside the shape.
+
+    `spacing` is that of each particle (n,), or one [m].
+    """
+    distance, spacings = shape.signed_distance, np.full(len(X), spacing)
 
     def sees(points: Array, near: Indices) -> Mask:
         m = len(points)
         chosen, place = np.unique(near, return_inverse=True)
-        starts, ends = line_ends(distance, points, spacing), line_ends(distance, X[chosen], spacing)
+        starts = line_ends(distance, points, spacings[near[:, 0]])
+        ends = line_ends(distance, X[chosen], spacings[chosen])
         lines = np.stack([np.repeat(np.arange(m), near.shape[1]), m + place.ravel()])
         leave = lines_leave(
             distance,
             np.concatenate([starts[0], ends[0]]),
             np.concatenate([starts[1], ends[1]]),
             lines,
-            spacing,
+            float(spacings.min()),
         )
         return ~leave.reshape(near.shape)
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import attrs
 import numpy as np
 
+from solidsph.errors import SceneError, SolidsphError
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.effect import Effect
 from solidsph.interfaces.engine import Engine
 from solidsph.interfaces.formulation import Formulation
+from solidsph.interfaces.graded_discretisation import GradedDiscretisation
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.kernel import Kernel
 from solidsph.interfaces.material import Material
@@ -26,6 +29,7 @@ from solidsph.scene.checks.numbers import check_numbers
 from solidsph.scene.checks.returned import check_particles
 from solidsph.scene.checks.terms import check_effects
 from solidsph.scene.default_cover import cover_of
+from solidsph.scene.graded_spacing import is_graded, predicted_count, spacing_field
 from solidsph.scene.scene_data import (
     RECOMMENDED,
     BodyScene,
@@ -203,13 +207,13 @@ class PartMaker:
                     discretisations[name] = discretisation
         if not bodies and self._scene.material is not None:
             self._make("materials", self._scene.material)  # unused, but it may have mistakes too
-        few = all(_is_few(shape, bodies[name].spacing) for name, shape in shapes.items())
+        few = all(_is_few(shape, bodies[name]) for name, shape in shapes.items())
         if self.problems.found and not few:
             return shapes, materials, {}
         sets: dict[str, Particles] = {}
         for name, discretisation in discretisations.items():
             shape = shapes[name]
-            own = self.problems.attempt(discretisation.particles, shape, bodies[name].spacing)
+            own = self.problems.attempt(_particles_of, name, bodies[name], discretisation, shape)
             if own is not None:
                 wrong = list(check_particles(discretisation, own, shape.dimension))
                 self.problems.add(wrong)
@@ -225,7 +229,39 @@ class PartMaker:
         return None
 
 
-def _is_few(shape: Shape, spacing: object) -> bool:
+def _particles_of(
+    name: str, body: BodyScene, discretisation: Discretisation, shape: Shape
+) -> Particles:
+    if not is_graded(body):
+        return discretisation.particles(shape, body.spacing)  # type: ignore[arg-type]
+    if not isinstance(discretisation, GradedDiscretisation):
+        raise SceneError(
+            f"body {name!r}: its spacing varies, which the discretisation "
+            f"{registry.entry_of('discretisations', discretisation).name!r} does not follow; use "
+            f"{' or '.join(map(repr, _graded_names()))}, or one number"
+        )
+    try:
+        return discretisation.graded_particles(shape, spacing_field(body, shape))
+    except SceneError as cause:
+        raise SceneError(f"body {name!r}: {cause}") from None
+
+
+def _graded_names() -> list[str]:
+    """Names of the discretisations that follow a spacing that varies."""
+    names = []
+    for name in registry.names("discretisations"):
+        with suppress(SolidsphError):
+            if issubclass(registry.load("discretisations", name), GradedDiscretisation):
+                names.append(name)
+    return names
+
+
+def _is_few(shape: Shape, body: BodyScene) -> bool:
+    if is_graded(body):
+        with suppress(SolidsphError):
+            return predicted_count(spacing_field(body, shape), shape) < _FEW
+        return True  # it is refused at once
+    spacing = body.spacing
     if not isinstance(spacing, (int, float)) or not spacing > 0.0:
         return True  # the discretisation refuses it at once
     lower, upper = shape.bounds()

@@ -46,16 +46,24 @@ class SceneBuilder(ABC):
         name: str,
         *,
         shape: PartLike,
-        spacing: float,
+        spacing: float | str,
         discretisation: PartLike | None = None,
         material: PartLike | None = None,
         tags: Mapping[str, Where] | None = None,
+        refine: Sequence[Mapping[str, Any]] = (),
     ) -> Self:
-        """Add a body; `spacing` in metres, `tags` name sets of its particles."""
+        """Add a body; `spacing` in metres, `tags` name sets of its particles.
+
+        The spacing may be a formula of X, Y and Z. Each entry of `refine` is a mapping with
+        `where`, a face or a condition, the `spacing` there, and the distance `over` which that of
+        the body returns.
+        """
         bodies = self._values.get("bodies", {})
         if name in bodies:
             raise SceneError(f"two bodies are called {name!r}; give each its own name")
-        body = BodyScene(shape, spacing, discretisation, material, dict(tags or {}))
+        body = BodyScene(
+            shape, spacing, discretisation, material, dict(tags or {}), tuple(map(dict, refine))
+        )
         return self._set(bodies={**bodies, name: body})
 
     def scheme(self, scheme: str) -> Self:

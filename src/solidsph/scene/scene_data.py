@@ -23,10 +23,11 @@ class BodyScene:
     """One body: its shape, resolution and material."""
 
     shape: PartLike
-    spacing: float  # [m]
+    spacing: float | str  # [m], a number or a formula of X, Y and Z
     discretisation: PartLike | None = None  # that of the scheme if None
     material: PartLike | None = None  # that of the scene if None
     tags: Mapping[str, Where] = attrs.field(factory=dict)  # named sets of its particles
+    refine: Sequence[Mapping[str, Any]] = ()  # where it is finer: {where, spacing, over}
 
 
 @attrs.frozen

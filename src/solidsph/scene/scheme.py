@@ -16,6 +16,7 @@ from solidsph.interfaces.discretisation import Discretisation
 from solidsph.registry import registry
 from solidsph.registry.construct import construct
 from solidsph.registry.origin import failure
+from solidsph.scene.graded_spacing import least_spacing
 from solidsph.scene.scene_data import RECOMMENDED, BodyScene, PartLike, SceneData
 
 S = TypeVar("S", bound=SceneData)
@@ -175,7 +176,7 @@ def _ends_on_surface(body: BodyScene) -> bool:
     part: Discretisation | None = None
     try:
         part = construct("discretisations", body.discretisation)
-        return bool(part.ends_on_surface(construct("shapes", body.shape), body.spacing))
+        return bool(part.ends_on_surface(construct("shapes", body.shape), least_spacing(body)))
     except SolidsphError:
         return False
     except Exception as cause:  # a plugin's code may fail in any way

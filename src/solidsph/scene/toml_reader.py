@@ -182,6 +182,7 @@ def _body(name: str, body: Any, problems: Problems) -> BodyScene | None:
         if key not in known and not _is_mistyped(body, key, fields):
             problems.add([f"{what}: no {key}; add {key} = ... ({unit})"])
     tags = problems.attempt(_mapping, known.pop("tags", {}), f"{what}.tags") or {}
+    refine = problems.attempt(_entries, known.pop("refine", []), f"{what}.refine") or ()
     read = {tag: problems.attempt(_text, at, f"{what}.tags.{tag}") for tag, at in tags.items()}
     values = _fields(BodyScene, known, f"{what}.", problems)
     if "shape" not in values or "spacing" not in values:
@@ -190,7 +191,8 @@ def _body(name: str, body: Any, problems: Problems) -> BodyScene | None:
             if key in values:
                 problems.attempt(construct, kind, values[key])
         return None
-    return BodyScene(**values, tags={tag: at for tag, at in read.items() if at is not None})
+    tags = {tag: at for tag, at in read.items() if at is not None}
+    return BodyScene(**values, tags=tags, refine=refine)
 
 
 def _imposed(entry: Any, what: str, problems: Problems) -> ImposedScene:
@@ -266,12 +268,26 @@ def _text(value: Any, what: str) -> str:
     return value
 
 
+def _number_or_text(value: Any, what: str) -> float | str:
+    return value if isinstance(value, str) else _number(value, what)
+
+
+def _entries(value: Any, what: str) -> tuple[Any, ...]:
+    if not isinstance(value, list):
+        raise SceneError(
+            f"{what} must be a list such as [{{where = \"rim\", spacing = 0.01, over = 0.2}}], got "
+            f"{value!r}"
+        )
+    return tuple(value)
+
+
 def _unchecked(value: Any, what: str) -> Any:
     return value
 
 
 _READERS: Mapping[Any, Callable[[Any, str], Any]] = {
     float: _number,
+    float | str: _number_or_text,
     float | None: _number,
     int: _whole_number,
     int | None: _whole_number,

@@ -65,6 +65,7 @@ def _body(body: BodyScene) -> dict[str, Any]:
         "spacing": body.spacing,
         "discretisation": _optional("discretisations", body.discretisation),
         "material": _optional("materials", body.material),
+        "refine": list(body.refine) or None,
         "tags": body.tags or None,
     }
 

@@ -246,7 +246,7 @@ def reference_body(body: Body, law: Any, dtype: str) -> ReferenceBody:
     else:
         pairs = body.pairs()
         weights = body.formulation.gradient.weights(
-            pairs, body.smoothing.gradient(pairs.offsets, pairs.distances), particles.cells
+            pairs, body.smoothing.gradients_of(pairs), particles.cells
         )
         gradient = compressed(counted(in_chunks(pairs, weights)), d, dtype, shortest_run)
         # To gather with d_pq is to scatter with d_qp.

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from solidsph.interfaces.body import Body
 from solidsph.maths.arrays import Array, Mask
-from solidsph.model.neighbours import Pairs
+from solidsph.model.neighbours import Pairs, listed_pairs
+from solidsph.model.pair_search import PairSearch
 
 _ROWS_AT_ONCE = 2048
 
@@ -23,10 +23,12 @@ def weighted_chunks(body: Body, wanted: Mask) -> Iterator[tuple[Pairs, Array]]:
         BuildError: the neighbours of a particle do not determine a gradient.
     """
     positions, cells = body.particles.positions, body.particles.cells
-    tree = cKDTree(positions)
+    search = PairSearch.of(positions, body.radii)
     for rows in _chunks(wanted):
-        pairs = _pairs_of(tree, body, rows)
-        kernel_gradients = body.smoothing.gradient(pairs.offsets, pairs.distances)
+        own, columns = search.near(np.arange(rows.start, rows.stop))
+        count = rows.stop - rows.start
+        pairs = listed_pairs(positions, own, columns, count, body.hidden, rows.start)
+        kernel_gradients = body.smoothing.gradients_of(pairs)
         yield pairs, body.formulation.gradient.weights(pairs, kernel_gradients, cells)
 
 
@@ -45,22 +47,3 @@ def _chunks(wanted: Mask) -> Iterator[slice]:
     for begin, end in change.reshape(-1, 2).tolist():
         for first in range(begin, end, _ROWS_AT_ONCE):
             yield slice(first, min(first + _ROWS_AT_ONCE, end))
-
-
-def _pairs_of(tree: cKDTree, body: Body, rows: slice) -> Pairs:
-    positions, radius = body.particles.positions, body.smoothing.support_radius
-    n, k = len(positions), rows.stop - rows.start
-    found = cKDTree(positions[rows]).sparse_distance_matrix(tree, radius, output_type="ndarray")
-    keys = np.sort(found["i"] * n + found["j"])
-    own, columns = np.divmod(keys, n)
-    if body.hidden is not None:
-        seen = ~body.hidden.between(own + rows.start, columns)
-        own, columns = own[seen], columns[seen]
-    offsets = positions[columns] - positions[own + rows.start]
-    return Pairs(
-        starts=np.searchsorted(own, np.arange(k + 1)).astype(np.intp),
-        rows=own + rows.start,
-        columns=columns,
-        offsets=offsets,
-        distances=np.linalg.norm(offsets, axis=1),
-    )

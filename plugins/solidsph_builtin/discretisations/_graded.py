@@ -1,0 +1,142 @@
+"""Particles on the surface and inside a shape, as far apart as a spacing that varies says.
+
+Inside, cells finer than the spacing are passed in an order that keeps neighbours together (Morton
+1966), and their shares of a particle add up: at each whole number there is one. So the number of
+particles is right everywhere; repulsion then makes their distances even.
+"""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solidsph.interfaces.discretisation import Discretisation
+from solidsph.interfaces.shape import Shape
+from solidsph.maths.arrays import Array, Indices
+from solidsph.model.particles import Particles
+from solidsph.model.pair_search import PairSearch
+from solidsph.model.spacing import SpacingField, cells_over
+from solidsph_builtin.discretisations._checks import check_count, refusal
+from solidsph_builtin.discretisations._curves import graded_points
+from solidsph_builtin.discretisations._graded_fitting import graded_fit
+from solidsph_builtin.discretisations._graded_relaxation import relaxed_by
+from solidsph_builtin.discretisations._graded_surface import surface_points
+from solidsph_builtin.discretisations._nearest import nearest, thinned_pairs
+from solidsph_builtin.discretisations._sampled_once import sampled_once
+from solidsph_builtin.discretisations._surface import faces, sampled, without_ghosts
+
+# Rows of particles that follow the surface.
+_ROWS = 4
+# A place this part less deep than its row belongs to another part of the surface.
+_OTHER = 0.1
+# In spacings: two particles of rows closer than this become one, and further than the second from
+# them is room for others.
+_CLOSEST, _CLEAR = 0.7, 0.58
+# Cells along a spacing, at least.
+_CELLS = 2.0
+# Steps of the relaxation.
+_STEPS = 200
+# Weight of a particle on the surface in sums over neighbours, in cells, as of `fitted`.
+_ON_SURFACE = 1.0 / 3.0
+# Bits of a place along an axis, for the order.
+_BITS = {1: 20, 2: 20, 3: 20}
+
+
+def graded(discretisation: Discretisation, shape: Shape, spacing: SpacingField) -> Particles:
+    """Particles of `shape` as far apart as the `spacing` says, with fitted volumes and areas.
+
+    Raises:
+        SceneError: there would be too many, or no particle has a place inside the surface.
+    """
+    shape = sampled_once(shape)
+    outer = _outer(shape, spacing)
+    rows = _rows(shape, spacing, outer)
+    held = np.concatenate([outer, rows])
+    inner = _inner(discretisation, shape, spacing, held)
+    X = np.concatenate([held, inner])
+    if len(X) == len(outer):
+        raise refusal(
+            discretisation,
+            f"the body has no place inside its surface for particles {spacing.least:.4g} to "
+            f"{spacing.greatest:.4g} m apart; use smaller spacings",
+        )
+    place = np.arange(len(X))
+    X = relaxed_by(X, place >= len(held), spacing.at, _STEPS)
+    onto = place < len(outer)
+    kept = (place < len(held)) | (shape.signed_distance(X) < -_CLEAR * spacing.at(X))
+    X, onto = X[kept], onto[kept]
+    order = _order(X, *shape.bounds())
+    X, onto = X[order], onto[order]
+    surface = sampled(discretisation, shape, spacing.least)
+    at = np.flatnonzero(onto)
+    owners = nearest(cKDTree(X[at]), surface.points)
+    owned = faces(
+        surface, type(owners)(at[owners.particles], owners.points, owners.shares), X
+    )
+    given = without_ghosts(X, np.ones(len(X)), spacing.at(X), owned)
+    cells = given.spacings**shape.dimension * np.where(onto, _ON_SURFACE, 1.0)
+    return attrs.evolve(graded_fit(discretisation, shape, spacing, given), cells=cells)
+
+
+def _outer(shape: Shape, spacing: SpacingField) -> Array:
+    """Particles on the boundary, (m, d) [m]."""
+    if shape.dimension == 1:
+        return np.stack(shape.bounds())
+    if shape.dimension == 2:
+        return graded_points(shape, spacing)
+    return surface_points(shape, spacing)
+
+
+def _rows(shape: Shape, spacing: SpacingField, outer: Array) -> Array:
+    """Rows of particles that follow the surface, the nearest `_ROWS` to it, (m, d) [m]."""
+    rows, depths = [outer], np.zeros(len(outer))
+    surface = shape.surface(spacing.least)
+    near = cKDTree(surface.points).query(outer)[1]
+    areas = surface.area_vectors[near]
+    inwards = -areas / np.linalg.norm(areas, axis=1, keepdims=True)
+    for _ in range(_ROWS):
+        way = spacing.at(rows[-1])
+        way = 0.5 * (way + spacing.at(rows[-1] + way[:, None] * inwards))
+        X, depths = rows[-1] + way[:, None] * inwards, depths + way
+        kept = -shape.signed_distance(X) > (1.0 - _OTHER) * depths
+        rows.append(X[kept])
+        inwards, depths = inwards[kept], depths[kept]
+    X = np.concatenate(rows)
+    close = np.column_stack(PairSearch.of(X, _CLOSEST * spacing.at(X)).near(np.arange(len(X))))
+    stays = thinned_pairs(close[close[:, 0] < close[:, 1]], np.arange(len(X)))
+    return X[len(outer) :][stays[len(outer) :]]
+
+
+def _inner(
+    discretisation: Discretisation, shape: Shape, spacing: SpacingField, held: Array
+) -> Array:
+    """Places that are left inside, before they are relaxed, (m, d) [m]."""
+    d = shape.dimension
+    lower, upper = shape.bounds()
+    cells = cells_over(
+        lower, upper, spacing.at, lambda X, reach: shape.signed_distance(X) < reach, 1.0 / _CELLS
+    )
+    s = spacing.at(cells.centres)
+    free = cKDTree(held).query(cells.centres)[0] > _CLEAR * s
+    free &= shape.signed_distance(cells.centres) < 0.0
+    expected = free * (cells.sizes / s) ** d
+    check_count(discretisation, float(expected.sum()))
+    order = _order(cells.centres, lower, upper)
+    whole = np.floor(0.5 + np.concatenate([[0.0], np.cumsum(expected[order])]))
+    chosen = order[np.diff(whole) > 0.0]
+    return cells.centres[chosen]
+
+
+def _order(X: Array, lower: Array, upper: Array) -> Indices:
+    """Morton's order of places X (n, d) in a box, (n,)."""
+    d = X.shape[1]
+    size = float((upper - lower).max())
+    places = ((X - lower) / size * (1 << _BITS[d])).astype(np.int64)
+    places = np.clip(places, 0, (1 << _BITS[d]) - 1)
+    keys = np.zeros(len(X), dtype=np.int64)
+    for bit in range(_BITS[d]):
+        for axis in range(d):
+            keys |= ((places[:, axis] >> bit) & 1) << (bit * d + axis)
+    return np.asarray(np.argsort(keys, kind="stable"), dtype=np.intp)
+

@@ -1,0 +1,278 @@
+"""The spacing of a body as a scene states it: a number, a formula, or finer at some places."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import inf
+from numbers import Real
+from typing import Any
+
+import attrs
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solidsph.errors import SceneError
+from solidsph.interfaces.shape import Shape
+from solidsph.maths.arrays import Array, Mask
+from solidsph.maths.formulas import Expression
+from solidsph.model.particles import Particles
+from solidsph.model.regions import AXES, select
+from solidsph.model.spacing import (
+    STEEPEST,
+    STEEPEST_STEP,
+    Cells,
+    SpacingField,
+    cells_over,
+    smooth_step,
+)
+from solidsph.registry.construct import construct
+from solidsph.scene.scene_data import BodyScene
+
+_KEYS = ("where", "spacing", "over")
+
+# Cells at which a spacing is read, at most: then it is that of a body beyond any machine.
+_MOST_CELLS = 4_000_000
+
+# Places inside a region, at most, by which the distance from it is known.
+_MOST_PLACES = 400_000
+
+# A slope is read by differences over this part of the spacing, and may be too large by that of
+# the third derivative.
+_STEP, _ROUNDING = 1e-3, 1e-3
+
+
+@attrs.frozen
+class _Refinement:
+    """One entry of `refine`."""
+
+    where: str
+    spacing: float  # [m]
+    over: float  # distance over which the body's own spacing returns [m]
+
+
+def is_graded(body: BodyScene) -> bool:
+    """Whether the spacing of a body varies."""
+    return isinstance(body.spacing, str) or bool(body.refine)
+
+
+def scaled(body: BodyScene, factor: float) -> BodyScene:
+    """The body with its spacing times a factor everywhere."""
+    spacing: float | str
+    if isinstance(body.spacing, str):
+        spacing = f"{factor!r}*({body.spacing})"
+    else:
+        spacing = factor * body.spacing
+    refine = [{**entry, "spacing": factor * entry["spacing"]} for entry in body.refine]
+    return attrs.evolve(body, spacing=spacing, refine=tuple(refine))
+
+
+def least_spacing(body: BodyScene) -> float:
+    """The smallest spacing of a body [m].
+
+    Raises:
+        SceneError: the spacing varies, and cannot be read.
+    """
+    if isinstance(body.spacing, str):
+        return spacing_field(body, construct("shapes", body.shape)).least
+    return min(body.spacing, *(entry["spacing"] for entry in body.refine), inf)
+
+
+def spacing_field(body: BodyScene, shape: Shape) -> SpacingField:
+    """The spacing of a body that varies.
+
+    Raises:
+        SceneError: it is not positive and finite, or grows too fast, or a place to refine is wrong.
+    """
+    entries = [_refinement(entry) for entry in body.refine]
+    base = _base(body.spacing, shape.dimension)
+    if entries:
+        coarse = _range(base, shape)[1] if isinstance(body.spacing, str) else float(body.spacing)
+        for entry in entries:
+            _check_slope(entry, coarse)
+        finer = [(entry, _distance(entry, shape, coarse)) for entry in entries]
+
+        def wanted(X: Array) -> Array:
+            least = s = base(X)
+            for entry, distance in finer:
+                way = smooth_step(distance(X) / entry.over)
+                least = np.minimum(least, entry.spacing + way * (s - entry.spacing))
+            return least
+    else:
+        wanted = base
+    least, greatest = _range(wanted, shape)
+    return SpacingField(wanted, least, greatest)
+
+
+def predicted_count(field: SpacingField, shape: Shape) -> float:
+    """Number of particles of a body with this spacing, about."""
+    cells = _cells(field.wanted, shape)
+    inside = np.clip(0.5 - shape.signed_distance(cells.centres) / cells.sizes, 0.0, 1.0)
+    return float(np.sum(inside * cells.volumes / field.at(cells.centres) ** shape.dimension))
+
+
+def _base(spacing: float | str, dimension: int) -> Callable[[Array], Array]:
+    """What `spacing` says, at X (n, d), (n,) [m]."""
+    if not isinstance(spacing, str):
+        number = _length("spacing", spacing)
+        return lambda X: np.full(len(X), number)
+    axes = AXES[:dimension]
+    formula = Expression.parse(spacing, axes)
+
+    def values(X: Array) -> Array:
+        own = dict(zip(axes, X.T, strict=True))
+        return np.array(np.broadcast_to(formula(own), len(X)), dtype=np.float64)
+
+    return values
+
+
+def _range(spacing: Callable[[Array], Array], shape: Shape) -> tuple[float, float]:
+    """The least and the greatest spacing within a shape [m].
+
+    Raises:
+        SceneError: it grows too fast, or is far too small for the shape.
+    """
+    cells = _cells(spacing, shape)
+    s = spacing(cells.centres)
+    _check_values(cells.centres, s)
+    _check_growth(spacing, cells, s)
+    if np.any(cells.sizes > 2.0 * s):
+        worst = int(np.argmin(s))
+        raise SceneError(
+            f"the spacing is {s[worst]:.3g} m at {_place(cells.centres[worst])}: too small for "
+            f"more than {_MOST_CELLS:.0e} particles in all; use larger spacings, or check the unit "
+            "of the shape"
+        )
+    points = shape.surface(float(np.median(s))).points
+    _check_values(points, spacing(points))
+    s = np.concatenate([s, spacing(points)])
+    return float(s.min()), float(s.max())
+
+
+def _cells(spacing: Callable[[Array], Array], shape: Shape) -> Cells:
+    """Cells of a shape about as large as the spacing."""
+
+    def reaches(centres: Array, half_diagonals: Array) -> Mask:
+        return np.asarray(shape.signed_distance(centres) < half_diagonals)
+
+    def known(X: Array) -> Array:
+        # A cell's centre may be outside, where a formula has no value.
+        found = spacing(X)
+        valid = np.isfinite(found) & (found > 0.0)
+        return np.where(valid, found, np.median(found[valid]) if valid.any() else inf)
+
+    found = cells_over(*shape.bounds(), known, reaches, most=_MOST_CELLS)
+    own = shape.signed_distance(found.centres) <= 0.0
+    return Cells(found.centres[own], found.sizes[own])
+
+
+def _check_values(X: Array, s: Array) -> None:
+    wrong = np.flatnonzero(~(np.isfinite(s) & (s > 0.0)))
+    if wrong.size:
+        raise SceneError(
+            f"the spacing is {s[wrong[0]]:.4g} m at {_place(X[wrong[0]])}; it must be positive and "
+            "finite everywhere in the body"
+        )
+
+
+def _check_growth(spacing: Callable[[Array], Array], cells: Cells, s: Array) -> None:
+    X, d = cells.centres, cells.centres.shape[1]
+    squares = np.zeros(len(X))
+    for axis in np.eye(d):
+        step = _STEP * s[:, None] * axis
+        squares += ((spacing(X + step) - spacing(X - step)) / (2.0 * _STEP * s)) ** 2
+    worst = int(np.argmax(squares))
+    growth = float(np.sqrt(squares[worst]))
+    if growth > STEEPEST * (1.0 + _ROUNDING):
+        raise SceneError(
+            f"the spacing grows by {growth:.3g} m per metre at {_place(X[worst])}, where it is "
+            f"{s[worst]:.4g} m; at most {STEEPEST:g} keeps neighbours alike: let it grow more "
+            "slowly, over a longer way"
+        )
+
+
+def _refinement(entry: Any) -> _Refinement:
+    what = "refine"
+    if not isinstance(entry, Mapping) or set(entry) != set(_KEYS):
+        raise SceneError(
+            f"{what}: each entry is {{where = ..., spacing = ..., over = ...}}, got {entry!r}"
+        )
+    if not isinstance(entry["where"], str):
+        raise SceneError(f"{what}: where must be a face or a condition, got {entry['where']!r}")
+    lengths = [_length(f"{what}: {name}", entry[name]) for name in ("spacing", "over")]
+    return _Refinement(entry["where"], *lengths)
+
+
+def _check_slope(entry: _Refinement, coarse: float) -> None:
+    if entry.spacing > coarse:
+        raise SceneError(
+            f"refine at {entry.where!r}: spacing = {entry.spacing:g} m is above the largest of the "
+            f"body, {coarse:.4g} m; it must be finer"
+        )
+    needed = STEEPEST_STEP * (coarse - entry.spacing) / STEEPEST
+    if entry.over < needed:
+        raise SceneError(
+            f"refine at {entry.where!r}: from {entry.spacing:g} to {coarse:.4g} m over "
+            f"{entry.over:g} m the spacing grows too fast for neighbours to be alike; use over = "
+            f"{_rounded_up(needed):g} or more"
+        )
+
+
+def _distance(entry: _Refinement, shape: Shape, coarse: float) -> Callable[[Array], Array]:
+    """The distance (n,) [m] of places (n, d) from where an entry refines."""
+    places = _places(shape, max(entry.spacing, 0.02 * entry.over), coarse)
+    tree = cKDTree(places.positions[select(places, entry.where)])
+
+    def distance(X: Array) -> Array:
+        return np.asarray(tree.query(X, distance_upper_bound=entry.over)[0])
+
+    return lambda X: np.minimum(distance(X), entry.over)
+
+
+def _places(shape: Shape, fine: float, coarse: float) -> Particles:
+    """Samples of the surface, with their faces as tags, and of the inside."""
+    surface = shape.surface(fine)
+    lower, upper = shape.bounds()
+    lengths = upper - lower
+    step = max(fine, float(np.prod(lengths) / _MOST_PLACES) ** (1.0 / len(lengths)))
+    axes = [
+        low + (np.arange(count) + 0.5) * length / count
+        for low, length, count in zip(
+            lower, lengths, np.maximum(1, np.ceil(lengths / step)).astype(np.intp), strict=True
+        )
+    ]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(lengths))
+    inner = grid[shape.signed_distance(grid) < 0.0]
+    positions = np.concatenate([surface.points, inner])
+    n, outer = len(positions), len(surface.points)
+    names, none = np.array(surface.faces), np.zeros(n, dtype=np.bool_)
+    on_surface = np.arange(n) < outer
+    tags = {"surface": on_surface, "interior": ~on_surface}
+    for name in dict.fromkeys(surface.faces):
+        tags[name] = none.copy()
+        tags[name][:outer] = names == name
+    return Particles(
+        positions=positions,
+        volumes=np.ones(n),
+        spacings=np.full(n, coarse),
+        area_vectors=np.zeros_like(positions),
+        ghosts=none,
+        images=positions,
+        tags=tags,
+    )
+
+
+def _length(what: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < value < inf:
+        raise SceneError(f"{what} must be a positive finite length in m, got {value!r}")
+    return float(value)
+
+
+def _rounded_up(length: float) -> float:
+    """`length` with two digits, none smaller."""
+    digit = 10.0 ** (np.floor(np.log10(length)) - 1.0)
+    return float(f"{np.ceil(length / digit * (1.0 - 1e-9)) * digit:.2g}")
+
+
+def _place(X: Array) -> str:
+    return "(" + ", ".join(f"{x:.4g}" for x in X) + ")"
+
