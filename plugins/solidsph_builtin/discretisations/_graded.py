@@ -14,8 +14,8 @@ from scipy.spatial import cKDTree
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape
 from solidsph.maths.arrays import Array, Indices
-from solidsph.model.particles import Particles
 from solidsph.model.pair_search import PairSearch
+from solidsph.model.particles import Particles
 from solidsph.model.spacing import SpacingField, cells_over
 from solidsph_builtin.discretisations._checks import check_count, refusal
 from solidsph_builtin.discretisations._curves import graded_points
@@ -71,9 +71,7 @@ def graded(discretisation: Discretisation, shape: Shape, spacing: SpacingField) 
     surface = sampled(discretisation, shape, spacing.least)
     at = np.flatnonzero(onto)
     owners = nearest(cKDTree(X[at]), surface.points)
-    owned = faces(
-        surface, type(owners)(at[owners.particles], owners.points, owners.shares), X
-    )
+    owned = faces(surface, type(owners)(at[owners.particles], owners.points, owners.shares), X)
     given = without_ghosts(X, np.ones(len(X)), spacing.at(X), owned)
     cells = given.spacings**shape.dimension * np.where(onto, _ON_SURFACE, 1.0)
     return attrs.evolve(graded_fit(discretisation, shape, spacing, given), cells=cells)
@@ -139,4 +137,3 @@ def _order(X: Array, lower: Array, upper: Array) -> Indices:
         for axis in range(d):
             keys |= ((places[:, axis] >> bit) & 1) << (bit * d + axis)
     return np.asarray(np.argsort(keys, kind="stable"), dtype=np.intp)
-

@@ -93,15 +93,14 @@ def _chains(points: Array, corners: Array, reach: float) -> list[tuple[Array, bo
 
 
 def _ways(graph: csr_array, start: int) -> Array:
-    return np.asarray(dijkstra(graph, directed=False, indices=start))
+    return np.asarray(dijkstra(graph, directed=False, indices=np.array([start]))[0])
 
 
 def _ended(line: Array, corners: Array, reach: float) -> tuple[Array, bool]:
     """A line with the corners at its ends, and whether it is closed instead."""
     if not len(corners):
         return _around(line), True
-    tree = cKDTree(corners)
-    gaps, ends = tree.query(line[[0, -1]])
+    gaps, ends = map(np.asarray, cKDTree(corners).query(line[[0, -1]]))
     if (gaps > 2.0 * _NEXT * reach).any():
         return _around(line), True
     return np.concatenate([corners[ends[:1]], line, corners[ends[1:]]]), False
@@ -114,4 +113,3 @@ def _around(line: Array) -> Array:
     angles = np.arctan2(x @ axes[1], x @ axes[0])
     ordered = line[np.argsort(angles, kind="stable")]
     return np.concatenate([ordered, ordered[:1]])
-

@@ -107,9 +107,7 @@ class Points(GradedDiscretisation):
         made = attrs.evolve(made, spacings=spacing.at(made.positions))
         return made if self.volumes is not None else graded_fit(self, shape, spacing, made)
 
-    def _made(
-        self, shape: Shape, spacing: float, volumes: Callable[[cKDTree], Array]
-    ) -> Particles:
+    def _made(self, shape: Shape, spacing: float, volumes: Callable[[cKDTree], Array]) -> Particles:
         """The points as particles with one spacing, and `volumes` (n,) where none are given."""
         positions = self._positions(shape.dimension)
         self._check_places(shape, positions, spacing)

@@ -108,6 +108,12 @@ class Contact(Effect):
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
         pairs = self._pairs_of_bodies(model.bodies)
+        for body in {body.name: body for pair in pairs for body in pair}.values():
+            if body.particles.graded:
+                raise SceneError(
+                    f"contact: the spacing of body {body.name!r} varies, which contact does not "
+                    "follow yet; give it one spacing, or leave it out with `between`"
+                )
         meetings = [_meeting(one, other, self.strength, self.margin) for one, other in pairs]
         return _Contact(
             label=label,

@@ -22,7 +22,7 @@ def bodies_meet(facts: SceneFacts) -> Iterator[Advice]:
         return
     times = np.linspace(0.0, facts.scene.duration if facts.is_motion else 0.0, _TIMES)
     for a, b in combinations(facts.bodies, 2):
-        near = _NEAR * max(a.spacing, b.spacing)
+        near = _NEAR * max(a.largest_spacing, b.largest_spacing)
         gaps = _gaps(a, b, _path(facts, b, times) - _path(facts, a, times))
         if gaps[0] <= near:
             how = "touch" if gaps[0] <= 0.5 * near else f"are {gaps[0]:.3g} m apart"

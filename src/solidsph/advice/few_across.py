@@ -24,7 +24,7 @@ def few_across(facts: SceneFacts) -> Iterator[Advice]:
     """Count particles along rays through the shape, normal to its surface."""
     for body in facts.bodies:
         least, usual = body.thicknesses
-        across = least / body.spacing
+        across = body.across
         wanted, where, remedy = _ALONG, "along it", ""
         if facts.dimension > 1:
             is_quadratic = body.exact_degree >= 2
@@ -35,9 +35,12 @@ def few_across(facts: SceneFacts) -> Iterator[Advice]:
                 remedy = f", or gradient = 'quadratic', which needs {_QUADRATIC}"
         if round(across, 1) > wanted - 0.5:
             continue
+        finer = f"spacing = {least / wanted:.3g}"
+        if body.body.particles.graded:
+            finer = f"a spacing there of a part {across / wanted:.2g} of what it is"
         slender = ", in a body so slender" if wanted == _BENT else ""
         yield Advice(
             finding=f"body {body.name!r} has {across:.2g} particles {where}, {least:.4g} m",
             expected=f"at least {wanted} with this gradient{slender}",
-            remedy=f"spacing = {least / wanted:.3g}{remedy}",
+            remedy=f"{finer}{remedy}",
         )

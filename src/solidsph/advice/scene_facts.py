@@ -17,7 +17,7 @@ from solidsph.advice.load_histories import (
     load_histories,
     motion_histories,
 )
-from solidsph.advice.thickness import rays_through
+from solidsph.advice.thickness import Rays, rays_through
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.formulation import Formulation
@@ -79,6 +79,11 @@ class BodyFacts:
         )
 
     @property
+    def largest_spacing(self) -> float:
+        """The largest of its particles [m]."""
+        return float(self.body.particles.spacings.max())
+
+    @property
     def is_held(self) -> bool:
         return bool(self.held_axes.any())
 
@@ -101,14 +106,38 @@ class BodyFacts:
         """
         if self.dimension == 1:
             return self.length, self.length
+        return self._rays.least(self._widest), self._rays.usual(self._widest)
+
+    @cached_property
+    def across(self) -> float:
+        """Smallest number of particles along its thickness.
+
+        Raises:
+            ValueError: its particles were moved away from its shape.
+        """
+        particles = self.body.particles
+        if not particles.graded:
+            return self.thicknesses[0] / self.spacing
+        if self.dimension == 1:
+            return float(np.sum(1.0 / particles.spacings * particles.volumes))
+        rays = self._rays
+        beside = cKDTree(particles.positions).query(rays.starts)[1]
+        counts = attrs.evolve(rays, lengths=rays.lengths / particles.spacings[beside])
+        return counts.least(self._widest / self.spacing)
+
+    @cached_property
+    def _rays(self) -> Rays:
         shape = self.body.shape
         samples = self.real[:: max(1, len(self.real) // _SAMPLES)]
         if (shape.signed_distance(samples) > self.spacing).mean() > 0.02:
             raise ValueError("particles do not stand where the shape is")
-        rays = rays_through(shape, self.spacing)
+        return rays_through(shape, self.spacing)
+
+    @cached_property
+    def _widest(self) -> float:
+        """Diameter of the largest ball inside [m]."""
         some = self.real[:: max(1, len(self.real) // _LOOKED_AT)]
-        widest = 2.0 * float(-shape.signed_distance(some).min())
-        return rays.least(widest), rays.usual(widest)
+        return 2.0 * float(-self.body.shape.signed_distance(some).min())
 
     @property
     def transit(self) -> float:

@@ -37,6 +37,7 @@ _TURNS = np.linspace(0.0, 1.0, 9)[1:-1]
 class Rays:
     """Straight lines through a body, each from a place of its surface along the normal there."""
 
+    starts: Array  # (k, d) [m]
     lengths: Array  # (k,) [m]
     areas: Array  # (k,) area of the surface that each represents [m^(d-1)]
     facing: Array  # (k,) cosine of the angle between the two sides [-]
@@ -109,7 +110,7 @@ def rays_through(shape: Shape, spacing: float) -> Rays:
     normals = _normals(surface, starts + lengths[:, None] * directions)
     facing = -np.einsum("ki,ki->k", normals, directions)
     corner = _meet(surface, starts, directions, lengths, normals)
-    return Rays(lengths, areas[ended], facing, corner)
+    return Rays(starts, lengths, areas[ended], facing, corner)
 
 
 def _boundary(shape: Shape, spacing: float) -> SampledSurface:

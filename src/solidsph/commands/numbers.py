@@ -10,6 +10,7 @@ from solidsph.interfaces.shape import Shape
 from solidsph.registry.construct import construct
 from solidsph.run.cfl_step import cfl_step
 from solidsph.scene.default_cover import cover_of
+from solidsph.scene.graded_spacing import is_graded, predicted_count, spacing_field
 from solidsph.scene.scene import Scene
 from solidsph.scene.static_solver import DIRECT, ITERATIVE, iterates
 from solidsph.simulation import Simulation
@@ -23,10 +24,17 @@ def sizes(scene: Scene) -> Iterator[tuple[str, str, str]]:
         shape: Shape = construct("shapes", body.shape)
         low, high = shape.bounds()
         lengths = " x ".join(f"{length:.4g}" for length in (high - low).tolist())
+        if not is_graded(body):
+            about = f"of the box around it; its spacing is {body.spacing:g}"
+            yield f"size of {name} [m]", lengths, about
+            continue
+        field = spacing_field(body, shape)
+        yield f"size of {name} [m]", lengths, "of the box around it; its spacing varies"
+        count = predicted_count(field, shape)
         yield (
-            f"size of {name} [m]",
-            lengths,
-            f"of the box around it; its spacing is {body.spacing:g}",
+            f"spacing of {name} [m]",
+            f"{field.least:.4g} to {field.greatest:.4g}",
+            f"least and greatest; about {count:.3g} particles",
         )
 
 

@@ -36,6 +36,7 @@ from solidsph.interfaces.shape import Shape
 from solidsph.interfaces.smoothing_kernel import UNIT_SPHERE
 from solidsph.registry.construct import construct
 from solidsph.scene.default_cover import cover_of
+from solidsph.scene.graded_spacing import is_graded, predicted_count, spacing_field
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import BodyScene, PartLike
 from solidsph.scene.scheme import SCHEMES, completed
@@ -116,19 +117,24 @@ def _body(scene: Scene, body: BodyScene, cover: float) -> BodyEstimate:
     shape: Shape = construct("shapes", body.shape)
     wanted = body.material if body.material is not None else scene.material
     material: Material = construct("materials", wanted if wanted is not None else "")
-    d, h = shape.dimension, body.spacing
+    d = shape.dimension
     lower, upper = shape.bounds()
     volume = shape.volume()
     volume = _sampled_volume(shape) if volume is None else volume
+    if is_graded(body):
+        field = spacing_field(body, shape)
+        least, h = field.least, (volume / predicted_count(field, shape)) ** (1.0 / d)
+    else:
+        least = h = float(body.spacing)
     sides = np.maximum(1.0, (upper - lower) / h)
-    lattice = _on_a_lattice(body)
+    lattice = _on_a_lattice(body) and not is_graded(body)
     particles = max(1.0, volume / h**d)
     around = lattice_neighbours(cover, d) if lattice else ball(cover, d)
     cut = _surface(shape) / h ** (d - 1) * cut_off(cover, d) * around / ball(cover, d)
     return BodyEstimate(
         particles=particles,
         pairs=max(particles, particles * around - cut),
-        wave_time=h / material.wave_speed,
+        wave_time=least / material.wave_speed,
         cells=full_box(sides, particles),
         lattice=lattice,
         remembers=isinstance(material, HistoryMaterial),

@@ -13,6 +13,7 @@ from solidsph.costs.process import available_memory
 from solidsph.errors import SceneError
 from solidsph.interfaces.shape import Shape
 from solidsph.registry.construct import construct
+from solidsph.scene.graded_spacing import least_spacing
 from solidsph.scene.scene import Scene
 
 # Smaller scenes always fit: at 20 kB a particle, the most that any needs, this is some 400 MB.
@@ -53,5 +54,5 @@ def _count_in_boxes(scene: Scene) -> float:
     for body in scene.bodies.values():
         shape: Shape = construct("shapes", body.shape)
         lower, upper = shape.bounds()
-        count += float(np.prod(np.maximum(1.0, (upper - lower) / body.spacing)))
+        count += float(np.prod(np.maximum(1.0, (upper - lower) / least_spacing(body))))
     return count

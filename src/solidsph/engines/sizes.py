@@ -13,7 +13,9 @@ from solidsph.interfaces.smoothing_kernel import UNIT_SPHERE
 def size_of(body: Body) -> BodySize:
     """The size of a body; the pairs are counted as if all supports were complete."""
     d = body.smoothing.dimension
-    ball = UNIT_SPHERE[d] / d * body.smoothing.support_radius**d
+    radii = body.smoothing.radii
+    H = body.smoothing.support_radius**d if radii is None else np.mean(radii**d)
+    ball = UNIT_SPHERE[d] / d * H
     return BodySize(
         dimension=d,
         particles=body.particles.count,

@@ -35,9 +35,7 @@ _ATTEMPTS = 8
 _LINES_AT_ONCE = 1 << 15
 
 
-def line_ends(
-    distance: SignedDistance, X: Array, spacing: Array | float
-) -> tuple[Array, Array]:
+def line_ends(distance: SignedDistance, X: Array, spacing: Array | float) -> tuple[Array, Array]:
     """Ends of lines from particles at X (n, d), (n, d), and their depths, (n,) [m]."""
     points, depths = X.copy(), -distance(X)
     wanted, share = np.full(len(X), DEPTH * spacing), np.ones(len(X))

@@ -127,9 +127,7 @@ class Hidden:
         return Hidden(keys, len(chosen), None if self.pieces is None else self.pieces[chosen])
 
 
-def neighbour_pairs(
-    positions: Array, radius: Array | float, hidden: Hidden | None = None
-) -> Pairs:
+def neighbour_pairs(positions: Array, radius: Array | float, hidden: Hidden | None = None) -> Pairs:
     """All pairs closer than `radius` [m] among `positions` (n, d), self pairs included, hidden
     pairs excluded. If each particle has its own radius (n,), that of a pair is their mean."""
     n = len(positions)

@@ -9,7 +9,7 @@ from typing import final
 import attrs
 import numpy as np
 
-from solidsph.maths.arrays import Array
+from solidsph.maths.arrays import Array, Mask
 
 STEEPEST = 0.5
 """Largest growth of a spacing over a distance [-]: less than twofold over a cubic spline's support.
@@ -57,7 +57,7 @@ def cells_over(
     lower: Array,
     upper: Array,
     spacing: Callable[[Array], Array],
-    reaches: Callable[[Array, Array], Array],
+    reaches: Callable[[Array, Array], Mask],
     part: float = _FINEST_PART,
     most: float = np.inf,
 ) -> Cells:
@@ -83,7 +83,7 @@ def cells_over(
     done = 0
     for _ in range(_MOST_LEVELS):
         wanted = reaches(centres, np.full(len(centres), 0.5 * np.sqrt(d) * edge))
-        centres = centres[np.asarray(wanted, dtype=np.bool_)]
+        centres = centres[wanted]
         large = edge > part * spacing(centres)
         kept = centres if done + len(centres) > most else centres[~large]
         settled.append((kept, np.full(len(kept), edge)))

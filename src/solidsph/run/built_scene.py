@@ -199,11 +199,12 @@ class BuiltScene(ABC):
             known |= {"step size [s]": self.step_size, "outputs": len(self.output_steps())}
         else:
             known |= {"load steps": self.load_steps}
+        spacings = self.particles.spacings
         bodies = [
             {
                 "body": name,
                 "shape": _name(body.shape),
-                "spacing [m]": float(body.spacing),
+                "spacing [m]": spacings[place].min(),
                 "particles": place.stop - place.start,
             }
             for (name, body), place in zip(

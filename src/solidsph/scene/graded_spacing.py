@@ -74,7 +74,7 @@ def least_spacing(body: BodyScene) -> float:
     """
     if isinstance(body.spacing, str):
         return spacing_field(body, construct("shapes", body.shape)).least
-    return min(body.spacing, *(entry["spacing"] for entry in body.refine), inf)
+    return float(min([body.spacing, *(entry["spacing"] for entry in body.refine)]))
 
 
 def spacing_field(body: BodyScene, shape: Shape) -> SpacingField:
@@ -97,10 +97,9 @@ def spacing_field(body: BodyScene, shape: Shape) -> SpacingField:
                 way = smooth_step(distance(X) / entry.over)
                 least = np.minimum(least, entry.spacing + way * (s - entry.spacing))
             return least
-    else:
-        wanted = base
-    least, greatest = _range(wanted, shape)
-    return SpacingField(wanted, least, greatest)
+
+        return SpacingField(wanted, *_range(wanted, shape))
+    return SpacingField(base, *_range(base, shape))
 
 
 def predicted_count(field: SpacingField, shape: Shape) -> float:
@@ -262,7 +261,8 @@ def _places(shape: Shape, fine: float, coarse: float) -> Particles:
 
 
 def _length(what: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < value < inf:
+    number = isinstance(value, Real) and not isinstance(value, bool)
+    if not (number and 0.0 < value < inf):
         raise SceneError(f"{what} must be a positive finite length in m, got {value!r}")
     return float(value)
 
@@ -275,4 +275,3 @@ def _rounded_up(length: float) -> float:
 
 def _place(X: Array) -> str:
     return "(" + ", ".join(f"{x:.4g}" for x in X) + ")"
-

@@ -275,7 +275,7 @@ def _number_or_text(value: Any, what: str) -> float | str:
 def _entries(value: Any, what: str) -> tuple[Any, ...]:
     if not isinstance(value, list):
         raise SceneError(
-            f"{what} must be a list such as [{{where = \"rim\", spacing = 0.01, over = 0.2}}], got "
+            f'{what} must be a list such as [{{where = "rim", spacing = 0.01, over = 0.2}}], got '
             f"{value!r}"
         )
     return tuple(value)

@@ -12,6 +12,7 @@ import attrs
 from solidsph.errors import SceneError
 from solidsph.maths.arrays import Array
 from solidsph.results.record import Record
+from solidsph.scene.graded_spacing import least_spacing
 from solidsph.scene.scene import Scene
 
 Curves: TypeAlias = Mapping[str, Array]
@@ -116,7 +117,9 @@ class Case(ABC):
     def resolution(self) -> float:
         """Smallest particle spacing [m], the measure of its refinement."""
         return min(
-            body.spacing for scene in self.scenes().values() for body in scene.bodies.values()
+            least_spacing(body)
+            for scene in self.scenes().values()
+            for body in scene.bodies.values()
         )
 
     def curves(self, records: Mapping[str, Record]) -> Mapping[str, Curves]:

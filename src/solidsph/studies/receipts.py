@@ -29,6 +29,7 @@ from solidsph.registry.construct import construct
 from solidsph.results.record import Record
 from solidsph.run.energy import RESIDUAL
 from solidsph.run.outcome import FINISHED
+from solidsph.scene.graded_spacing import least_spacing, scaled
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import BodyScene
 from solidsph.simulation import Simulation
@@ -147,7 +148,8 @@ def receipts(
             less = _run(without(whole, label), Path(folder) / "without.h5", of)
             each.append(_receipt(label, shares.get(label), base, less))
     factor = max(
-        small.bodies[name].spacing / body.spacing for name, body in simulation.scene.bodies.items()
+        least_spacing(small.bodies[name]) / least_spacing(body)
+        for name, body in simulation.scene.bodies.items()
     )
     return Receipts(each, factor, small.duration, whole.particles.count, base.outcome)
 
@@ -272,7 +274,7 @@ def _coarser(body: BodyScene, factor: float) -> BodyScene:
     shape: Shape = construct("shapes", body.shape)
     lower, upper = shape.bounds()
     most = float((upper - lower).min()) / _FEWEST
-    return attrs.evolve(body, spacing=max(body.spacing, min(factor * body.spacing, most)))
+    return scaled(body, max(1.0, min(factor, most / least_spacing(body))))
 
 
 def _run(simulation: Simulation, path: Path, of: Sequence[str]) -> _Run:

@@ -12,6 +12,7 @@ import attrs
 from solidsph.errors import SceneError
 from solidsph.registry.construct import construct, describe
 from solidsph.scene.default_cover import cover_of
+from solidsph.scene.graded_spacing import is_graded, least_spacing, scaled
 from solidsph.scene.keys import is_key, with_key
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import DEFAULT_FACTOR, RECOMMENDED, ImposedScene, PartLike
@@ -92,7 +93,7 @@ def named(scene: Scene) -> frozenset[str]:
 
 def smallest_spacing(scene: Scene) -> float:
     """Smallest particle spacing of its bodies [m]."""
-    return min(body.spacing for body in scene.bodies.values())
+    return min(map(least_spacing, scene.bodies.values()))
 
 
 def _with_spacing(scene: Scene, value: Any) -> Scene:
@@ -102,7 +103,9 @@ def _with_spacing(scene: Scene, value: Any) -> Scene:
     least = smallest_spacing(scene)
     factor = value / least
     bodies = {
-        name: attrs.evolve(body, spacing=factor * body.spacing if body.spacing > least else value)
+        name: scaled(body, factor)
+        if is_graded(body) or least_spacing(body) > least
+        else attrs.evolve(body, spacing=value)
         for name, body in scene.bodies.items()
     }
     return attrs.evolve(scene, bodies=bodies)

@@ -18,6 +18,7 @@ from solidsph.maths.arrays import Array
 from solidsph.model.particles import State
 from solidsph.registry.construct import construct
 from solidsph.scene.default_cover import cover_of, kernel_cover
+from solidsph.scene.graded_spacing import least_spacing
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import DEFAULT_FACTOR, PartLike
 from solidsph.scene.scheme import SCHEMES, completed
@@ -106,7 +107,7 @@ class Scheme:
             material=material,
             effects=tuple(effect.part for effect in scene.effects),
             integrator=scene.integrator,
-            spacing=body.spacing,
+            spacing=least_spacing(body),
             time_step_factor=scene.time_step_factor,
         )
 
