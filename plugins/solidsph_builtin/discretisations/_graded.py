@@ -21,10 +21,11 @@ from solidsph_builtin.discretisations._checks import check_count, refusal
 from solidsph_builtin.discretisations._curves import graded_points
 from solidsph_builtin.discretisations._graded_fitting import graded_fit
 from solidsph_builtin.discretisations._graded_relaxation import relaxed_by
+from solidsph_builtin.discretisations._graded_samples import graded_samples
 from solidsph_builtin.discretisations._graded_surface import surface_points
 from solidsph_builtin.discretisations._nearest import nearest, thinned_pairs
 from solidsph_builtin.discretisations._sampled_once import sampled_once
-from solidsph_builtin.discretisations._surface import faces, sampled, without_ghosts
+from solidsph_builtin.discretisations._surface import faces, without_ghosts
 
 # Rows of particles that follow the surface.
 _ROWS = 4
@@ -50,7 +51,7 @@ def graded(discretisation: Discretisation, shape: Shape, spacing: SpacingField) 
         SceneError: there would be too many, or no particle has a place inside the surface.
     """
     shape = sampled_once(shape)
-    outer = _outer(shape, spacing)
+    outer = _outer(discretisation, shape, spacing)
     rows = _rows(shape, spacing, outer)
     held = np.concatenate([outer, rows])
     inner = _inner(discretisation, shape, spacing, held)
@@ -68,7 +69,7 @@ def graded(discretisation: Discretisation, shape: Shape, spacing: SpacingField) 
     X, onto = X[kept], onto[kept]
     order = _order(X, *shape.bounds())
     X, onto = X[order], onto[order]
-    surface = sampled(discretisation, shape, spacing.least)
+    surface = graded_samples(discretisation, shape, spacing)
     at = np.flatnonzero(onto)
     owners = nearest(cKDTree(X[at]), surface.points)
     owned = faces(surface, type(owners)(at[owners.particles], owners.points, owners.shares), X)
@@ -77,13 +78,13 @@ def graded(discretisation: Discretisation, shape: Shape, spacing: SpacingField) 
     return attrs.evolve(graded_fit(discretisation, shape, spacing, given), cells=cells)
 
 
-def _outer(shape: Shape, spacing: SpacingField) -> Array:
+def _outer(discretisation: Discretisation, shape: Shape, spacing: SpacingField) -> Array:
     """Particles on the boundary, (m, d) [m]."""
     if shape.dimension == 1:
         return np.stack(shape.bounds())
     if shape.dimension == 2:
         return graded_points(shape, spacing)
-    return surface_points(shape, spacing)
+    return surface_points(discretisation, shape, spacing)
 
 
 def _rows(shape: Shape, spacing: SpacingField, outer: Array) -> Array:

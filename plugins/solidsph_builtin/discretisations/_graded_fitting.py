@@ -23,9 +23,10 @@ from solidsph_builtin.discretisations._fitting import (
     gauss_points,
     with_moments,
 )
+from solidsph_builtin.discretisations._graded_samples import graded_samples
 from solidsph_builtin.discretisations._pieces import finest_pieces
 from solidsph_builtin.discretisations._reproducing import Fit
-from solidsph_builtin.discretisations._surface import area_vectors, sampled
+from solidsph_builtin.discretisations._surface import area_vectors
 
 
 def graded_fit(
@@ -53,7 +54,7 @@ def graded_fit(
     owners = np.unique(np.concatenate([face.particles for face in faces.values()]))
     off = np.abs(shape.signed_distance(X[owners])) / given.spacings[owners]
     if off.max(initial=0.0) <= ON_BOUNDARY:
-        surface = sampled(discretisation, shape, spacing.least / FINER[d])
+        surface = graded_samples(discretisation, shape, spacing, FINER[d])
         faces = faces_by(surface, X, given.spacings, faces, lambda own: Fit(own, spacing.at, None))
         faces = agreeing(faces, X, volumes)
     areas = area_vectors(faces, given.count, d)

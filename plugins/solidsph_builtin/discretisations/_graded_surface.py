@@ -7,6 +7,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
+from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array
 from solidsph.model.pair_search import PairSearch
@@ -15,10 +16,13 @@ from solidsph_builtin.discretisations._curves import graded_steps
 from solidsph_builtin.discretisations._features import gap, meetings, smooth
 from solidsph_builtin.discretisations._feet import on_boundary
 from solidsph_builtin.discretisations._graded_relaxation import relaxed_by
+from solidsph_builtin.discretisations._graded_samples import graded_samples
 from solidsph_builtin.discretisations._nearest import thinned_pairs
 
 # Samples along the least spacing, of the four that a shape makes.
 _SAMPLES = 2.0
+# Places on faces to choose from are a quarter to half of a spacing apart.
+_CANDIDATES = 0.5
 # Samples follow each other along an edge up to this distance, in gaps between them.
 _NEXT = 2.5
 # Places closer than this, in spacings, are one; of those on faces a random choice with this
@@ -29,7 +33,7 @@ _AT_CORNER = 1.5
 _STEPS = 60
 
 
-def surface_points(shape: Shape, spacing: SpacingField) -> Array:
+def surface_points(discretisation: Discretisation, shape: Shape, spacing: SpacingField) -> Array:
     """Particles on corners, on edges in even steps, and on faces, (m, 3) [m]."""
     surface = shape.surface(spacing.least * 4.0 / _SAMPLES)
     reach = gap(surface)
@@ -40,7 +44,8 @@ def surface_points(shape: Shape, spacing: SpacingField) -> Array:
         rows.append(graded_steps(line, spacing, closed=closed))
     fixed = _distinct(np.concatenate(rows), spacing)
     fixed = on_boundary(shape, surface, fixed, spacing.least) if len(fixed) else fixed
-    points = np.concatenate([fixed, _shuffled(surface)])
+    candidates = graded_samples(discretisation, shape, spacing, _CANDIDATES)
+    points = np.concatenate([fixed, _shuffled(candidates)])
     s = spacing.at(points)
     near = PairSearch.of(points, _CLOSEST * s).near(np.arange(len(points)))
     pairs = np.column_stack(near)

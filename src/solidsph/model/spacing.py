@@ -36,8 +36,13 @@ class SpacingField:
     greatest: float  # [m]
 
     def at(self, X: Array) -> Array:
-        """The spacing at X (n, d) [m], (n,) [m]."""
-        return np.clip(self.wanted(X), self.least, self.greatest)
+        """The spacing at X (n, d) [m], (n,) [m].
+
+        Outside of the body, where a formula may have no value, it is at least half the least and
+        at most twice the greatest.
+        """
+        s = self.wanted(X)
+        return np.clip(np.where(np.isfinite(s), s, self.greatest), 0.5 * self.least, 2.0 * self.greatest)
 
 
 @attrs.frozen(eq=False)
@@ -69,8 +74,8 @@ def cells_over(
         spacing: at places (n, d) [m], (n,) [m].
         reaches: whether cubes about places (n, d) with half diagonals (n,) [m] are wanted, (n,).
         part: of the spacing [-].
-        most: number of cubes beyond which there are to be no more, and those are returned that
-            there are, some too large.
+        most: if more cubes than this are to be expected, none is halved any more, and some of those
+            returned are too large.
     """
     lengths = upper - lower
     edge = float(lengths.min()) / _FIRST
@@ -84,8 +89,11 @@ def cells_over(
     for _ in range(_MOST_LEVELS):
         wanted = reaches(centres, np.full(len(centres), 0.5 * np.sqrt(d) * edge))
         centres = centres[wanted]
-        large = edge > part * spacing(centres)
-        kept = centres if done + len(centres) > most else centres[~large]
+        wanted_size = part * spacing(centres)
+        large = edge > wanted_size
+        with np.errstate(over="ignore", divide="ignore"):
+            coming = float(np.sum((edge / wanted_size[large]) ** d))
+        kept = centres if done + coming > most else centres[~large]
         settled.append((kept, np.full(len(kept), edge)))
         done += len(kept)
         if len(kept) == len(centres):

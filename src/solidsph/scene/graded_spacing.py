@@ -31,10 +31,13 @@ from solidsph.scene.scene_data import BodyScene
 _KEYS = ("where", "spacing", "over")
 
 # Cells at which a spacing is read, at most: then it is that of a body beyond any machine.
-_MOST_CELLS = 4_000_000
+_MOST_CELLS = 2_000_000
 
 # Places inside a region, at most, by which the distance from it is known.
 _MOST_PLACES = 400_000
+
+# The boundary is sampled for the least spacing everywhere.
+_MOST_RATIO = 100.0
 
 # A slope is read by differences over this part of the spacing, and may be too large by that of
 # the third derivative.
@@ -103,10 +106,13 @@ def spacing_field(body: BodyScene, shape: Shape) -> SpacingField:
 
 
 def predicted_count(field: SpacingField, shape: Shape) -> float:
-    """Number of particles of a body with this spacing, about."""
+    """Number of particles of a body with this spacing, about, if they stand on its surface."""
     cells = _cells(field.wanted, shape)
-    inside = np.clip(0.5 - shape.signed_distance(cells.centres) / cells.sizes, 0.0, 1.0)
-    return float(np.sum(inside * cells.volumes / field.at(cells.centres) ** shape.dimension))
+    inside = float(np.sum(cells.volumes / field.at(cells.centres) ** shape.dimension))
+    surface = shape.surface(field.least)
+    areas = np.linalg.norm(surface.area_vectors, axis=1)
+    # Particles stand on the surface, half a cell beyond the middle of those of a lattice.
+    return inside + 0.5 * float(np.sum(areas / field.at(surface.points) ** (shape.dimension - 1)))
 
 
 def _base(spacing: float | str, dimension: int) -> Callable[[Array], Array]:
@@ -131,20 +137,24 @@ def _range(spacing: Callable[[Array], Array], shape: Shape) -> tuple[float, floa
         SceneError: it grows too fast, or is far too small for the shape.
     """
     cells = _cells(spacing, shape)
-    s = spacing(cells.centres)
-    _check_values(cells.centres, s)
-    _check_growth(spacing, cells, s)
-    if np.any(cells.sizes > 2.0 * s):
-        worst = int(np.argmin(s))
+    low, high = shape.bounds()
+    X = np.concatenate([cells.centres, shape.surface(float((high - low).min()) / 8.0).points])
+    s = spacing(X)
+    _check_values(X, s)
+    least, greatest, worst = float(s.min()), float(s.max()), int(np.argmin(s))
+    if np.any(cells.sizes > 2.0 * s[: len(cells.sizes)]):
         raise SceneError(
-            f"the spacing is {s[worst]:.3g} m at {_place(cells.centres[worst])}: too small for "
-            f"more than {_MOST_CELLS:.0e} particles in all; use larger spacings, or check the unit "
-            "of the shape"
+            f"the spacing is {least:.3g} m at {_place(X[worst])}, where it varies for some "
+            f"{_MOST_CELLS:.0e} particles at most; use larger spacings, or check the unit of the "
+            "shape"
         )
-    points = shape.surface(float(np.median(s))).points
-    _check_values(points, spacing(points))
-    s = np.concatenate([s, spacing(points)])
-    return float(s.min()), float(s.max())
+    if greatest > _MOST_RATIO * least:
+        raise SceneError(
+            f"the spacing is {least:.3g} m at {_place(X[worst])} and {greatest:.3g} m elsewhere; "
+            f"it may vary by a factor of {_MOST_RATIO:g} in one body"
+        )
+    _check_growth(spacing, cells)
+    return least, greatest
 
 
 def _cells(spacing: Callable[[Array], Array], shape: Shape) -> Cells:
@@ -173,8 +183,11 @@ def _check_values(X: Array, s: Array) -> None:
         )
 
 
-def _check_growth(spacing: Callable[[Array], Array], cells: Cells, s: Array) -> None:
+def _check_growth(spacing: Callable[[Array], Array], cells: Cells) -> None:
     X, d = cells.centres, cells.centres.shape[1]
+    s = spacing(X)
+    if not len(X):
+        return
     squares = np.zeros(len(X))
     for axis in np.eye(d):
         step = _STEP * s[:, None] * axis
