@@ -122,7 +122,7 @@ def test_a_discretisation_that_cannot_follow_names_those_that_can() -> None:
     builder = Simulation.builder().body(
         "sheet", shape=SHEET, spacing="0.1 + 0.1*X**2", discretisation="lattice"
     )
-    with pytest.raises(BuildError, match="'lattice' does not follow; use .*'fitted'.*'points'"):
+    with pytest.raises(BuildError, match=r"'lattice' does not follow; use .*'fitted'.*'points'"):
         builder.material("neo-hookean", **SOFT).duration(1.0).build()
 
 
@@ -140,6 +140,7 @@ def test_what_cannot_follow_is_refused(words: dict[str, Any], message: str) -> N
 
 def test_cells_fill_the_box_and_are_no_larger_than_the_spacing() -> None:
     lower, upper = np.array([0.0, -1.0]), np.array([2.0, 0.5])
+    middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
     cells = cells_over(
         lower,
         upper,

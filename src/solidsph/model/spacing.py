@@ -42,7 +42,8 @@ class SpacingField:
         at most twice the greatest.
         """
         s = self.wanted(X)
-        return np.clip(np.where(np.isfinite(s), s, self.greatest), 0.5 * self.least, 2.0 * self.greatest)
+        known = np.where(np.isfinite(s), s, self.greatest)
+        return np.clip(known, 0.5 * self.least, 2.0 * self.greatest)
 
 
 @attrs.frozen(eq=False)
