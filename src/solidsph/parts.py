@@ -23,6 +23,7 @@ from solidsph.interfaces.engine import Engine, InternalForces, StressFields
 from solidsph.interfaces.equation_of_motion import EquationOfMotion, Response
 from solidsph.interfaces.forces_modifier import ForcesModifier
 from solidsph.interfaces.formulation import Configuration, Formulation
+from solidsph.interfaces.graded_discretisation import GradedDiscretisation
 from solidsph.interfaces.gradient import Gradient, PointwiseGradient
 from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.interfaces.integrator import Integrator, PointwiseIntegrator
@@ -91,6 +92,7 @@ from solidsph.model.fields import Component, VectorField, scheduled_forces
 from solidsph.model.neighbours import Pairs, neighbour_pairs
 from solidsph.model.particles import Face, Particles, State
 from solidsph.model.regions import AXES, EVERYWHERE, Where
+from solidsph.model.spacing import SpacingField
 from solidsph.registry.construct import construct
 from solidsph.registry.parameters import check_positive, formula, number, optional_number
 from solidsph.results.record import Record
@@ -134,6 +136,7 @@ __all__ = [
     "ForcesModifier",
     "Formulation",
     "GhostConstraint",
+    "GradedDiscretisation",
     "Gradient",
     "Held",
     "History",
@@ -178,6 +181,7 @@ __all__ = [
     "ScheduledLoad",
     "Shape",
     "SmoothingKernel",
+    "SpacingField",
     "State",
     "StepError",
     "StressFields",

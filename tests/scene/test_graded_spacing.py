@@ -145,9 +145,7 @@ def test_cells_fill_the_box_and_are_no_larger_than_the_spacing() -> None:
         lower,
         upper,
         lambda X: 0.05 + 0.2 * np.abs(X[:, 0]),
-        lambda X, reach: np.all(
-            (lower - reach[:, None] < X) & (upper + reach[:, None] > X), axis=1
-        ),
+        lambda X, reach: np.all(np.abs(X - middle) < half + reach[:, None], axis=1),
         0.5,
     )
     s = 0.05 + 0.2 * np.abs(cells.centres[:, 0])
