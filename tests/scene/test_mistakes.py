@@ -52,7 +52,7 @@ EMPTY = (
     "where = 'X > 9' matches no particle",
 )
 STEP = ('type = "central-difference"', "time_step = -1.0"), "time_step must be positive"
-SPACING = ("spacing = 0.125", 'spacing = "fine"'), "body.block.spacing must be a number"
+SPACING = ("spacing = 0.125", 'spacing = "fine"'), "unknown name 'fine'"
 SHAPE = ('type = "box"', 'type = "boxx"'), "unknown shape 'boxx'"
 NAME = ('title = "a block', 'engine = "steam"\ntitle = "a block'), "unknown engine 'steam'"
 

@@ -13,7 +13,6 @@ from solidsph.costs.work import Loop, StaticWork, Work
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.material import Material
 from solidsph.interfaces.terms import FieldTerm
-from solidsph.model.neighbours import neighbour_pairs
 from solidsph.scene.default_cover import cover_of
 from solidsph.scene.scene_data import StaticsScene
 from solidsph.scene.static_solver import iterates
@@ -123,7 +122,7 @@ def iterated_work(load_steps: int, iterations: int, unknowns: int, products: int
 def _coupled(body: Body) -> int:
     """Approximate number of pairs with a common neighbour: those up to two supports apart."""
     if body.smoothing.radii is not None:
-        return neighbour_pairs(body.particles.positions, 2.0 * body.smoothing.radii).count
+        return body.pairs(2.0 * body.smoothing.support_radius).count
     tree = cKDTree(body.particles.positions)
     return int(tree.count_neighbors(tree, 2.0 * body.smoothing.support_radius))
 

@@ -80,6 +80,14 @@ def least_spacing(body: BodyScene) -> float:
     return float(min([body.spacing, *(entry["spacing"] for entry in body.refine)]))
 
 
+def check_words(body: BodyScene) -> None:
+    """Raise SceneError if a spacing that varies cannot be read, whatever the shape."""
+    if isinstance(body.spacing, str):
+        Expression.parse(body.spacing, AXES)
+    for entry in body.refine:
+        _refinement(entry)
+
+
 def spacing_field(body: BodyScene, shape: Shape) -> SpacingField:
     """The spacing of a body that varies.
 

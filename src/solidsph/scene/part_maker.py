@@ -29,7 +29,12 @@ from solidsph.scene.checks.numbers import check_numbers
 from solidsph.scene.checks.returned import check_particles
 from solidsph.scene.checks.terms import check_effects
 from solidsph.scene.default_cover import cover_of
-from solidsph.scene.graded_spacing import is_graded, predicted_count, spacing_field
+from solidsph.scene.graded_spacing import (
+    check_words,
+    is_graded,
+    predicted_count,
+    spacing_field,
+)
 from solidsph.scene.scene_data import (
     RECOMMENDED,
     BodyScene,
@@ -196,6 +201,7 @@ class PartMaker:
         discretisations: dict[str, Discretisation] = {}
         bodies = self._scene.bodies
         for name, body in bodies.items():
+            readable = self.problems.attempt(_readable, name, body)
             shape = self._make("shapes", body.shape)
             discretisation = self._make("discretisations", body.discretisation)
             material = self._material(name, body)
@@ -203,12 +209,11 @@ class PartMaker:
                 materials[name] = material
             if shape is not None:
                 shapes[name] = shape
-                if discretisation is not None:
+                if discretisation is not None and readable:
                     discretisations[name] = discretisation
         if not bodies and self._scene.material is not None:
             self._make("materials", self._scene.material)  # unused, but it may have mistakes too
-        few = all(_is_few(shape, bodies[name]) for name, shape in shapes.items())
-        if self.problems.found and not few:
+        if self.problems.found and not all(_is_few(shapes[name], bodies[name]) for name in shapes):
             return shapes, materials, {}
         sets: dict[str, Particles] = {}
         for name, discretisation in discretisations.items():
@@ -227,6 +232,15 @@ class PartMaker:
             return self._make("materials", wanted)
         self.problems.add([f"body {name!r} has no material; add one to it, or to the scene"])
         return None
+
+
+def _readable(name: str, body: BodyScene) -> bool:
+    """True; raises SceneError if the spacing of a body has mistakes."""
+    try:
+        check_words(body)
+    except SceneError as cause:
+        raise SceneError(f"body {name!r}: {cause}") from None
+    return True
 
 
 def _particles_of(
