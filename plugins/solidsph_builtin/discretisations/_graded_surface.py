@@ -28,8 +28,9 @@ _NEXT = 2.5
 # Places closer than this, in spacings, are one; of those on faces a random choice with this
 # distance has one in the square of a spacing.
 _CLOSEST = 0.84
-# Samples of an edge are no further than this from it, in gaps.
-_AT_CORNER = 1.5
+# Samples closer to a corner than this, in gaps, are left out: edges that meet at an angle of 50
+# degrees or more are then apart.
+_AT_CORNER = 3.0
 _STEPS = 60
 
 

@@ -28,8 +28,8 @@ _SMALLEST = 1e-300
 # those with 0.001.
 _LEFT, _LEFT_OF_SUMS = 0.1, 1e-7
 # The same of the sums where the spacing varies. A uniform stress in a box with spacings from 1 to 2
-# is balanced to 6e-9 of the largest load, with 1e-7 to 1e-7; it takes as long.
-_LEFT_OF_GRADED = 1e-9
+# is then balanced to 1e-9 of the largest load, with 1e-7 to 1e-7; it takes as long.
+_LEFT_OF_GRADED = 3e-10
 
 # Steps with the diagonal alone, at most: these are enough for boxes. Then splines help: in a ball
 # of 37 000 particles 86 steps leave 0.09 with them, 96 leave 0.58 with blocks beside them.
