@@ -85,6 +85,8 @@ def test_a_study_scales_all_of_it() -> None:
     finer = changed(wanted, "spacing", 0.5 * smallest_spacing(wanted))
     assert smallest_spacing(finer) == pytest.approx(0.5 * smallest_spacing(wanted), rel=1e-6)
     assert least_spacing(scaled(body(0.1, AT_RIM), 0.5)) == pytest.approx(0.01)
+    coarser = scaled(body(0.1, AT_RIM), 3.0)
+    assert spacing_field(coarser, construct("shapes", SHEET)).least == pytest.approx(0.06, rel=1e-2)
     X = np.array([[0.3, 0.4], [0.9, 0.1]])
     half = spacing_field(finer.bodies["sheet"], construct("shapes", SHEET)).at(X)
     whole = spacing_field(wanted.bodies["sheet"], construct("shapes", SHEET)).at(X)

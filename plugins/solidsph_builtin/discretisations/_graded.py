@@ -27,12 +27,10 @@ from solidsph_builtin.discretisations._nearest import nearest, thinned_pairs
 from solidsph_builtin.discretisations._sampled_once import sampled_once
 from solidsph_builtin.discretisations._surface import faces, without_ghosts
 
-# Rows of particles that follow the surface.
-_ROWS = 4
-# A place this part less deep than its row belongs to another part of the surface.
+# A place this part less deep than a spacing below its own part of the surface belongs to another.
 _OTHER = 0.1
-# In spacings: two particles of rows closer than this become one, and further than the second from
-# them is room for others.
+# In spacings: two particles of the rows beside the surface closer than this become one, and further
+# than the second from them is room for others.
 _CLOSEST, _CLEAR = 0.7, 0.58
 # Cells along a spacing, at least.
 _CELLS = 2.0
@@ -41,7 +39,7 @@ _STEPS = 200
 # Weight of a particle on the surface in sums over neighbours, in cells, as of `fitted`.
 _ON_SURFACE = 1.0 / 3.0
 # Bits of a place along an axis, for the order.
-_BITS = {1: 20, 2: 20, 3: 20}
+_BITS = 20
 
 
 def graded(discretisation: Discretisation, shape: Shape, spacing: SpacingField) -> Particles:
@@ -52,8 +50,7 @@ def graded(discretisation: Discretisation, shape: Shape, spacing: SpacingField) 
     """
     shape = sampled_once(shape)
     outer = _outer(discretisation, shape, spacing)
-    rows = _rows(shape, spacing, outer)
-    held = np.concatenate([outer, rows])
+    held = np.concatenate([outer, _row(shape, spacing, outer)])
     inner = _inner(discretisation, shape, spacing, held)
     X = np.concatenate([held, inner])
     if len(X) == len(outer):
@@ -87,24 +84,24 @@ def _outer(discretisation: Discretisation, shape: Shape, spacing: SpacingField) 
     return surface_points(discretisation, shape, spacing)
 
 
-def _rows(shape: Shape, spacing: SpacingField, outer: Array) -> Array:
-    """Rows of particles that follow the surface, the nearest `_ROWS` to it, (m, d) [m]."""
-    rows, depths = [outer], np.zeros(len(outer))
+def _row(shape: Shape, spacing: SpacingField, outer: Array) -> Array:
+    """A row of particles that follows the surface, a spacing below those on it, (m, d) [m].
+
+    In Lame's ring with spacings from a tenth to a third of the inner radius, the hoop stress there
+    is off by 0.95 % (root mean square) without it, 0.51 % with it, 0.67 and 0.56 % with 2 and 4.
+    """
     surface = shape.surface(spacing.least)
-    near = cKDTree(surface.points).query(outer)[1]
-    areas = surface.area_vectors[near]
+    areas = surface.area_vectors[cKDTree(surface.points).query(outer)[1]]
     inwards = -areas / np.linalg.norm(areas, axis=1, keepdims=True)
-    for _ in range(_ROWS):
-        way = spacing.at(rows[-1])
-        way = 0.5 * (way + spacing.at(rows[-1] + way[:, None] * inwards))
-        X, depths = rows[-1] + way[:, None] * inwards, depths + way
-        kept = -shape.signed_distance(X) > (1.0 - _OTHER) * depths
-        rows.append(X[kept])
-        inwards, depths = inwards[kept], depths[kept]
-    X = np.concatenate(rows)
-    close = np.column_stack(PairSearch.of(X, _CLOSEST * spacing.at(X)).near(np.arange(len(X))))
-    stays = thinned_pairs(close[close[:, 0] < close[:, 1]], np.arange(len(X)))
-    return X[len(outer) :][stays[len(outer) :]]
+    s = spacing.at(outer)
+    depths = 0.5 * (s + spacing.at(outer + s[:, None] * inwards))
+    X = outer + depths[:, None] * inwards
+    X = X[-shape.signed_distance(X) > (1.0 - _OTHER) * depths]
+    every = np.concatenate([outer, X])
+    near = PairSearch.of(every, _CLOSEST * spacing.at(every)).near(np.arange(len(every)))
+    pairs = np.column_stack(near)
+    stays = thinned_pairs(pairs[pairs[:, 0] < pairs[:, 1]], np.arange(len(every)))
+    return X[stays[len(outer) :]]
 
 
 def _inner(
@@ -131,10 +128,10 @@ def _order(X: Array, lower: Array, upper: Array) -> Indices:
     """Morton's order of places X (n, d) in a box, (n,)."""
     d = X.shape[1]
     size = float((upper - lower).max())
-    places = ((X - lower) / size * (1 << _BITS[d])).astype(np.int64)
-    places = np.clip(places, 0, (1 << _BITS[d]) - 1)
+    places = ((X - lower) / size * (1 << _BITS)).astype(np.int64)
+    places = np.clip(places, 0, (1 << _BITS) - 1)
     keys = np.zeros(len(X), dtype=np.int64)
-    for bit in range(_BITS[d]):
+    for bit in range(_BITS):
         for axis in range(d):
             keys |= ((places[:, axis] >> bit) & 1) << (bit * d + axis)
     return np.asarray(np.argsort(keys, kind="stable"), dtype=np.intp)

@@ -59,14 +59,20 @@ def is_graded(body: BodyScene) -> bool:
 
 
 def scaled(body: BodyScene, factor: float) -> BodyScene:
-    """The body with its spacing times a factor everywhere."""
-    spacing: float | str
+    """The body with its spacing times a factor everywhere.
+
+    Where it would then grow too fast, it returns over a longer way.
+    """
     if isinstance(body.spacing, str):
-        spacing = f"{factor!r}*({body.spacing})"
-    else:
-        spacing = factor * body.spacing
-    refine = [{**entry, "spacing": factor * entry["spacing"]} for entry in body.refine]
-    return attrs.evolve(body, spacing=spacing, refine=tuple(refine))
+        refine = [{**entry, "spacing": factor * entry["spacing"]} for entry in body.refine]
+        return attrs.evolve(body, spacing=f"{factor!r}*({body.spacing})", refine=tuple(refine))
+    coarse = factor * body.spacing
+    refine = []
+    for entry in body.refine:
+        fine = factor * entry["spacing"]
+        over = max(entry["over"], _needed(fine, coarse))
+        refine.append({**entry, "spacing": fine, "over": over})
+    return attrs.evolve(body, spacing=coarse, refine=tuple(refine))
 
 
 def least_spacing(body: BodyScene) -> float:
@@ -77,7 +83,7 @@ def least_spacing(body: BodyScene) -> float:
     """
     if isinstance(body.spacing, str):
         return spacing_field(body, construct("shapes", body.shape)).least
-    return float(min([body.spacing, *(entry["spacing"] for entry in body.refine)]))
+    return min([float(body.spacing), *(_refinement(entry).spacing for entry in body.refine)])
 
 
 def check_words(body: BodyScene) -> None:
@@ -228,13 +234,18 @@ def _check_slope(entry: _Refinement, coarse: float) -> None:
             f"refine at {entry.where!r}: spacing = {entry.spacing:g} m is above the largest of the "
             f"body, {coarse:.4g} m; it must be finer"
         )
-    needed = STEEPEST_STEP * (coarse - entry.spacing) / STEEPEST
-    if entry.over < needed:
+    needed = _needed(entry.spacing, coarse)
+    if entry.over < needed * (1.0 - _ROUNDING):
         raise SceneError(
             f"refine at {entry.where!r}: from {entry.spacing:g} to {coarse:.4g} m over "
             f"{entry.over:g} m the spacing grows too fast for neighbours to be alike; use over = "
             f"{_rounded_up(needed):g} or more"
         )
+
+
+def _needed(fine: float, coarse: float) -> float:
+    """Least distance over which a spacing may return from fine to coarse [m]."""
+    return STEEPEST_STEP * (coarse - fine) / STEEPEST
 
 
 def _distance(entry: _Refinement, shape: Shape, coarse: float) -> Callable[[Array], Array]:
