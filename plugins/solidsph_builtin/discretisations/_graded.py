@@ -101,7 +101,8 @@ def _row(shape: Shape, spacing: SpacingField, outer: Array) -> Array:
     near = PairSearch.of(every, _CLOSEST * spacing.at(every)).near(np.arange(len(every)))
     pairs = np.column_stack(near)
     stays = thinned_pairs(pairs[pairs[:, 0] < pairs[:, 1]], np.arange(len(every)))
-    return X[stays[len(outer) :]]
+    row: Array = X[stays[len(outer) :]]
+    return row
 
 
 def _inner(

@@ -237,9 +237,9 @@ def test_a_wave_is_hardly_reflected_where_the_spacing_doubles_in_a_support(
 @pytest.mark.parametrize(
     ("fine", "over", "most", "allowed"),
     [
-        # Measured 0.40 %. One spacing of 0.05 has 1636 particles, and an extension off by 0.05 %.
+        # Measured 0.30 %. One spacing of 0.05 has 1636 particles, and an extension off by 0.05 %.
         (0.0125, 0.6, 2_100, 6e-3),
-        # Measured 0.02 %. One spacing of 0.0125 has 25 160 particles, is off by 0.10 %, and takes
+        # Measured 0.06 %. One spacing of 0.0125 has 25 160 particles, is off by 0.10 %, and takes
         # five times as long.
         (0.0078, 0.8, 7_200, 1e-3),
     ],
