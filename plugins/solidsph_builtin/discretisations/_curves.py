@@ -45,7 +45,7 @@ def even_points(shape: Shape, spacing: float) -> Array:
     rows = [corners]
     for curve in _curves(surface, lengths):
         line = _with_ends(surface, lengths, curve, corners)
-        rows.append(_evenly(line, spacing, closed=_is_closed(line, lengths[curve])))
+        rows.append(evenly(line, spacing, closed=_is_closed(line, lengths[curve])))
     points = np.concatenate(rows)
     # Corners come first, so that they stay.
     points = points[thinned(points / spacing, np.arange(len(points)), _CLOSEST)]
@@ -111,8 +111,8 @@ def _is_closed(line: Array, lengths: Array) -> bool:
     return bool(np.linalg.norm(line[-1] - line[0]) < 0.5 * float(lengths.min()))
 
 
-def _evenly(line: Array, spacing: float, *, closed: bool) -> Array:
-    """Points in equal steps along a polygonal `line` (m, 2), its ends included, (k, 2) [m]."""
+def evenly(line: Array, spacing: float, *, closed: bool) -> Array:
+    """Points in equal steps along a polygonal `line` (m, d), its ends included, (k, d) [m]."""
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     steps = cells_along(float(way[-1]), spacing)
     if closed:
@@ -120,4 +120,4 @@ def _evenly(line: Array, spacing: float, *, closed: bool) -> Array:
         # too many, which crowd those inside.
         steps = 4 * max(1, floor(float(way[-1]) / (4.0 * spacing) + _UP))
     places = np.linspace(0.0, way[-1], steps + 1)[: steps + (not closed)]
-    return np.stack([np.interp(places, way, line[:, axis]) for axis in range(2)], axis=1)
+    return np.stack([np.interp(places, way, along) for along in line.T], axis=1)

@@ -17,6 +17,9 @@ from solidsph_builtin.shapes._sampling import cells_along
 # Points handled at once: enough for NumPy to be efficient, few enough to stay in the cache.
 _CHUNK = 1 << 15
 
+# Points this close to one of the lattice are there, in cells.
+_AT = 1e-6
+
 # What is thinner than this part of its length has no extent: rounding moves its surface.
 _FLAT = 1e-9
 
@@ -77,7 +80,14 @@ class Grid:
     def has(self, points: Array) -> Mask:
         """Which of `points` (m, d) are lattice points, up to a millionth of a cell, (m,)."""
         places = (points - self.lower) / self.steps - self.first
-        return np.asarray((np.abs(places - np.rint(places)) <= 1e-6).all(axis=1))
+        return np.asarray((np.abs(places - np.rint(places)) <= _AT).all(axis=1))
+
+    def snapped(self, points: Array) -> tuple[Array, Mask]:
+        """Points (m, d), those at a point of the lattice to the last bit, and which these are
+        (m,)."""
+        there = self.positions(self.cell_of(points))
+        at = np.abs((points - there) / self.steps).max(axis=1, initial=0.0) <= _AT
+        return np.where(at[:, None], there, points), at
 
     def cell_of(self, points: Array) -> Indices:
         """Number of the cell that holds each of `points` (n, d), or the nearest one, (n,)."""

@@ -16,13 +16,13 @@ from solidsph.model.spacing import SpacingField
 from solidsph_builtin.discretisations._cells import mean_spacing
 from solidsph_builtin.discretisations._checks import check_spacing
 from solidsph_builtin.discretisations._curves import even_points
-from solidsph_builtin.discretisations._feet import on_boundary
 from solidsph_builtin.discretisations._fitting import fitted
 from solidsph_builtin.discretisations._graded import graded
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._nearest import nearest
 from solidsph_builtin.discretisations._relaxation import relaxed
 from solidsph_builtin.discretisations._sampled_once import sampled_once
+from solidsph_builtin.discretisations._skin import even_skin
 from solidsph_builtin.discretisations._surface import faces, sampled, without_ghosts
 from solidsph_builtin.discretisations.conforming_lattice import outermost
 
@@ -34,9 +34,7 @@ _CLEAR = 0.5
 _APART = 1.2
 # Depth to which particles move, beside places where the boundary is off the lattice.
 _MOVES = 4.0
-# Steps of particles along a curved surface in space.
-_ALONG = 40
-# Particles this close to a point of the lattice are there.
+# Closer to the boundary than this, in depths, a point may be on it.
 _AT = 1e-6
 # Particles that the others push closer to the boundary than this are left out.
 _PUSHED_OUT = 0.2
@@ -104,7 +102,7 @@ class Fitted(GradedDiscretisation):
         off the lattice."""
         reach = 2.0 * grid.half_diagonal
         distance = in_chunks(grid.size, lambda n: shape.distance_within(grid.positions(n), reach))
-        outer, at_lattice = _snapped(_outer(shape, grid, distance, spacing, size), grid)
+        outer, at_lattice = grid.snapped(_outer(shape, grid, distance, spacing, size))
         inner = grid.positions(_deep(shape, grid, distance, spacing, _CLEAR * size))
         inner = inner[cKDTree(outer).query(inner)[0] > _CLEAR * size] if len(inner) else inner
         off = outer[~at_lattice]
@@ -136,23 +134,9 @@ def _outer(shape: Shape, grid: Grid, distance: Array, spacing: float, size: floa
     """Particles on the boundary, (m, d) [m]; `distance` (size,) [m] is that of the lattice."""
     if shape.dimension == 2:
         return even_points(shape, spacing)
-    start, on_smooth = outermost(shape, grid, distance, size)
-    outer, at_lattice = _snapped(start, grid)
-    surface = shape.surface(spacing)
-    return relaxed(
-        outer,
-        on_smooth & ~at_lattice,
-        size,
-        _ALONG,
-        lambda moved: on_boundary(shape, surface, moved, size),
-    )
-
-
-def _snapped(points: Array, grid: Grid) -> tuple[Array, Mask]:
-    """Points (m, d), those at a point of the lattice to the last bit, and which these are (m,)."""
-    there = grid.positions(grid.cell_of(points))
-    at = np.abs((points - there) / grid.steps).max(axis=1, initial=0.0) <= _AT
-    return np.where(at[:, None], there, points), at
+    if shape.dimension == 3:
+        return even_skin(shape, grid, distance, spacing, size)
+    return outermost(shape, grid, distance, size)[0]
 
 
 def _order(X: Array, grid: Grid) -> Indices:
