@@ -21,9 +21,9 @@ _FINER = 2.0
 # Closer than this, in spacings, two particles of edges are one,
 _CLOSEST_ON_EDGES = 0.6
 # and of two others one is left out.
-_CLOSEST = 0.75
+_CLOSEST = 0.7
 # A place further than this from all particles, in spacings, gets one.
-_EMPTY = 0.8
+_EMPTY = 0.75
 # Beside what is off the lattice particles move along the surface up to this far away, in spacings.
 _MOVES = 4.0
 # Steps of particles along the surface, and how often some are left out and put in.
@@ -61,7 +61,11 @@ def even_skin(shape: Shape, grid: Grid, distance: Array, spacing: float, size: f
             return points
         free &= cKDTree(off).query(points)[0] < _MOVES * size
         points = relaxed(
-            points, free, size, _STEPS, lambda moved: on_boundary(shape, surface, moved, size)
+            points,
+            free,
+            lambda x: np.full(len(x), size),
+            _STEPS,
+            lambda moved: on_boundary(shape, surface, moved, size),
         )
     return points
 

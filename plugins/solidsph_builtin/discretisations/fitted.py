@@ -111,7 +111,7 @@ class Fitted(GradedDiscretisation):
         if len(off):
             free = ~onto
             free[free] = cKDTree(off).query(inner)[0] < _MOVES * size
-            X = relaxed(X, free, size)
+            X = relaxed(X, free, lambda x: np.full(len(x), size))
             onto_or_inside = onto | (shape.distance_within(X, size) < -_PUSHED_OUT * size)
             X, onto = X[onto_or_inside], onto[onto_or_inside]
         order = _order(X, grid)

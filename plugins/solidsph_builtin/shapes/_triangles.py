@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
-from scipy.spatial import cKDTree
 
 from solidsph.interfaces.shape import Moments, Surface
 from solidsph.maths.arrays import Array, Indices
 from solidsph_builtin.shapes._libraries import geometry_library
 from solidsph_builtin.shapes._sampling import ON_SURFACE
+
+if TYPE_CHECKING:
+    from solidsph_builtin.shapes._triangle_tree import Tree
 
 # Cosine of the angle between the way to the nearest place and the normal there.
 _STRAIGHT_ABOVE = 1.0 - 1e-8
@@ -33,8 +35,6 @@ class Triangles:
     corners: Indices  # (k, 3) vertices of each triangle
     names: tuple[str, ...]  # of the faces
     owners: Indices  # (k,) the face that each triangle belongs to
-    # For the last reach that was asked for, middles of pieces of the triangles, and their size [m].
-    _middles: dict[float, tuple[cKDTree, float]] = attrs.field(factory=dict, init=False)
 
     @cached_property
     def areas(self) -> Array:
@@ -58,33 +58,30 @@ class Triangles:
         Straight above or below a triangle that tells the side; elsewhere, the winding number
         (Barill et al. 2018) does.
         """
-        if not len(points):
-            return np.zeros(0)
-        triangles, feet = self._closest(points)
-        ways = points - feet
-        distance = np.sqrt(np.einsum("ni,ni->n", ways, ways))
-        heights = np.einsum("ni,ni->n", ways, self.normals[triangles])
-        beside = np.flatnonzero(np.abs(heights) <= _STRAIGHT_ABOVE * distance)
-        if beside.size:
-            inside = self.winding_numbers(points[beside]) > 0.5
-            heights[beside] = np.where(inside, -1.0, 1.0)
-        result: Array = np.copysign(distance, heights)
-        return result
+        return self.distance_within(points, np.inf)
 
     def distance_within(self, points: Array, reach: float) -> Array:
         """The same, no further than `reach` [m] from 0: few triangles are near points near them."""
-        if reach not in self._middles:
-            pieces, _ = divided(self.vertices[self.corners], reach)
-            middles = pieces.mean(axis=1)
-            size = float(np.linalg.norm(pieces - middles[:, None], axis=2).max())
-            self._middles.clear()
-            self._middles[reach] = cKDTree(middles), size
-        tree, size = self._middles[reach]
-        near = np.isfinite(tree.query(points, distance_upper_bound=reach + size)[0])
-        result = np.full(len(points), reach)
-        result[near] = np.clip(self.signed_distance(points[near]), -reach, reach)
-        far = np.flatnonzero(~near)
-        result[far[self.winding_numbers(points[far]) > 0.5]] = -reach
+        if not len(points):
+            return np.zeros(0)
+        triangles, feet = self._closest(points, reach)
+        ways = points - feet
+        distance = np.sqrt(np.einsum("ni,ni->n", ways, ways))
+        heights = np.einsum("ni,ni->n", ways, self.normals[triangles])
+        far = triangles < 0
+        distance[far], heights[far] = reach, 0.0
+        beside = np.abs(heights) <= _STRAIGHT_ABOVE * distance
+        # The surface is not between two far points that are less than the reach apart.
+        follows = far & np.roll(far, 1)
+        follows[0] = False
+        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        follows[1:] &= steps < reach
+        asked = np.flatnonzero(beside & ~follows)
+        sides = np.zeros(len(points))
+        sides[asked] = np.where(self.winding_numbers(points[asked]) > 0.5, -1.0, 1.0)
+        last = np.maximum.accumulate(np.where(follows, 0, np.arange(len(points))))
+        heights = np.where(beside, sides[last], heights)
+        result: Array = np.copysign(distance, heights)
         return result
 
     def nearest(self, points: Array) -> Array:
@@ -130,35 +127,18 @@ class Triangles:
         above = np.einsum("eci,ei->ec", middle, self.normals[first])
         return bool(above.max() <= _STRAIGHT * float((upper - lower).max()))
 
-    def _closest(self, points: Array) -> tuple[Indices, Array]:
-        """The triangle nearest to each of `points` (n, 3), and the nearest place on it, (n, 3)."""
-        _, found, _ = self._tree.squared_distance(self.vertices, self.corners, _rows(points))
-        # On long thin triangles the place that comes with it is off by 1e-9 of the size.
-        triangles = np.asarray(found, dtype=np.intp)
-        corners = self.vertices[self.corners[triangles]]
-        normals = self.normals[triangles]
-        heights = np.einsum("ni,ni->n", points - corners[:, 0], normals)
-        feet = points - heights[:, None] * normals
-        above = np.asarray(normals.any(axis=1))
-        least = np.full(len(points), np.inf)
-        on_edges = feet.copy()
-        for k in range(3):
-            edges = corners[:, (k + 1) % 3] - corners[:, k]
-            offsets = points - corners[:, k]
-            above &= np.einsum("ni,ni->n", np.cross(edges, offsets), normals) >= 0.0
-            squares = np.einsum("ni,ni->n", edges, edges)
-            along = np.einsum("ni,ni->n", edges, offsets) / np.where(squares > 0.0, squares, 1.0)
-            there = corners[:, k] + np.clip(along, 0.0, 1.0)[:, None] * edges
-            gaps = np.linalg.norm(points - there, axis=1)
-            on_edges[gaps < least] = there[gaps < least]
-            np.minimum(least, gaps, out=least)
-        return triangles, np.where(above[:, None], feet, on_edges)
+    def _closest(self, points: Array, reach: float = np.inf) -> tuple[Indices, Array]:
+        """The triangle nearest to each of `points` (n, 3), and the nearest place on it, (n, 3);
+        none, -1, beyond a `reach` [m]."""
+        from solidsph_builtin.shapes._triangle_tree import closest  # loads the compiler
+
+        return closest(self._tree, points, reach)
 
     @cached_property
-    def _tree(self) -> Any:
-        tree = geometry_library("igl").AABB()
-        tree.init(self.vertices, self.corners)
-        return tree
+    def _tree(self) -> Tree:
+        from solidsph_builtin.shapes._triangle_tree import tree_of
+
+        return tree_of(self.vertices[self.corners], self.normals)
 
     @cached_property
     def _winding(self) -> Any:
