@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from functools import cache, cached_property
 from itertools import product
 from math import ceil
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -20,6 +21,9 @@ from scipy.spatial import cKDTree
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph_builtin.discretisations._grid import Grid
 from solidsph_builtin.discretisations._surroundings import Surroundings
+
+if TYPE_CHECKING:
+    from solidsph_builtin.discretisations._fit_loops import Cells
 
 
 @attrs.frozen
@@ -71,6 +75,9 @@ _FAR = 30.0
 # Polynomials whose mean square over the particles is below this are rounding: particles on a plane
 # are off it by that, and one that is further off than the others would get no value.
 _FLAT = 1e-12
+
+# From so many points on, compiled loops are worth the time of loading the compiler.
+_MANY = 20_000
 
 # So few that what is computed for them stays in the cache.
 _POINTS_AT_ONCE = 300
@@ -188,6 +195,8 @@ class Fit:
         regular = degree == self._rule.degree
         regular &= self.grid is not None and self._lattice.regular(points, self.reach)
         elsewhere = np.flatnonzero(~regular)
+        if len(elsewhere) >= _MANY:
+            elsewhere = self._add_by_loops(result, elsewhere, points, weights, degree)
         for start in range(0, elsewhere.size, _POINTS_AT_ONCE):
             some = elsewhere[start : start + _POINTS_AT_ONCE]
             values, near = self._functions(points[some], degree[some])
@@ -196,6 +205,31 @@ class Fit:
         if some.size:
             self._add_regular(result, points[some], weights[some])
         return result
+
+    def _add_by_loops(
+        self, result: Array, some: Indices, points: Array, weights: Array, degree: Indices
+    ) -> Indices:
+        """Add to `result` (n, k) the integrals over `some` points; those that are left out."""
+        from solidsph_builtin.discretisations._fit_loops import Fits, add_integrals
+
+        rule, degrees = self._rule, [_degree(power) for power in _powers(self._tree.m).tolist()]
+        fits = Fits(
+            radius=self.reach,
+            powers=_powers(self._tree.m),
+            sizes=np.cumsum(np.bincount(degrees)),
+            determined=rule.determined,
+            flat=_FLAT,
+            largest_sum=rule.largest_sum,
+            most=min(_MOST[self._tree.m], self._tree.n),
+        )
+        left = add_integrals(self._cells, fits, points[some], weights[some], degree[some], result)
+        return some[left]
+
+    @cached_property
+    def _cells(self) -> Cells:
+        from solidsph_builtin.discretisations._fit_loops import Cells  # loads the compiler
+
+        return Cells.of(self.particles, self.reach)
 
     def _add_regular(self, result: Array, points: Array, weights: Array) -> None:
         """Add to `result` (n, k) the integrals over points (m, d) in a part that is a lattice."""
