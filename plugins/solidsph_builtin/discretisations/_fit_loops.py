@@ -77,11 +77,50 @@ def add_integrals(
     return np.flatnonzero(left)
 
 
+def nearest(cells: Cells, points: Array) -> Indices:
+    """The particle nearest to each of `points` (m, d), (m,); -1 if none is within the width of a
+    cell."""
+    found = np.empty(len(points), dtype=np.intp)
+    threaded = thread_count(_PER_POINT * len(points) // 10) > 1
+    _nearest_loop(points.shape[1], threaded)(cells, points, found)
+    return found
+
+
+def _steps_around(dimension: int) -> Indices:
+    """A cell and those around it, (3^d, d)."""
+    steps = np.meshgrid(*[np.array([-1, 0, 1])] * dimension, indexing="ij")
+    return np.ascontiguousarray(np.stack(steps, axis=-1).reshape(-1, dimension))
+
+
+@cache
+def _nearest_loop(dimension: int, threaded: bool) -> Any:
+    d, around = dimension, _steps_around(dimension)
+
+    @njit(parallel=threaded)
+    def loop(cells, points, found):
+        for p in prange(len(points)):
+            best = cells.width * cells.width
+            found[p] = -1
+            for step in range(len(around)):
+                cell, inside = 0, True
+                for i in range(d):
+                    place = int((points[p, i] - cells.lower[i]) / cells.width) + around[step, i]
+                    inside = inside and 0 <= place < cells.counts[i]
+                    cell = cell * cells.counts[i] + place
+                if inside:
+                    for at in range(cells.starts[cell], cells.starts[cell + 1]):
+                        square = 0.0
+                        for i in range(d):
+                            square += (cells.places[at, i] - points[p, i]) ** 2
+                        if square < best:
+                            best, found[p] = square, cells.order[at]
+
+    return loop
+
+
 @cache
 def _loop(dimension: int, threaded: bool) -> Any:
-    d = dimension
-    around = np.array(np.meshgrid(*[(-1, 0, 1)] * d, indexing="ij"), dtype=np.intp)
-    around = around.reshape(d, -1).T.copy()
+    d, around = dimension, _steps_around(dimension)
 
     @njit(error_model="numpy")
     def first_column(M, size, determined, flat, lower, pivots, known, x):

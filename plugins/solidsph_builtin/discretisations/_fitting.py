@@ -18,7 +18,6 @@ from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.particles import Face, Particles
-from solidsph_builtin.discretisations._cells import cell_shares
 from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._pieces import finest_pieces
@@ -152,19 +151,21 @@ def _quadrature(shape: Shape, spacing: float, grid: Grid, depth: float) -> tuple
     """Points (m, d) [m] and weights (m,) [m^d] of integrals over `shape`, to a depth [m]."""
     reach = 2.0 * grid.half_diagonal
     distance = in_chunks(grid.size, lambda n: shape.distance_within(grid.positions(n), reach))
-    numbers = np.flatnonzero(
-        (distance < grid.half_diagonal) & _near_surface(shape, spacing, grid, depth)
-    )
-    shares = cell_shares(shape, grid, numbers, distance)
-    whole, cut = numbers[shares == 1.0], numbers[(shares > 0.0) & (shares < 1.0)]
-    gauss = gauss_points(shape.dimension) * grid.steps
-    points = [(grid.positions(whole)[:, None, :] + gauss).reshape(-1, shape.dimension)]
-    weights = [np.full(len(points[0]), 1.0 / len(gauss))]
+    near = (distance < grid.half_diagonal) & _near_surface(shape, spacing, grid, depth)
+    cut = np.flatnonzero(near & (distance > -grid.half_diagonal))
+    whole = np.flatnonzero(near & (distance <= -grid.half_diagonal))
+    points, weights = [], []
     for start in range(0, cut.size, _CELLS_AT_ONCE):
         some = cut[start : start + _CELLS_AT_ONCE]
         found = finest_pieces(shape, grid.positions(some), grid.steps, HALVINGS[shape.dimension])
-        points.append(found.points)
-        weights.append(found.shares)
+        full = np.bincount(found.cells, found.shares, minlength=some.size) == 1.0
+        whole = np.concatenate([whole, some[full]])
+        parts = ~full[found.cells]
+        points.append(found.points[parts])
+        weights.append(found.shares[parts])
+    gauss = gauss_points(shape.dimension) * grid.steps
+    points.append((grid.positions(whole)[:, None, :] + gauss).reshape(-1, shape.dimension))
+    weights.append(np.full(len(points[-1]), 1.0 / len(gauss)))
     return np.concatenate(points), grid.cell_volume * np.concatenate(weights)
 
 

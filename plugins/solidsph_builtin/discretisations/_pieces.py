@@ -75,6 +75,10 @@ def _tiny(shape: Shape, centres: Array, steps: Array, corners: Array, distance: 
     width = float(steps.min())
     rounding = 1e-9 * width
     near = np.flatnonzero(np.abs(distance) < 0.5 * width - rounding)
+    # So near to the nearest place of a boundary, a piece is on both sides.
+    if shape.nearest(centres[:1]) is not None:
+        shares[near] = 0.5 - distance[near] / width
+        return shares
     around = (centres[near, np.newaxis, :] + corners * steps).reshape(-1, len(steps))
     sides = shape.signed_distance(around).reshape(near.size, len(corners))
     some_inside = (sides < -rounding).any(axis=1)

@@ -52,7 +52,8 @@ def relaxed(
         return X
     widest = REACH * float(spacing_at(X).max())
     # Others only hold the free ones in place.
-    some = np.flatnonzero(cKDTree(X[free]).query(X)[0] < 2.0 * widest)
+    gaps = cKDTree(X[free]).query(X, distance_upper_bound=2.0 * widest)[0]
+    some = np.flatnonzero(np.isfinite(gaps))
     x, moves = X[some].copy(), free[some]
     sums, slack = _sums_by_arrays if moves.sum() < _MANY else _sums_by_loops, -1.0
     for _ in range(steps):

@@ -119,7 +119,14 @@ class Fit:
 
     def _nearest(self, points: Array, weights: Array) -> Array:
         """Sum of the weights (m,) of the points (m, d) nearest to each particle, (n,)."""
-        _, owners = self._tree.query(points)
+        if len(points) < _MANY:
+            owners = np.asarray(self._tree.query(points)[1])
+        else:
+            from solidsph_builtin.discretisations._fit_loops import Cells, nearest
+
+            owners = nearest(Cells.of(self.particles, self.spacing), points)
+            alone = owners < 0
+            owners[alone] = self._tree.query(points[alone])[1]
         sums = np.bincount(owners, weights, minlength=len(self.particles))
         return np.asarray(sums, dtype=np.float64)
 

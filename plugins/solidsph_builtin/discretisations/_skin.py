@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.interfaces.shape import Shape, Surface
-from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.maths.arrays import Array
 from solidsph_builtin.discretisations._curves import evenly
 from solidsph_builtin.discretisations._edges import lines
 from solidsph_builtin.discretisations._features import gap, meetings, smooth
@@ -14,20 +14,21 @@ from solidsph_builtin.discretisations._feet import on_boundary
 from solidsph_builtin.discretisations._grid import Grid
 from solidsph_builtin.discretisations._nearest import thinned
 from solidsph_builtin.discretisations._relaxation import relaxed
-from solidsph_builtin.discretisations.conforming_lattice import outermost
 
 # Spacing over the gaps between samples by which edges are found.
 _FINER = 2.0
 # Closer than this, in spacings, two particles of edges are one,
 _CLOSEST_ON_EDGES = 0.6
-# and of two others one is left out.
-_CLOSEST = 0.7
-# A place further than this from all particles, in spacings, gets one.
-_EMPTY = 0.75
+# Places this close, in cells, are the same.
+_AT = 1e-6
 # Beside what is off the lattice particles move along the surface up to this far away, in spacings.
 _MOVES = 4.0
-# Steps of particles along the surface, and how often some are left out and put in.
-_STEPS, _ROUNDS = 40, 3
+# Steps of particles along the surface.
+_STEPS = 40
+# Before each time that they move: of two particles closer than the first, in spacings, one is left
+# out, and a place further from all than the second gets one. On the lattice that they start from,
+# points are nearer to each other than after they have moved.
+_ROUNDS = ((0.7, 0.75), (0.8, 0.8), (0.8, 0.8))
 
 
 def even_skin(shape: Shape, grid: Grid, distance: Array, spacing: float, size: float) -> Array:
@@ -46,20 +47,17 @@ def even_skin(shape: Shape, grid: Grid, distance: Array, spacing: float, size: f
     """
     surface = shape.surface(spacing)
     fixed, _ = grid.snapped(_on_edges(shape, spacing))
-    start, on_smooth = outermost(shape, grid, distance, size)
-    start, at_lattice = grid.snapped(start)
-    start, at_lattice = start[on_smooth], at_lattice[on_smooth]
-    start = start[np.argsort(~at_lattice, kind="stable")]
-    points = np.concatenate([fixed, start])
-    for round_ in range(_ROUNDS):
-        points = _thinned(points, len(fixed), size)
-        points = _filled(points, surface, size)
+    points = np.concatenate([fixed, _from_lattice(shape, surface, grid, distance, size)])
+    for closest, empty in _ROUNDS:
+        points = _thinned(points, len(fixed), closest * size)
+        points = _filled(points, surface, empty * size)
         at_lattice = grid.has(points)
         free = np.arange(len(points)) >= len(fixed)
         off = points[~at_lattice]
         if not len(off):
             return points
-        free &= cKDTree(off).query(points)[0] < _MOVES * size
+        gaps = cKDTree(off).query(points, distance_upper_bound=_MOVES * size)[0]
+        free &= np.isfinite(gaps)
         points = relaxed(
             points,
             free,
@@ -85,17 +83,30 @@ def _on_edges(shape: Shape, spacing: float) -> Array:
     return on_boundary(shape, surface, points, spacing)
 
 
-def _thinned(points: Array, fixed: int, size: float) -> Array:
-    """Points without those too close to one before them; the first `fixed` ones stay."""
-    stays = thinned(points / size, np.arange(len(points)), _CLOSEST)
+def _from_lattice(
+    shape: Shape, surface: Surface, grid: Grid, distance: Array, size: float
+) -> Array:
+    """Places on the boundary nearest to points of the lattice, each in the cell of its point, (m, 3)
+    [m]; those that are nearest come first."""
+    near = grid.positions(np.flatnonzero(np.abs(distance) <= grid.half_diagonal))
+    feet, _ = grid.snapped(on_boundary(shape, surface, near, size))
+    ways = (feet - near) / grid.steps
+    order = np.argsort(np.round(np.linalg.norm(ways, axis=1), 6), kind="stable")
+    own = np.abs(ways).max(axis=1, initial=0.0) <= 0.5 + _AT
+    return feet[order[own[order]]]
+
+
+def _thinned(points: Array, fixed: int, closest: float) -> Array:
+    """Points without those closer than that [m] to one before them; the first `fixed` ones stay."""
+    stays = thinned(points, np.arange(len(points)), closest)
     stays[:fixed] = True
     return points[stays]
 
 
-def _filled(points: Array, surface: Surface, size: float) -> Array:
-    """Points and the samples of the surface that are far from all of them."""
-    gaps = cKDTree(points).query(surface.points)[0] / size
-    empty = np.flatnonzero(gaps > _EMPTY)
-    order = np.argsort(-np.round(gaps[empty], 6), kind="stable")
-    more = surface.points[empty]
-    return np.concatenate([points, more[thinned(more / size, order, _EMPTY)]])
+def _filled(points: Array, surface: Surface, empty: float) -> Array:
+    """Points and the samples of the surface that are further than that [m] from all of them."""
+    gaps = cKDTree(points).query(surface.points)[0]
+    some = np.flatnonzero(gaps > empty)
+    order = np.argsort(-np.round(gaps[some] / empty, 6), kind="stable")
+    more = surface.points[some]
+    return np.concatenate([points, more[thinned(more, order, empty)]])

@@ -66,9 +66,17 @@ class Surroundings:
             word, bit = divmod(number, 64)
             there = self.numbers[home + np.array(step) @ self._strides] >= 0
             bits[:, word] |= there.astype(np.uint64) << np.uint64(bit)
-        keys = np.column_stack([bits.view(np.int64), np.rint(within / _SAME).astype(np.int64)])
-        _, first, kind = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-        return first, kind.ravel()
+        # Below 2^21 each, so that one number tells the place in the cell.
+        places = np.rint(within / _SAME).astype(np.int64) @ (1 << 21 * np.arange(within.shape[1]))
+        keys = np.column_stack([bits.view(np.int64), places])
+        # Most points are among complete rows, and need no comparison of whole keys.
+        whole = (bits == bits.max(axis=0)).all(axis=1)
+        first, kind = np.empty(0, dtype=np.intp), np.empty(len(points), dtype=np.intp)
+        for some, own in ((np.flatnonzero(whole), places), (np.flatnonzero(~whole), keys)):
+            _, at, which = np.unique(own[some], axis=0, return_index=True, return_inverse=True)
+            kind[some] = len(first) + which.ravel()
+            first = np.concatenate([first, some[at]])
+        return first, kind
 
     def home(self, points: Array) -> Indices:
         """Place in the array of the lower corner of the cell of each point, (m,)."""

@@ -104,18 +104,24 @@ class Fitted(GradedDiscretisation):
         distance = in_chunks(grid.size, lambda n: shape.distance_within(grid.positions(n), reach))
         outer, at_lattice = grid.snapped(_outer(shape, grid, distance, spacing, size))
         inner = grid.positions(_deep(shape, grid, distance, spacing, _CLEAR * size))
-        inner = inner[cKDTree(outer).query(inner)[0] > _CLEAR * size] if len(inner) else inner
+        inner = inner[~_beside(outer, inner, _CLEAR * size)] if len(inner) else inner
         off = outer[~at_lattice]
         X = np.concatenate([outer, inner])
         onto = np.arange(len(X)) < len(outer)
         if len(off):
             free = ~onto
-            free[free] = cKDTree(off).query(inner)[0] < _MOVES * size
+            free[free] = _beside(off, inner, _MOVES * size)
             X = relaxed(X, free, lambda x: np.full(len(x), size))
             onto_or_inside = onto | (shape.distance_within(X, size) < -_PUSHED_OUT * size)
             X, onto = X[onto_or_inside], onto[onto_or_inside]
         order = _order(X, grid)
         return X[order], onto[order], bool(len(off))
+
+
+def _beside(others: Array, points: Array, distance: float) -> Mask:
+    """Which of `points` (m, d) are less than a `distance` [m] from one of the others, (m,)."""
+    gaps = cKDTree(others).query(points, distance_upper_bound=distance)[0]
+    return np.isfinite(gaps)
 
 
 def _deep(shape: Shape, grid: Grid, distance: Array, spacing: float, depth: float) -> Indices:
