@@ -199,11 +199,12 @@ class Fit:
 
     def _integrals(self, points: Array, weights: Array, degree: Indices) -> Array:
         result = np.zeros((len(self.particles), weights.shape[1]))
+        if len(points) >= _MANY and self._rule is not IN_LATTICE:
+            left = self._add_by_loops(result, points, weights, degree)
+            points, weights, degree = points[left], weights[left], degree[left]
         regular = degree == self._rule.degree
         regular &= self.grid is not None and self._lattice.regular(points, self.reach)
         elsewhere = np.flatnonzero(~regular)
-        if len(elsewhere) >= _MANY:
-            elsewhere = self._add_by_loops(result, elsewhere, points, weights, degree)
         for start in range(0, elsewhere.size, _POINTS_AT_ONCE):
             some = elsewhere[start : start + _POINTS_AT_ONCE]
             values, near = self._functions(points[some], degree[some])
@@ -214,9 +215,9 @@ class Fit:
         return result
 
     def _add_by_loops(
-        self, result: Array, some: Indices, points: Array, weights: Array, degree: Indices
+        self, result: Array, points: Array, weights: Array, degree: Indices
     ) -> Indices:
-        """Add to `result` (n, k) the integrals over `some` points; those that are left out."""
+        """Add to `result` (n, k) the integrals over points (m, d); those that are left out."""
         from solidsph_builtin.discretisations._fit_loops import Fits, add_integrals
 
         rule, degrees = self._rule, [_degree(power) for power in _powers(self._tree.m).tolist()]
@@ -229,8 +230,7 @@ class Fit:
             largest_sum=rule.largest_sum,
             most=min(_MOST[self._tree.m], self._tree.n),
         )
-        left = add_integrals(self._cells, fits, points[some], weights[some], degree[some], result)
-        return some[left]
+        return add_integrals(self._cells, fits, points, weights, degree, result)
 
     @cached_property
     def _cells(self) -> Cells:

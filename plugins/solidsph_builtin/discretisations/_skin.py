@@ -51,16 +51,19 @@ def even_skin(shape: Shape, grid: Grid, distance: Array, spacing: float, size: f
     for closest, empty in _ROUNDS:
         points = _thinned(points, len(fixed), closest * size)
         points = _filled(points, surface, empty * size)
+        # Side by side in memory what is side by side in space.
+        free = points[len(fixed) :]
+        points = np.concatenate([fixed, free[np.argsort(grid.cell_of(free), kind="stable")]])
         at_lattice = grid.has(points)
-        free = np.arange(len(points)) >= len(fixed)
         off = points[~at_lattice]
         if not len(off):
             return points
+        moves = np.arange(len(points)) >= len(fixed)
         gaps = cKDTree(off).query(points, distance_upper_bound=_MOVES * size)[0]
-        free &= np.isfinite(gaps)
+        moves &= np.isfinite(gaps)
         points = relaxed(
             points,
-            free,
+            moves,
             lambda x: np.full(len(x), size),
             _STEPS,
             lambda moved: on_boundary(shape, surface, moved, size),
@@ -70,6 +73,9 @@ def even_skin(shape: Shape, grid: Grid, distance: Array, spacing: float, size: f
 
 def _on_edges(shape: Shape, spacing: float) -> Array:
     """Corners, and points in even steps along the edges between them, (m, 3) [m]."""
+    surface = shape.surface(spacing)
+    if not len(meetings(smooth(surface), gap(surface)).points):
+        return surface.points[:0]
     surface = shape.surface(spacing / _FINER)
     reach = gap(surface)
     edges = meetings(smooth(surface), reach)
