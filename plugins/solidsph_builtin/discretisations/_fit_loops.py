@@ -14,6 +14,8 @@ from solidsph.maths.arrays import Array, Indices
 
 # Slices of the points, each with sums of its own: results do not depend on the number of threads.
 _SLICES = 4
+# Cells on each side of a point that are searched: they are so many times smaller than the radius.
+_HALF = 2
 # Nanoseconds that a point takes, roughly.
 _PER_POINT = 5000
 
@@ -52,6 +54,11 @@ class Fits(NamedTuple):
     most: int  # particles that count, at most
 
 
+def cells_for_fits(positions: Array, radius: float) -> Cells:
+    """The particles at `positions` (n, d) for fits with a `radius` [m]."""
+    return Cells.of(positions, radius / _HALF)
+
+
 def add_integrals(
     cells: Cells, fits: Fits, points: Array, weights: Array, degree: Indices, sums: Array
 ) -> Indices:
@@ -86,9 +93,9 @@ def nearest(cells: Cells, points: Array) -> Indices:
     return found
 
 
-def _steps_around(dimension: int) -> Indices:
-    """A cell and those around it, (3^d, d)."""
-    steps = np.meshgrid(*[np.array([-1, 0, 1])] * dimension, indexing="ij")
+def _steps_around(dimension: int, layers: int = 1) -> Indices:
+    """A cell and those up to so many `layers` around it, (m, d)."""
+    steps = np.meshgrid(*[np.arange(-layers, layers + 1)] * dimension, indexing="ij")
     return np.ascontiguousarray(np.stack(steps, axis=-1).reshape(-1, dimension))
 
 
@@ -120,7 +127,8 @@ def _nearest_loop(dimension: int, threaded: bool) -> Any:
 
 @cache
 def _loop(dimension: int, threaded: bool) -> Any:
-    d, around = dimension, _steps_around(dimension)
+    d = dimension
+    rows = _steps_around(max(dimension - 1, 1), _HALF)[:: 1 if dimension > 1 else 1 + 2 * _HALF]
 
     @njit(error_model="numpy")
     def first_column(M, size, determined, flat, lower, pivots, known, x):
@@ -159,9 +167,9 @@ def _loop(dimension: int, threaded: bool) -> Any:
         basis = np.empty((terms, most))
         M, lower = np.empty((terms, terms)), np.zeros((terms, terms))
         pivots, known, x = np.empty(terms), np.empty(terms, np.bool_), np.empty(terms)
-        values, accepted = np.empty(most), np.empty(most)
+        values = np.empty(most)
         index = np.empty(d, np.int64)
-        inverse = 1.0 / fits.radius
+        inverse, reach = 1.0 / fits.radius, fits.radius * fits.radius
         # Each monomial is an earlier one times the place along an axis.
         before, axes = np.zeros(terms, np.int64), np.zeros(terms, np.int64)
         for j in range(1, terms):
@@ -176,23 +184,27 @@ def _loop(dimension: int, threaded: bool) -> Any:
                     before[j] = k
         for p in range(begin, end):
             for i in range(d):
-                index[i] = int((points[p, i] - cells.lower[i]) / cells.width)
+                index[i] = np.int64(np.floor((points[p, i] - cells.lower[i]) / cells.width))
             count = 0
-            for step in range(len(around)):
-                cell, inside = 0, True
-                for i in range(d):
-                    place = index[i] + around[step, i]
+            for step in range(len(rows)):
+                row, inside = 0, True
+                for i in range(d - 1):
+                    place = index[i] + rows[step, i]
                     inside = inside and 0 <= place < cells.counts[i]
-                    cell = cell * cells.counts[i] + place
+                    row = row * cells.counts[i] + place
+                # Along the last axis cells follow each other, as their particles do.
+                first = min(max(index[d - 1] - _HALF, 0), cells.counts[d - 1])
+                last = max(min(index[d - 1] + _HALF + 1, cells.counts[d - 1]), first)
                 if not inside:
                     continue
-                for at in range(cells.starts[cell], cells.starts[cell + 1]):
+                row *= cells.counts[d - 1]
+                for at in range(cells.starts[row + first], cells.starts[row + last]):
                     square = 0.0
                     for i in range(d):
                         square += (cells.places[at, i] - points[p, i]) ** 2
-                    q = np.sqrt(square) * inverse
-                    if q < 1.0:
+                    if square < reach:
                         if count < most:
+                            q = np.sqrt(square) * inverse
                             near[count] = cells.order[at]
                             weight[count] = (1.0 - q) ** 4 * (1.0 + 4.0 * q)
                             for i in range(d):
@@ -226,9 +238,8 @@ def _loop(dimension: int, threaded: bool) -> Any:
                     for m in range(count):
                         total += values[m] * basis[k, m]
                     M[j, k] = total
-            for m in range(count):
-                accepted[m] = 0.0
-            for number in range(degree[p] + 1):
+            safe = False
+            for number in range(degree[p], -1, -1):
                 size = fits.sizes[number]
                 first_column(M, size, fits.determined, fits.flat, lower, pivots, known, x)
                 for m in range(count):
@@ -240,10 +251,12 @@ def _loop(dimension: int, threaded: bool) -> Any:
                 for m in range(count):
                     total += abs(weight[m] * values[m])
                 if total <= fits.largest_sum:
-                    for m in range(count):
-                        accepted[m] = values[m]
+                    safe = True
+                    break
+            if not safe:
+                continue
             for m in range(count):
-                value = weight[m] * accepted[m]
+                value = weight[m] * values[m]
                 for c in range(weights.shape[1]):
                     out[near[m], c] += value * weights[p, c]
 

@@ -234,9 +234,9 @@ class Fit:
 
     @cached_property
     def _cells(self) -> Cells:
-        from solidsph_builtin.discretisations._fit_loops import Cells  # loads the compiler
+        from solidsph_builtin.discretisations._fit_loops import cells_for_fits  # loads the compiler
 
-        return Cells.of(self.particles, self.reach)
+        return cells_for_fits(self.particles, self.reach)
 
     def _add_regular(self, result: Array, points: Array, weights: Array) -> None:
         """Add to `result` (n, k) the integrals over points (m, d) in a part that is a lattice."""
