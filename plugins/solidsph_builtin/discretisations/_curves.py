@@ -29,6 +29,9 @@ _TO_CORNER = 4.0
 # Particles around a quarter of a closed curve are rounded up from 0.9 only.
 _UP = 0.1
 
+# Steps around a closed curve, in spacings, that are even enough.
+_EVEN = 0.8, 1.2
+
 # Two particles closer than this, in spacings, are one.
 _CLOSEST = 0.4
 
@@ -114,10 +117,12 @@ def _is_closed(line: Array, lengths: Array) -> bool:
 def evenly(line: Array, spacing: float, *, closed: bool) -> Array:
     """Points in equal steps along a polygonal `line` (m, d), its ends included, (k, d) [m]."""
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    steps = cells_along(float(way[-1]), spacing)
+    length = float(way[-1])
+    steps = cells_along(length, spacing)
+    # As many in each quarter, so that a hole is as symmetric as its body; rather too few than too
+    # many, which crowd those inside. A small hole has as many as fit.
+    quarter = max(1, floor(length / (4.0 * spacing) + _UP))
     if closed:
-        # As many in each quarter, so that a hole is as symmetric as its body; rather too few than
-        # too many, which crowd those inside.
-        steps = 4 * max(1, floor(float(way[-1]) / (4.0 * spacing) + _UP))
+        steps = 4 * quarter if _EVEN[0] < length / (4.0 * spacing * quarter) < _EVEN[1] else steps
     places = np.linspace(0.0, way[-1], steps + 1)[: steps + (not closed)]
     return np.stack([np.interp(places, way, along) for along in line.T], axis=1)

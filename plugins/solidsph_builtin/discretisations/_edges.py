@@ -10,6 +10,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
+from solidsph.interfaces.shape import Shape
 from solidsph.maths.arrays import Array, Indices
 from solidsph_builtin.discretisations._features import Features
 
@@ -20,6 +21,11 @@ _NEXT = 3.0
 # from each other at more than this angle to their edges.
 _AROUND = 2.0
 _ALONG = 0.8  # its cosine
+
+# Beside an edge, so many spacings along each of its faces, the boundary is that face alone.
+_BESIDE = 1e-3
+# How often a point between two of an edge is moved onto its faces: twice, the second for rounding.
+_MOVED = 2
 
 
 @attrs.frozen(eq=False)
@@ -84,3 +90,28 @@ def _paths(of: Features, distance: float) -> Iterator[Indices]:
             yield names[path]
         # Branches off a path are edges of their own.
         links, names = csr_array(links[rest][:, rest]), names[rest]
+
+
+def onto_edges(shape: Shape, of: Features, points: Array, spacing: float) -> Array:
+    """`points` (m, 3) beside edges `of` a shape, moved onto both faces, (m, 3) [m].
+
+    Between two points of a curved edge the straight line leaves it. How far a face is away is told
+    by the distance a little along it, on the side of the edge where the face is.
+    """
+    if not len(points):
+        return points
+    normals = of.normals[cKDTree(of.points).query(points)[1]]
+    inverse = np.linalg.pinv(normals)
+    cosines = np.einsum("mi,mi->m", normals[:, 0], normals[:, 1])
+    across = normals[:, ::-1] - cosines[:, None, None] * normals
+    across *= _BESIDE * spacing / np.linalg.norm(across, axis=2, keepdims=True)
+    for _ in range(_MOVED):
+        heights = np.empty(normals.shape[:2])
+        for face in range(2):
+            sides = np.stack(
+                [shape.signed_distance(points + way * across[:, face]) for way in (-1.0, 1.0)]
+            )
+            there = np.argmin(np.abs(sides), axis=0)
+            heights[:, face] = np.take_along_axis(sides, there[None], axis=0)[0]
+        points = points - np.einsum("mik,mk->mi", inverse, heights)
+    return points

@@ -44,6 +44,12 @@ def nearest(tree: cKDTree, points: Array) -> Assignment:
     )
 
 
+def beside(others: Array, points: Array, distance: float) -> Mask:
+    """Which of `points` (m, d) are less than a `distance` [m] from one of `others` (k, d), (m,)."""
+    gaps = cKDTree(others).query(points, distance_upper_bound=distance)[0]
+    return np.isfinite(gaps)
+
+
 def thinned(points: Array, order: Indices, distance: float) -> Mask:
     """Which of `points` (m, d) stay if each, in this `order`, removes all that are less than
     `distance` away and have not been kept before, (m,)."""

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph_builtin.discretisations._nearest import beside
 
 # Particles repel each other up to this distance, in spacings: those across the diagonal of a cell.
 REACH = 1.5
@@ -52,8 +53,7 @@ def relaxed(
         return X
     widest = REACH * float(spacing_at(X).max())
     # Others only hold the free ones in place.
-    gaps = cKDTree(X[free]).query(X, distance_upper_bound=2.0 * widest)[0]
-    some = np.flatnonzero(np.isfinite(gaps))
+    some = np.flatnonzero(beside(X[free], X, 2.0 * widest))
     x, moves = X[some].copy(), free[some]
     sums, slack = _sums_by_arrays if moves.sum() < _MANY else _sums_by_loops, -1.0
     for _ in range(steps):

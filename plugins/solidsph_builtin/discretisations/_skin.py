@@ -8,11 +8,11 @@ from scipy.spatial import cKDTree
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array
 from solidsph_builtin.discretisations._curves import evenly
-from solidsph_builtin.discretisations._edges import lines
+from solidsph_builtin.discretisations._edges import lines, onto_edges
 from solidsph_builtin.discretisations._features import gap, meetings, smooth
 from solidsph_builtin.discretisations._feet import on_boundary
 from solidsph_builtin.discretisations._grid import Grid
-from solidsph_builtin.discretisations._nearest import thinned
+from solidsph_builtin.discretisations._nearest import beside, thinned
 from solidsph_builtin.discretisations._relaxation import relaxed
 
 # Spacing over the gaps between samples by which edges are found.
@@ -51,16 +51,15 @@ def even_skin(shape: Shape, grid: Grid, distance: Array, spacing: float, size: f
     for closest, empty in _ROUNDS:
         points = _thinned(points, len(fixed), closest * size)
         points = _filled(points, surface, empty * size)
-        # Side by side in memory what is side by side in space.
+        # What is side by side in space is so in memory, too.
         free = points[len(fixed) :]
         points = np.concatenate([fixed, free[np.argsort(grid.cell_of(free), kind="stable")]])
         at_lattice = grid.has(points)
         off = points[~at_lattice]
         if not len(off):
             return points
-        moves = np.arange(len(points)) >= len(fixed)
-        gaps = cKDTree(off).query(points, distance_upper_bound=_MOVES * size)[0]
-        moves &= np.isfinite(gaps)
+        moves = beside(off, points, _MOVES * size)
+        moves[: len(fixed)] = False
         points = relaxed(
             points,
             moves,
@@ -80,10 +79,10 @@ def _on_edges(shape: Shape, spacing: float) -> Array:
     reach = gap(surface)
     edges = meetings(smooth(surface), reach)
     corners = meetings(edges, reach).points
-    rows = [corners]
+    rows = [surface.points[:0]]
     for line in lines(edges, corners, reach):
         rows.append(evenly(line.points, spacing, closed=line.closed))
-    points = np.concatenate(rows)
+    points = np.concatenate([corners, onto_edges(shape, edges, np.concatenate(rows), spacing)])
     # Corners come first, so that they stay.
     points = points[thinned(points / spacing, np.arange(len(points)), _CLOSEST_ON_EDGES)]
     return on_boundary(shape, surface, points, spacing)
@@ -92,8 +91,8 @@ def _on_edges(shape: Shape, spacing: float) -> Array:
 def _from_lattice(
     shape: Shape, surface: Surface, grid: Grid, distance: Array, size: float
 ) -> Array:
-    """Places on the boundary nearest to points of the lattice, each in the cell of its point, (m, 3)
-    [m]; those that are nearest come first."""
+    """Places on the boundary nearest to points of the lattice, each in the cell of its point,
+    (m, 3) [m]; those that are nearest come first."""
     near = grid.positions(np.flatnonzero(np.abs(distance) <= grid.half_diagonal))
     feet, _ = grid.snapped(on_boundary(shape, surface, near, size))
     ways = (feet - near) / grid.steps

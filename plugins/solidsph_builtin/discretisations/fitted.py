@@ -19,7 +19,7 @@ from solidsph_builtin.discretisations._curves import even_points
 from solidsph_builtin.discretisations._fitting import fitted
 from solidsph_builtin.discretisations._graded import graded
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
-from solidsph_builtin.discretisations._nearest import nearest
+from solidsph_builtin.discretisations._nearest import beside, nearest
 from solidsph_builtin.discretisations._relaxation import relaxed
 from solidsph_builtin.discretisations._sampled_once import sampled_once
 from solidsph_builtin.discretisations._skin import even_skin
@@ -50,9 +50,14 @@ _ON_SURFACE = 1.0 / 3.0
 class Fitted(GradedDiscretisation):
     """Particles on the surface in even steps, and a lattice inside that adapts to them.
 
-    Each corner and edge has particles. Inside are the points of a lattice over the bounding box;
-    beside a part of the surface that is off the lattice they repel each other until their distances
-    are even. A box aligned with the axes has the particles of `lattice` with `on_boundary`.
+    Each corner has a particle, and each edge has them in equal steps. On faces of bodies in space
+    they repel each other until they are spread evenly. Inside are the points of a lattice over the
+    bounding box; beside a part of the surface that is off the lattice they move, too. A box aligned
+    with the axes has the particles of `lattice` with `on_boundary`.
+
+    Nearest neighbours are 0.8 to 1.25 spacings apart. Where edges meet at an angle below 47 degrees
+    they are closer at the corner, and so they are where a body is thinner than a spacing or has
+    edges closer to each other than that.
 
     Volumes and areas integrate polynomials of the second degree, as those of `fitted-moments` do.
 
@@ -104,24 +109,18 @@ class Fitted(GradedDiscretisation):
         distance = in_chunks(grid.size, lambda n: shape.distance_within(grid.positions(n), reach))
         outer, at_lattice = grid.snapped(_outer(shape, grid, distance, spacing, size))
         inner = grid.positions(_deep(shape, grid, distance, spacing, _CLEAR * size))
-        inner = inner[~_beside(outer, inner, _CLEAR * size)] if len(inner) else inner
+        inner = inner[~beside(outer, inner, _CLEAR * size)] if len(inner) else inner
         off = outer[~at_lattice]
         X = np.concatenate([outer, inner])
         onto = np.arange(len(X)) < len(outer)
         if len(off):
             free = ~onto
-            free[free] = _beside(off, inner, _MOVES * size)
+            free[free] = beside(off, inner, _MOVES * size)
             X = relaxed(X, free, lambda x: np.full(len(x), size))
             onto_or_inside = onto | (shape.distance_within(X, size) < -_PUSHED_OUT * size)
             X, onto = X[onto_or_inside], onto[onto_or_inside]
         order = _order(X, grid)
         return X[order], onto[order], bool(len(off))
-
-
-def _beside(others: Array, points: Array, distance: float) -> Mask:
-    """Which of `points` (m, d) are less than a `distance` [m] from one of the others, (m,)."""
-    gaps = cKDTree(others).query(points, distance_upper_bound=distance)[0]
-    return np.isfinite(gaps)
 
 
 def _deep(shape: Shape, grid: Grid, distance: Array, spacing: float, depth: float) -> Indices:

@@ -93,9 +93,7 @@ def _search(threaded: bool) -> Any:
             ax, ay, az = corners[t, k, 0], corners[t, k, 1], corners[t, k, 2]
             ex, ey, ez = corners[t, m, 0] - ax, corners[t, m, 1] - ay, corners[t, m, 2] - az
             ox, oy, oz = x - ax, y - ay, z - az
-            side = (
-                nx * (ey * oz - ez * oy) + ny * (ez * ox - ex * oz) + nz * (ex * oy - ey * ox)
-            )
+            side = nx * (ey * oz - ez * oy) + ny * (ez * ox - ex * oz) + nz * (ex * oy - ey * ox)
             above = above and side >= 0.0
             square = ex * ex + ey * ey + ez * ez
             along = (ex * ox + ey * oy + ez * oz) / (square if square > 0.0 else 1.0)

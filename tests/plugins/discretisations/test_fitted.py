@@ -16,8 +16,10 @@ from solidsph_builtin.discretisations.lattice import Lattice
 from solidsph_builtin.shapes.annulus import Annulus
 from solidsph_builtin.shapes.ball import Ball
 from solidsph_builtin.shapes.box import Box
+from solidsph_builtin.shapes.cylinder import Cylinder
 from solidsph_builtin.shapes.difference import Difference
 from solidsph_builtin.shapes.disc import Disc
+from solidsph_builtin.shapes.extruded import Extruded
 from solidsph_builtin.shapes.interval import Interval
 from solidsph_builtin.shapes.polygon import Polygon
 
@@ -177,14 +179,67 @@ def test_particles_on_a_surface_off_the_lattice_weigh_less_in_fits() -> None:
     assert Fitted().particles(Box(lengths=(1.0, 1.0)), h).cells == pytest.approx(h**2)
 
 
-def test_a_ball_is_covered() -> None:
-    """In space particles on the surface do not move along it: their distances vary more."""
-    ball = Ball(radius=1.0)
-    particles = Fitted().particles(ball, 0.2)
-    gaps = nearest(particles.positions) / 0.2
-    assert gaps.min() > 0.5
+@pytest.mark.parametrize(
+    ("shape", "spacing"),
+    [
+        pytest.param(Ball(radius=1.0), 0.2, id="ball"),
+        pytest.param(Ball(radius=1.0), 0.15, id="finer ball"),
+        pytest.param(Cylinder(radius=0.5, length=1.0), 0.1, id="cylinder"),
+        pytest.param(eighth(2.0, 1.0), 0.2, id="eighth of a hollow ball"),
+        pytest.param(
+            Extruded(of=Annulus(inner_radius=0.5, outer_radius=1.0), length=0.6), 0.125, id="tube"
+        ),
+        pytest.param(Extruded(of=QUARTER, length=0.3), 0.06, id="plate with a hole"),
+    ],
+)
+def test_in_space_distances_are_even(shape: Shape, spacing: float) -> None:
+    particles = Fitted().particles(shape, spacing)
+    X, on_surface = particles.positions, particles.tags["surface"]
+    gaps = nearest(X) / particles.spacings[0]
+    assert gaps.min() > 0.8
     assert gaps.max() < 1.25
+    depth = -shape.signed_distance(X) / spacing
+    assert np.abs(depth[on_surface]).max() < 1e-6
+    assert depth[~on_surface].min() > 0.4
+    # No place of the surface is further from a particle than the corner of a cell, and some more.
+    assert cKDTree(X[on_surface]).query(shape.surface(spacing).points)[0].max() < 0.95 * spacing
     assert particles.volumes.min() > 0.0
+
+
+def test_edges_in_space_have_particles_in_equal_steps() -> None:
+    h, radius = 0.1, 0.5
+    X = Fitted().particles(Cylinder(radius=radius, length=1.0), h).positions
+    ends = X[:, 2].min(), X[:, 2].max()
+    for end in ends:
+        rim = X[np.isclose(X[:, 2], end) & np.isclose(np.hypot(*X[:, :2].T), radius, rtol=1e-6)]
+        steps = np.diff(np.sort(np.arctan2(rim[:, 1], rim[:, 0]))) * radius
+        # A quarter is 7.9 spacings long; rather too few than too many.
+        assert len(rim) == 4 * 7
+        # The rim is found as a chain of chords a tenth of a spacing long.
+        assert steps.max() < steps.min() * 1.01
+
+
+@pytest.mark.parametrize("around", [3.2, 5.0, 7.5])
+def test_steps_around_small_holes_are_even(around: float) -> None:
+    """Where no multiple of four fits."""
+    h = 0.1
+    hole = Disc(radius=around * h / (2.0 * np.pi), centre=(0.5, 0.5))
+    shape = Difference(Box(lengths=(1.0, 1.0)), [hole])
+    gaps = nearest(Fitted().particles(shape, h).positions) / h
+    assert gaps.min() > 0.75
+    assert gaps.max() < 1.25
+
+
+def test_corners_in_space_have_particles() -> None:
+    X = Fitted().particles(eighth(2.0, 1.0), 0.2).positions
+    corners = np.concatenate([np.eye(3), 2.0 * np.eye(3)])
+    # Where arcs meet, as well as planes through samples of the balls meet.
+    assert cKDTree(X).query(corners)[0].max() < 1e-3
+
+
+def test_second_moments_of_a_ball() -> None:
+    """As well as flat samples of its surface tell them."""
+    particles = Fitted().particles(Ball(radius=1.0), 0.2)
     assert np.abs(second_moment(particles) - 4.0 * np.pi / 15.0).max() < 4e-3
 
 
