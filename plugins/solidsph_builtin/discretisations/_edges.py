@@ -53,7 +53,9 @@ def lines(of: Features, corners: Array, reach: float) -> Iterator[Line]:
             gaps, nearest = tree.query(line[[0, -1]])
             first, last = (
                 corners[[corner]] if gap < _NEXT * reach else line[:0]
-                for gap, corner in zip(gaps.tolist(), np.asarray(nearest).tolist(), strict=True)
+                for gap, corner in zip(
+                    np.asarray(gaps).tolist(), np.asarray(nearest).tolist(), strict=True
+                )
             )
             closed &= not len(first) and not len(last)
             line = np.concatenate([first, line, last])

@@ -98,7 +98,8 @@ def _from_lattice(
     ways = (feet - near) / grid.steps
     order = np.argsort(np.round(np.linalg.norm(ways, axis=1), 6), kind="stable")
     own = np.abs(ways).max(axis=1, initial=0.0) <= 0.5 + _AT
-    return feet[order[own[order]]]
+    found: Array = feet[order[own[order]]]
+    return found
 
 
 def _thinned(points: Array, fixed: int, closest: float) -> Array:
@@ -110,7 +111,7 @@ def _thinned(points: Array, fixed: int, closest: float) -> Array:
 
 def _filled(points: Array, surface: Surface, empty: float) -> Array:
     """Points and the samples of the surface that are further than that [m] from all of them."""
-    gaps = cKDTree(points).query(surface.points)[0]
+    gaps = np.asarray(cKDTree(points).query(surface.points)[0])
     some = np.flatnonzero(gaps > empty)
     order = np.argsort(-np.round(gaps[some] / empty, 6), kind="stable")
     more = surface.points[some]
