@@ -28,7 +28,9 @@ _STEPS = 40
 # Before each time that they move: of two particles closer than the first, in spacings, one is left
 # out, and a place further from all than the second gets one. On the lattice that they start from,
 # points are nearer to each other than after they have moved.
-_ROUNDS = ((0.7, 0.75), (0.8, 0.8), (0.8, 0.8))
+_FIRST, _THEN = (0.7, 0.75), (0.8, 0.8)
+# They move at least so often, and then until no two are too close, at most so often.
+_LEAST, _MOST = 3, 8
 
 
 def even_skin(shape: Shape, grid: Grid, distance: Array, spacing: float, size: float) -> Array:
@@ -48,9 +50,12 @@ def even_skin(shape: Shape, grid: Grid, distance: Array, spacing: float, size: f
     surface = shape.surface(spacing)
     fixed, _ = grid.snapped(_on_edges(shape, spacing))
     points = np.concatenate([fixed, _from_lattice(shape, surface, grid, distance, size)])
-    for closest, empty in _ROUNDS:
-        points = _thinned(points, len(fixed), closest * size)
-        points = _filled(points, surface, empty * size)
+    for round_ in range(_MOST):
+        closest, empty = _THEN if round_ else _FIRST
+        apart = _thinned(points, len(fixed), closest * size)
+        if round_ >= _LEAST and len(apart) == len(points):
+            break
+        points = _filled(apart, surface, empty * size)
         # What is side by side in space is so in memory, too.
         free = points[len(fixed) :]
         points = np.concatenate([fixed, free[np.argsort(grid.cell_of(free), kind="stable")]])
