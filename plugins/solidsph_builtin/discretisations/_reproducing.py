@@ -145,12 +145,18 @@ class Fit:
         at = self.particles[poor]
         parts, near = _functions(tree, rule, self._spacing_at(at), at, degree)
         gain = (least - integrals)[poor]
-        result = integrals.copy()
-        result[poor] += gain
-        np.subtract.at(result, rich[near], gain[:, None] * parts)
-        # In a body of few particles that may be more than some have.
-        robbed = bool(np.any(result[rich] < np.minimum(least, integrals)[rich]))
-        return integrals if robbed else result
+        taken = gain[:, None] * parts
+        # Where that is more than a neighbour has, as in a body of few particles, none is gained.
+        while gain.any():
+            result = integrals.copy()
+            result[poor] += gain
+            np.subtract.at(result, rich[near], taken)
+            robbed = result[rich] < np.minimum(least, integrals)[rich]
+            if not robbed.any():
+                return result
+            refused = (robbed[near] & (taken > 0.0)).any(axis=1)
+            gain[refused], taken[refused] = 0.0, 0.0
+        return integrals
 
     def _degrees(self, points: Array, sizes: Array, least: Array) -> tuple[Indices, Array]:
         """The degree of the fit at each point (m,), and the integrals of the `sizes` (m,) with it,

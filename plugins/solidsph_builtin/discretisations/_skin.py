@@ -23,13 +23,18 @@ _CLOSEST_ON_EDGES = 0.6
 _AT = 1e-6
 # Beside what is off the lattice particles move along the surface up to this far away, in spacings.
 _MOVES = 4.0
+# A step along an edge is known up to this, in cells.
+_NEARLY_AT = 1e-3
+# Points this close to the boundary, in cells, are on it.
+_ON_BOUNDARY = 1e-9
 # Steps of particles along the surface.
 _STEPS = 40
 # Before each time that they move: of two particles closer than the first, in spacings, one is left
 # out, and a place further from all than the second gets one. On the lattice that they start from,
 # points are nearer to each other than after they have moved.
-_FIRST, _THEN = (0.7, 0.75), (0.8, 0.8)
-# They move at least so often, and then until no two are too close, at most so often.
+_FIRST, _THEN = (0.7, 0.75), (0.8, 0.82)
+# They move at least so often, and then, without new ones, until no two are too close, at most so
+# often.
 _LEAST, _MOST = 3, 8
 
 
@@ -48,14 +53,14 @@ def even_skin(shape: Shape, grid: Grid, distance: Array, spacing: float, size: f
         size: the spacing in the lattice [m].
     """
     surface = shape.surface(spacing)
-    fixed, _ = grid.snapped(_on_edges(shape, spacing))
+    fixed = _to_lattice(shape, grid, _on_edges(shape, spacing))
     points = np.concatenate([fixed, _from_lattice(shape, surface, grid, distance, size)])
     for round_ in range(_MOST):
         closest, empty = _THEN if round_ else _FIRST
         apart = _thinned(points, len(fixed), closest * size)
         if round_ >= _LEAST and len(apart) == len(points):
             break
-        points = _filled(apart, surface, empty * size)
+        points = _filled(apart, surface, empty * size) if round_ < _LEAST else apart
         # What is side by side in space is so in memory, too.
         free = points[len(fixed) :]
         points = np.concatenate([fixed, free[np.argsort(grid.cell_of(free), kind="stable")]])
@@ -91,6 +96,16 @@ def _on_edges(shape: Shape, spacing: float) -> Array:
     # Corners come first, so that they stay.
     points = points[thinned(points / spacing, np.arange(len(points)), _CLOSEST_ON_EDGES)]
     return on_boundary(shape, surface, points, spacing)
+
+
+def _to_lattice(shape: Shape, grid: Grid, points: Array) -> Array:
+    """Points (m, 3) on the boundary, those all but at a point of the lattice that is on it moved
+    there."""
+    there = grid.positions(grid.cell_of(points))
+    size = float(grid.steps.min())
+    at = np.abs((points - there) / grid.steps).max(axis=1, initial=0.0) <= _NEARLY_AT
+    at[at] = np.abs(shape.signed_distance(there[at])) <= _ON_BOUNDARY * size
+    return np.where(at[:, None], there, points)
 
 
 def _from_lattice(

@@ -47,6 +47,8 @@ def test_particles_of_a_mesh(body: Body) -> None:
     samples = shape.surface(h).points
     assert cKDTree(X[surface]).query(samples)[0].max() < 1.0 * h
     nearest = cKDTree(X).query(X, k=2)[0][:, 1] / h
+    # At the corner of a lattice it is 0.0375.
+    assert V.min() > 0.02 * h**3
     assert nearest.min() > 0.8
     assert nearest.max() < 1.25
 
