@@ -76,7 +76,8 @@ _FAR = 30.0
 # are off it by that, and one that is further off than the others would get no value.
 _FLAT = 1e-12
 
-# From so many points on, compiled loops are worth the time of loading the compiler.
+# From so many points on, compiled loops are worth the time of loading the compiler. They know one
+# spacing.
 _MANY = 20_000
 
 # So few that what is computed for them stays in the cache.
@@ -119,7 +120,7 @@ class Fit:
 
     def _nearest(self, points: Array, weights: Array) -> Array:
         """Sum of the weights (m,) of the points (m, d) nearest to each particle, (n,)."""
-        if len(points) < _MANY:
+        if len(points) < _MANY or callable(self.spacing):
             owners = np.asarray(self._tree.query(points)[1])
         else:
             from solidsph_builtin.discretisations._fit_loops import Cells, nearest
@@ -205,7 +206,8 @@ class Fit:
 
     def _integrals(self, points: Array, weights: Array, degree: Indices) -> Array:
         result = np.zeros((len(self.particles), weights.shape[1]))
-        if len(points) >= _MANY and self._rule is not IN_LATTICE:
+        by_loops = self._rule is not IN_LATTICE and not callable(self.spacing)
+        if by_loops and len(points) >= _MANY:
             left = self._add_by_loops(result, points, weights, degree)
             points, weights, degree = points[left], weights[left], degree[left]
         regular = degree == self._rule.degree
