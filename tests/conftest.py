@@ -18,6 +18,7 @@ from solidsph.costs import calibration
 from solidsph.costs.coefficients import REFERENCE
 from solidsph.registry import registry
 from solidsph.system.cache import CACHE, write_whole
+from solidsph.system.cache import cache_folder as users_cache
 from tests.helpers.examples import QUICK, THOROUGH
 from tests.slow import SLOW
 
@@ -70,13 +71,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 @pytest.fixture(scope="session")
-def cache_folder(pytestconfig: pytest.Config) -> Path:
-    """What the user's cache would hold, of all processes of this session and those after it.
+def cache_folder() -> Path:
+    """What the user's cache would hold, of this session and all others, in whichever clone.
 
+    To compile what the tests run takes longer than to run it, and an entry is known by its content.
     The calibration in it is the reference: no test measures this machine unless it says so.
     """
-    assert pytestconfig.cache is not None
-    folder = pytestconfig.cache.mkdir("solidsph")
+    folder = users_cache() / "tests"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(CACHE, str(folder))
         write_whole(calibration.cache_file(), REFERENCE.to_json().encode())
