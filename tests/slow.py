@@ -18,6 +18,7 @@ SLOW = (
     "tests/plugins/boundaries/test_boundaries.py::"
     "test_total_load_on_curved_faces_and_around_corners[shape2-",
     "tests/probes/test_probes.py::test_a_curved_face_is_where_it_is[3]",
+    "tests/plugins/shapes/test_mesh_bodies.py::test_a_uniform_stretch_is_reproduced[torus]",
     # Larger systems of equations.
     "tests/statics/test_iterative.py::test_a_bent_beam[0.0-3]",
     "tests/statics/test_iterative.py::test_a_bent_beam[0.49-3]",
