@@ -41,6 +41,7 @@ bench: $(BENCH_STAMP)  ## against a plain C loop, whole steps, memory, throughpu
 	$(BIN)/python benchmarks/effects.py
 	$(BIN)/python benchmarks/finite_elements.py
 	$(BIN)/python benchmarks/beside_lammps.py
+	$(BIN)/python benchmarks/meshed_parts.py
 
 bench-page: $(STAMP)  ## the same, written to the documentation
 	$(BIN)/python benchmarks/bench.py --write docs/benchmarks.md

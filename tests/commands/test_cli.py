@@ -239,7 +239,6 @@ def test_write_a_cases_scenes_and_run_one(tmp_path: Path) -> None:
         (("check", "--cover", "0.5"), "too small in 2D"),
         (("check", "--cover", "3", "--set", "a=1"), "name one"),
         (("plot", "absent.h5"), "absent.h5"),
-        (("plot", "pull.toml"), "pull.toml"),
     ],
 )
 def test_bad_input_is_one_message_and_code_2(
