@@ -8,15 +8,12 @@ import numpy as np
 
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.pair_search import PairSearch
+from solidsph_builtin.discretisations._relaxation import REACH, pull
 
-# As of `_relaxation.py`: particles repel each other up to this distance, in spacings.
-_REACH = 1.5
 # A step, and the longest, in spacings, from the first to the last.
 _FIRST, _LAST = 0.1, 0.02
 # Neighbours are searched anew after so many steps, up to this part beyond the reach.
 _SEARCH, _SLACK = 5, 0.3
-# Keeps the force of two particles at one place finite.
-_SOFT = 1e-3
 
 
 def relaxed_by(
@@ -28,8 +25,8 @@ def relaxed_by(
 ) -> Array:
     """`positions` (n, d) after repulsion has moved those that are `free` (n,), (n, d) [m].
 
-    The force of a neighbour at q reaches is (1 - q)^2 / q, with the mean of both reaches. After
-    each step the free ones are put `onto` a surface that they must not leave.
+    The force of a neighbour is that of `relaxed`, with the mean of both reaches. After each step
+    the free ones are put `onto` a surface that they must not leave.
     """
     x = positions.copy()
     if not free.any():
@@ -37,12 +34,12 @@ def relaxed_by(
     for step in range(steps):
         if step % _SEARCH == 0:
             s = spacing(x)
-            pairs = _near(x, free, (_REACH + _SLACK) * s)
+            pairs = _near(x, free, (REACH + _SLACK) * s)
         a, b = pairs
         offsets = x[b] - x[a]
-        reach = _REACH * 0.5 * (s[a] + s[b])
+        reach = REACH * 0.5 * (s[a] + s[b])
         q = np.linalg.norm(offsets, axis=1) / reach
-        strength = np.maximum(1.0 - q, 0.0) ** 2 / ((q + _SOFT) * np.maximum(q, _SOFT) * reach)
+        strength = pull(np.minimum(q, 1.0)) / reach
         way = np.stack(
             [
                 np.bincount(b, force, minlength=len(x)) - np.bincount(a, force, minlength=len(x))
