@@ -64,8 +64,9 @@ A point is on the front if none is both quicker and nearer; dominated points are
 pictures. How near it is says its trusted error: the largest of its scheme at its spacing or any
 finer one. What crosses the reference on its way past it is near by chance, and gets no credit.
 
-Times are medians of {repeats} runs, each in a process of its own, building and compiling included,
-on a shared machine: read them as ratios. `solidsph cost CASE` makes the same for any case,
+Times are medians of {repeats} runs, each in a process of its own on a shared machine, building
+included: read them as ratios. Compiling is not in them: what it makes is kept on disk.
+`solidsph cost CASE` makes the same for any case,
 `solidsph cost CASE --accuracy 1%` searches for the cheapest configuration by few runs.
 """
 
@@ -193,8 +194,11 @@ def one_at_a_time(case: Case, default: Point, means: SweepSetup) -> str:
 
 
 def _can_be(case: Case, choice: str, value: Any) -> bool:
-    """Whether scenes of the case can be built with a choice: one at rest has no step."""
-    scene = next(iter(with_settings(case, {choice: value}).scenes().values()))
+    """Whether scenes of the case, if it has any, can be built with a choice: one at rest has no
+    step."""
+    scene = next(iter(with_settings(case, {choice: value}).scenes().values()), None)
+    if scene is None:
+        return True
     try:
         Simulation.builder(scene).build()
     except BuildError:

@@ -144,3 +144,40 @@ def test_a_second_run_compiles_nothing_and_moves_the_same(
     # The prediction knows that all of it is on disk: to read takes a hundredth.
     assert known == "True"
     assert float(compiling) < 0.2
+
+
+CLOCKED = """
+import time
+from solidsph.engines.compiled.jit import njit
+from solidsph.system.compile_time import COMPILE_TIME
+
+@njit
+def inner(x):
+    return x + 1.0
+
+@njit
+def outer(x):
+    return inner(x) * 2.0
+
+begun = time.perf_counter()
+outer(1.0)
+print(COMPILE_TIME.seconds, time.perf_counter() - begun)
+"""
+
+
+def test_time_of_compiling_is_counted_once_though_functions_are_compiled_within_others(
+    own_cache: Path, tmp_path: Path
+) -> None:
+    script = tmp_path / "clocked.py"
+    script.write_text(CLOCKED)
+
+    def run() -> tuple[float, float]:
+        line = subprocess.run(
+            [sys.executable, str(script)], capture_output=True, check=True, text=True
+        ).stdout
+        compiling, whole = map(float, line.split())
+        return compiling, whole
+
+    compiling, whole = run()
+    assert 0.5 * whole < compiling < whole
+    assert run()[0] == 0.0

@@ -14,9 +14,12 @@ from solidsph.registry import registry
 from solidsph.scene.scene import Scene
 from solidsph.scene.scheme import completed
 from solidsph.simulation import Simulation
+from solidsph.studies import point
 from solidsph.studies.case import Case
+from solidsph.studies.case_run import run_scenes
 from solidsph.studies.point import merge_repeats, run_point
 from solidsph.studies.variant import setting_of, with_settings
+from solidsph.system.compile_time import COMPILE_TIME
 from solidsph_cases.csm3 import Csm3
 
 
@@ -83,6 +86,16 @@ def test_a_point_counts_what_no_machine_changes() -> None:
     assert one.steps == built.steps
     assert one.pair_evaluations == built.steps * count_work(built).visited
     assert merge_repeats([one, two]).seconds == (*one.seconds, *two.seconds)
+
+
+def test_compiling_is_not_in_the_time_of_a_point(monkeypatch: pytest.MonkeyPatch) -> None:
+    def compiling(*given: Any) -> Any:
+        monkeypatch.setattr(COMPILE_TIME, "seconds", COMPILE_TIME.seconds + 1000.0)
+        return run_scenes(*given)
+
+    monkeypatch.setattr(point, "run_scenes", compiling)
+    case = with_settings(Csm3(across=3, duration=0.01), {"engine": "matrix"})
+    assert run_point(case, {}).time < -900.0
 
 
 def test_what_goes_wrong_is_a_point_too(monkeypatch: pytest.MonkeyPatch) -> None:
