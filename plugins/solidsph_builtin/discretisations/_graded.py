@@ -72,8 +72,9 @@ def graded(discretisation: Discretisation, shape: Shape, spacing: SpacingField) 
     owners = attrs.evolve(owners, particles=at[owners.particles])
     owned = faces(surface, owners, X)
     given = without_ghosts(X, np.ones(len(X)), spacing.at(X), owned)
-    cells = given.spacings**shape.dimension * np.where(onto, _ON_SURFACE, 1.0)
-    return attrs.evolve(graded_fit(discretisation, shape, spacing, given), cells=cells)
+    made = graded_fit(discretisation, shape, spacing, given)
+    on_surface = _ON_SURFACE * given.spacings**shape.dimension
+    return attrs.evolve(made, cells=np.where(onto, on_surface, made.volumes))
 
 
 def _outer(discretisation: Discretisation, shape: Shape, spacing: SpacingField) -> Array:

@@ -56,10 +56,6 @@ _BOXES = ("bar", "rectangle", "block")
 # Support radius of the sums [spacings], so small that some supports are complete.
 _COVER = 2.2
 
-# Particles that make room for those on a round surface stand closer further inside, and have one
-# weight all the same: in a ball of 3.5 spacings the sums are 1.18, in one of 12 they are 1.04.
-_DENSER = 0.2
-
 KIT = Kit()
 
 
@@ -158,10 +154,10 @@ def middle(discretisation: Discretisation) -> Iterator[float]:
         yield float(np.abs(centre - first / flux).max()) / SPACING
 
 
-@KIT.errors(_DENSER, none="no support is complete")
+@KIT.errors(0.1, none="no support is complete")
 def sums(discretisation: Discretisation) -> Iterator[float]:
     """Where supports are complete, the kernel summed with the weights in sums is 1 on average,
-    within a fifth."""
+    within a tenth."""
     kernel: Kernel = construct("kernels", "modified-mollifier")
     for sample in _samples(discretisation):
         p, radius = sample.particles, _COVER * SPACING

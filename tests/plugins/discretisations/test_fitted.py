@@ -174,7 +174,7 @@ def test_particles_on_a_surface_off_the_lattice_weigh_less_in_fits() -> None:
     h = 0.05
     quarter = Fitted().particles(QUARTER, h)
     surface = quarter.tags["surface"]
-    assert quarter.cells[~surface] == pytest.approx(h**2)
+    assert np.array_equal(quarter.cells[~surface], quarter.volumes[~surface])
     assert quarter.cells[surface] == pytest.approx(h**2 / 3.0)
     assert Fitted().particles(Box(lengths=(1.0, 1.0)), h).cells == pytest.approx(h**2)
 
