@@ -22,7 +22,7 @@ FunctionIdentity._unique_ids = itertools.count(secrets.randbits(62))
 
 
 @final
-class _CompileClock(Listener):  # type: ignore[misc]  # Numba has no types
+class _CompileClock(Listener):
     """Counts the time of compilations, of which one may begin within another."""
 
     def __init__(self) -> None:
