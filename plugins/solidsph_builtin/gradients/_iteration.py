@@ -1,7 +1,7 @@
 """The sums of `consistent` for many particles, by conjugate gradients over the fixed pairs.
 
 A factorisation couples neighbours of neighbours: in space some 600 particles a particle. Here each
-step is one pass over the pairs and one over small blocks of particles, whose inverses take some 4
+step is one pass over the pairs and one over small blocks of particles, whose factors take some 2
 kilobytes a particle in space.
 """
 

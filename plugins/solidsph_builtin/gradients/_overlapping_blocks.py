@@ -12,7 +12,7 @@ from typing import final
 import attrs
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import spotrf, spotri
+from scipy.linalg.lapack import spotrf
 from scipy.spatial import cKDTree
 
 from solidsph.maths.arrays import Array, Indices
@@ -23,19 +23,19 @@ from solidsph_builtin.gradients._passes import Passes, Sums
 _CORE = 100
 _OVERLAP = 2.0
 
-# Keeps the matrices regular for inverses of single precision, relative to their largest entry.
+# Keeps the matrices regular for factors of single precision, relative to their largest entry.
 _REGULAR = 1e-5
 
 
 @final
 @attrs.frozen(eq=False)
 class OverlappingBlocks:
-    """The inverses of the system for l alone of overlapping blocks of particles."""
+    """The factors of the system for l alone in overlapping blocks of particles."""
 
     passes: Passes
     ends: Indices  # (b + 1,) where the particles of each block begin, and the end
     members: Indices  # (m,) the particles of all blocks
-    inverses: NDArray[np.float32]  # of the blocks' matrices (m', m'), one after the other
+    factors: NDArray[np.float32]  # Cholesky's, of the blocks one after the other, row by row
 
     @classmethod
     def of(
@@ -52,12 +52,12 @@ class OverlappingBlocks:
         """
         blocks = list(_overlapping(sums.positions, reached, _OVERLAP * spacings))
         ends = np.cumsum([0, *map(len, blocks)])
-        inverses = _inverses(sums, passes, blocks, soft)
-        return cls(passes, ends, np.concatenate(blocks), inverses)
+        factors = _factors(sums, passes, blocks, soft)
+        return cls(passes, ends, np.concatenate(blocks), factors)
 
     def add_solutions(self, r: Array, z: Array) -> None:
         """Add to z (n, d) the sum of all blocks' solutions for r (n, d)."""
-        self.passes.add_solutions(self.ends, self.members, self.inverses, r, z)
+        self.passes.add_solutions(self.ends, self.members, self.factors, r, z)
 
 
 def _overlapping(X: Array, reached: Indices, overlaps: Array) -> Iterator[Indices]:
@@ -82,12 +82,10 @@ def _halved(X: Array, chosen: Indices) -> Iterator[Indices]:
     yield from _halved(X, order[middle:])
 
 
-def _inverses(
-    sums: Sums, passes: Passes, blocks: list[Indices], soft: Array
-) -> NDArray[np.float32]:
-    """Of the matrices of the blocks of particles, one after the other."""
+def _factors(sums: Sums, passes: Passes, blocks: list[Indices], soft: Array) -> NDArray[np.float32]:
+    """Of the matrices of the blocks of particles: lower triangles, one after the other."""
     places = np.full(len(sums.positions), -1)
-    ends = np.cumsum([0, *(len(block) ** 2 for block in blocks)])
+    ends = np.cumsum([0, *(len(block) * (len(block) + 1) // 2 for block in blocks)])
     found = np.empty(ends[-1], dtype=np.float32)
     for block, begin, end in zip(blocks, ends[:-1], ends[1:], strict=True):
         places[block] = np.arange(len(block))
@@ -96,11 +94,10 @@ def _inverses(
         places[block] = -1
         own = np.einsum("ii->i", matrix)
         own += soft[block] + _REGULAR * own.max()
-        factor, failed = spotrf(matrix, lower=True)
+        diagonal = own.copy()
+        # LAPACK reads by columns: the rows of the lower triangle are columns of the upper one.
+        factor, failed = spotrf(matrix.T, lower=False, clean=False, overwrite_a=True)
         if failed:  # by rounding; its diagonal will do
-            inverse = np.diag(1.0 / own)
-        else:
-            lower, _ = spotri(factor, lower=True)
-            inverse = np.tril(lower) + np.tril(lower, -1).T
-        found[begin:end] = inverse.ravel()
+            factor = np.diag(np.sqrt(diagonal))
+        passes.pack(factor.T, found[begin:end])
     return found

@@ -46,8 +46,10 @@ class Passes(NamedTuple):
     # (sums, rows (r,), functions of the particles (n, c) by their rows' starts, columns and values,
     # matrix (c, c)): matrix += that of l alone between the functions, from these rows.
     add_functions: Any
-    # (ends (b + 1,) of the blocks among their members, members, inverses of their matrices one
-    # after the other, r (n, d), z (n, d)): z += the solutions of all blocks.
+    # (matrix (m, m), out): its lower triangle, row by row.
+    pack: Any
+    # (ends (b + 1,) of the blocks among their members, members, the packed Cholesky factors of
+    # their matrices one after the other, r (n, d), z (n, d)): z += the solutions of all blocks.
     add_solutions: Any
 
 
@@ -302,23 +304,42 @@ def passes(dimension: int, degree: int) -> Passes:
                         value += ya[m] * rc[m]
                     line[found[c]] += value
 
+    @njit
+    def pack(matrix, out):
+        at = 0
+        for m in range(len(matrix)):
+            out[at : at + m + 1] = matrix[m, : m + 1]
+            at += m + 1
+
     # By loops, since the threads of a linear algebra library wait for each other at every block.
     @njit(fastmath=_FAST)
-    def add_solutions(ends, members, inverses, r, z):
-        own = np.empty((d, np.diff(ends).max()), np.float32)
+    def add_solutions(ends, members, factors, r, z):
+        x = np.empty((d, np.diff(ends).max()), np.float32)
         first = 0
         for block in range(len(ends) - 1):
             begin, count = ends[block], ends[block + 1] - ends[block]
             for m in range(count):
+                line = factors[first : first + m + 1]
+                first += m + 1
                 for c in range(d):
-                    own[c, m] = r[members[begin + m], c]
+                    xc, value = x[c], np.float32(r[members[begin + m], c])
+                    for j in range(m):
+                        value -= line[j] * xc[j]
+                    xc[m] = value / line[m]
+            at = first
+            for m in range(count - 1, -1, -1):
+                at -= m + 1
+                line = factors[at : at + m + 1]
+                for c in range(d):
+                    xc = x[c]
+                    xc[m] /= line[m]
+                    value = xc[m]
+                    for j in range(m):
+                        xc[j] -= line[j] * value
             for m in range(count):
-                line = inverses[first : first + count]
                 for c in range(d):
-                    oc, value = own[c], np.float32(0.0)
-                    for j in range(count):
-                        value += line[j] * oc[j]
-                    z[members[begin + m], c] += value
-                first += count
+                    z[members[begin + m], c] += x[c, m]
 
-    return Passes(diagonal_blocks, product, rows_beside, add_block, add_functions, add_solutions)
+    return Passes(
+        diagonal_blocks, product, rows_beside, add_block, add_functions, pack, add_solutions
+    )

@@ -217,7 +217,7 @@ def test_by_iteration_the_sums_are_those_by_factorisation(
 
 def test_blocks_without_a_factor_have_a_diagonal(monkeypatch: pytest.MonkeyPatch) -> None:
     """In single precision rounding may make a matrix indefinite."""
-    monkeypatch.setattr(_overlapping_blocks, "spotrf", lambda matrix, lower: (matrix, 1))
+    monkeypatch.setattr(_overlapping_blocks, "spotrf", lambda matrix, **how: (matrix, 1))
     assert_iteration_agrees(2, "cubic", monkeypatch)
 
 
