@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import final
 
 import attrs
@@ -33,12 +34,24 @@ class ImposedMotion(ScheduledConstraint):
     def shape(self) -> tuple[int, ...]:
         return self.positions.shape
 
-    @property
+    @cached_property
     def entries(self) -> tuple[Indices, Indices]:
         axes = np.array(list(self.field.components), dtype=np.intp)
         return np.tile(self.indices, len(axes)), np.repeat(axes, len(self.indices))
 
     def schedule(self, times: Array, derivative: int, step: float = 0.0) -> Array:
+        if self._lasting is None:
+            return self._schedule(times, derivative, step)
+        return self._lasting if derivative == 0 else np.zeros_like(self._lasting)
+
+    @cached_property
+    def _lasting(self) -> Array | None:
+        """The displacements (1, m) [m], if they do not change in time: those of a clamp."""
+        if any(map(self.field.varies, self.field.components)):
+            return None
+        return self._schedule(np.zeros(1), 0, 0.0)
+
+    def _schedule(self, times: Array, derivative: int, step: float) -> Array:
         X = self.positions[self.indices]
         columns = [
             self.field.derivative_schedule(axis, X, times, derivative, step)

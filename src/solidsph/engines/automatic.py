@@ -17,7 +17,7 @@ from solidsph.interfaces.terms import StressTerm
 
 # Rough times [s] of the matrix engine per step and per pair, for constant and for moving
 # neighbours; the steps of the compiled engine are negligible beside them.
-_STEP, _PAIR = 1e-4, 25e-9
+_STEP, _PAIR = 3e-4, 25e-9
 _MOVING_STEP, _MOVING_PAIR = 1e-3, 400e-9
 
 # Time of the matrix engine from which compiling pays [s]. The first run of a kind of scene compiles
