@@ -45,6 +45,10 @@ KINDS = {
         'discretisation = "lattice"',
         *("body.csv", "0,0\n1,0\n1,1\n0,1\n"),
     ),
+    "spacing": (
+        'shape = {type = "interval", length = 1.0}\nspacing = {file = "FILE"}',
+        *("body.csv", "X,spacing\n0,0.02\n1,0.1\n"),
+    ),
     "points": (
         'shape = {type = "interval", length = 1.0}\n'
         'discretisation = {type = "points", file = "FILE"}',
@@ -60,7 +64,8 @@ def written(folder: Path, kind: str) -> Path:
     (folder / "scenes/parts" / name).write_text(text)
     scene = folder / "scenes/scene.toml"
     body = table.replace("FILE", f"parts/{name}")
-    scene.write_text(f"{_REST}[body.it]\nspacing = 0.25\n{body}\n")
+    spacing = "" if "spacing" in body else "spacing = 0.25"
+    scene.write_text(f"{_REST}[body.it]\n{spacing}\n{body}\n")
     return scene
 
 
@@ -83,7 +88,7 @@ def test_a_path_begins_in_the_folder_of_the_scene(
     assert Simulation.builder(Scene.from_toml(text)).build().particles.count == counts[0]
 
 
-@pytest.mark.parametrize("kind", ["points", "outline"])
+@pytest.mark.parametrize("kind", ["points", "outline", "spacing"])
 def test_a_run_is_resumed_from_anywhere(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,4 +1,4 @@
-"""The spacing of a body as a scene states it: a number, a formula, or finer at some places."""
+"""The spacing of a body as a scene states it: a number, a formula, a list, or finer somewhere."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from solidsph.model.spacing import (
     smooth_step,
 )
 from solidsph.registry.construct import construct
+from solidsph.scene.listed_spacing import check_list, listed_spacing, with_factor
 from solidsph.scene.scene_data import BodyScene
 
 _KEYS = ("where", "spacing", "over")
@@ -55,7 +56,7 @@ class _Refinement:
 
 def is_graded(body: BodyScene) -> bool:
     """Whether the spacing of a body varies."""
-    return isinstance(body.spacing, str) or bool(body.refine)
+    return isinstance(body.spacing, (str, Mapping)) or bool(body.refine)
 
 
 def scaled(body: BodyScene, factor: float) -> BodyScene:
@@ -63,9 +64,11 @@ def scaled(body: BodyScene, factor: float) -> BodyScene:
 
     Where it would then grow too fast, it returns over a longer way.
     """
-    if isinstance(body.spacing, str):
+    if isinstance(body.spacing, (str, Mapping)):
+        own = body.spacing
+        finer = f"{factor!r}*({own})" if isinstance(own, str) else with_factor(own, factor)
         refine = [{**entry, "spacing": factor * entry["spacing"]} for entry in body.refine]
-        return attrs.evolve(body, spacing=f"{factor!r}*({body.spacing})", refine=tuple(refine))
+        return attrs.evolve(body, spacing=finer, refine=tuple(refine))
     coarse = factor * body.spacing
     refine = []
     for entry in body.refine:
@@ -81,7 +84,7 @@ def least_spacing(body: BodyScene) -> float:
     Raises:
         SceneError: the spacing varies, and cannot be read.
     """
-    if isinstance(body.spacing, str):
+    if isinstance(body.spacing, (str, Mapping)):
         return spacing_field(body, construct("shapes", body.shape)).least
     return min([float(body.spacing), *(_refinement(entry).spacing for entry in body.refine)])
 
@@ -90,6 +93,8 @@ def check_words(body: BodyScene) -> None:
     """Raise SceneError if a spacing that varies cannot be read, whatever the shape."""
     if isinstance(body.spacing, str):
         Expression.parse(body.spacing, AXES)
+    if isinstance(body.spacing, Mapping):
+        check_list(body.spacing)
     for entry in body.refine:
         _refinement(entry)
 
@@ -101,22 +106,23 @@ def spacing_field(body: BodyScene, shape: Shape) -> SpacingField:
         SceneError: it is not positive and finite, or grows too fast, or a place to refine is wrong.
     """
     entries = [_refinement(entry) for entry in body.refine]
-    base = _base(body.spacing, shape.dimension)
-    if entries:
-        coarse = _range(base, shape)[1] if isinstance(body.spacing, str) else float(body.spacing)
-        for entry in entries:
-            _check_slope(entry, coarse)
-        finer = [(entry, _distance(entry, shape, coarse)) for entry in entries]
+    base = _base(body.spacing, shape)
+    varies = isinstance(body.spacing, (str, Mapping))
+    if not entries:
+        return _checked(base, body, shape)
+    coarse = _checked(base, body, shape).greatest if varies else float(body.spacing)
+    for entry in entries:
+        _check_slope(entry, coarse)
+    finer = [(entry, _distance(entry, shape, coarse)) for entry in entries]
 
-        def wanted(X: Array) -> Array:
-            least = s = base(X)
-            for entry, distance in finer:
-                way = smooth_step(distance(X) / entry.over)
-                least = np.minimum(least, entry.spacing + way * (s - entry.spacing))
-            return least
+    def wanted(X: Array) -> Array:
+        least = s = base(X)
+        for entry, distance in finer:
+            way = smooth_step(distance(X) / entry.over)
+            least = np.minimum(least, entry.spacing + way * (s - entry.spacing))
+        return least
 
-        return SpacingField(wanted, *_range(wanted, shape))
-    return SpacingField(base, *_range(base, shape))
+    return _checked(wanted, body, shape)
 
 
 def predicted_count(field: SpacingField, shape: Shape) -> float:
@@ -129,12 +135,14 @@ def predicted_count(field: SpacingField, shape: Shape) -> float:
     return inside + 0.5 * float(np.sum(areas / field.at(surface.points) ** (shape.dimension - 1)))
 
 
-def _base(spacing: float | str, dimension: int) -> Callable[[Array], Array]:
+def _base(spacing: float | str | Mapping[str, Any], shape: Shape) -> Callable[[Array], Array]:
     """What `spacing` says, at X (n, d), (n,) [m]."""
+    if isinstance(spacing, Mapping):
+        return listed_spacing(spacing, *shape.bounds())
     if not isinstance(spacing, str):
         number = _length("spacing", spacing)
         return lambda X: np.full(len(X), number)
-    axes = AXES[:dimension]
+    axes = AXES[: shape.dimension]
     formula = Expression.parse(spacing, axes)
 
     def values(X: Array) -> Array:
@@ -144,8 +152,8 @@ def _base(spacing: float | str, dimension: int) -> Callable[[Array], Array]:
     return values
 
 
-def _range(spacing: Callable[[Array], Array], shape: Shape) -> tuple[float, float]:
-    """The least and the greatest spacing within a shape [m].
+def _checked(spacing: Callable[[Array], Array], body: BodyScene, shape: Shape) -> SpacingField:
+    """That spacing, with the range that it keeps to within a shape.
 
     Raises:
         SceneError: it grows too fast, or is far too small for the shape.
@@ -167,8 +175,9 @@ def _range(spacing: Callable[[Array], Array], shape: Shape) -> tuple[float, floa
             f"the spacing is {least:.3g} m at {_place(X[worst])} and {greatest:.3g} m elsewhere; "
             f"it may vary by a factor of {_MOST_RATIO:g} in one body"
         )
-    _check_growth(spacing, cells)
-    return least, greatest
+    if isinstance(body.spacing, str):  # the growth of the others is limited by what they are
+        _check_growth(spacing, cells)
+    return SpacingField(spacing, least, greatest)
 
 
 def _cells(spacing: Callable[[Array], Array], shape: Shape) -> Cells:

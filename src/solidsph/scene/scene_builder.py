@@ -46,7 +46,7 @@ class SceneBuilder(ABC):
         name: str,
         *,
         shape: PartLike,
-        spacing: float | str,
+        spacing: float | str | Mapping[str, Any],
         discretisation: PartLike | None = None,
         material: PartLike | None = None,
         tags: Mapping[str, Where] | None = None,
@@ -54,7 +54,8 @@ class SceneBuilder(ABC):
     ) -> Self:
         """Add a body; `spacing` in metres, `tags` name sets of its particles.
 
-        The spacing may be a formula of X, Y and Z. Each entry of `refine` is a mapping with
+        The spacing may be a formula of X, Y and Z, or `{"file": path}`, a list of places and
+        spacings. Each entry of `refine` is a mapping with
         `where`, a face or a condition, the `spacing` there, and the distance `over` which that of
         the body returns.
         """

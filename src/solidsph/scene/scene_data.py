@@ -23,7 +23,7 @@ class BodyScene:
     """One body: its shape, resolution and material."""
 
     shape: PartLike
-    spacing: float | str  # [m], a number or a formula of X, Y and Z
+    spacing: float | str | Mapping[str, Any]  # [m], a number, a formula of X, Y, Z, or {file = ...}
     discretisation: PartLike | None = None  # that of the scheme if None
     material: PartLike | None = None  # that of the scene if None
     tags: Mapping[str, Where] = attrs.field(factory=dict)  # named sets of its particles

@@ -272,6 +272,10 @@ def _number_or_text(value: Any, what: str) -> float | str:
     return value if isinstance(value, str) else _number(value, what)
 
 
+def _number_text_or_table(value: Any, what: str) -> float | str | Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else _number_or_text(value, what)
+
+
 def _entries(value: Any, what: str) -> tuple[Any, ...]:
     if not isinstance(value, list):
         raise SceneError(
@@ -288,6 +292,7 @@ def _unchecked(value: Any, what: str) -> Any:
 _READERS: Mapping[Any, Callable[[Any, str], Any]] = {
     float: _number,
     float | str: _number_or_text,
+    float | str | Mapping[str, Any]: _number_text_or_table,
     float | None: _number,
     int: _whole_number,
     int | None: _whole_number,

@@ -18,8 +18,11 @@ import numpy as np
 
 from solidsph.errors import SceneError, SolidsphError
 from solidsph.registry import registry
+from solidsph.results.scene_files import file_versions
+from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case
 from solidsph.studies.variant import with_settings
+from solidsph.system.files import working_folder
 
 
 @final
@@ -35,16 +38,20 @@ class Task:
     def configuration(self) -> str:
         """Hash of all that decides the outcome.
 
-        It covers the case with its parameters, the settings, the resulting scenes, and the versions
-        of solidsph and of every distribution that provides a part. A change of code without a
-        change of version is noticed only if it changes the scenes.
+        It covers the case with its parameters, the settings, the resulting scenes, what is in the
+        files that their bodies are read from, and the versions of solidsph and of every
+        distribution that provides a part. A change of code without a change of version is noticed
+        only if it changes the scenes.
 
         Raises:
             SceneError: a value in the case or the settings has no lasting description.
         """
         described = {"case": plain(self.case), "settings": plain(self.settings)}
         with suppress(SolidsphError):  # refused settings, or scenes with functions
-            described["scenes"] = plain(with_settings(self.case, self.settings).scenes())
+            scenes = with_settings(self.case, self.settings).scenes()
+            described["scenes"] = plain(scenes)
+            if files := {k: v for scene in scenes.values() for k, v in _files(scene).items()}:
+                described["files"] = files
         described["versions"] = _versions(set(_texts(described)))
         return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()[:32]
 
@@ -84,6 +91,14 @@ def plain(value: Any) -> Any:
         f"a sweep cannot name {value!r} in its journal; state it as a number, a text, a registered "
         "part, or a function of a module"
     )
+
+
+def _files(scene: Scene) -> Mapping[str, str]:
+    """Digests of the files of a scene; none of one that cannot be written."""
+    try:
+        return file_versions(scene.to_toml(), working_folder())
+    except SceneError:
+        return {}
 
 
 def _path(named: Any) -> str:
