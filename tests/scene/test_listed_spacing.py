@@ -76,7 +76,9 @@ def test_a_list_that_is_too_steep_is_finer_than_listed(dimension: int, tmp_path:
 def test_any_number_of_places_is_a_list(tmp_path: Path) -> None:
     alone = field(body(tmp_path, "0.5,0.25,0.03\n"))
     assert alone.least == alone.greatest == 0.03
-    in_a_row = field(body(tmp_path, "X,Y,spacing\n# a row\n0,0.25,0.03\n0.5,0.25,0.03\n1,0.25,0.06"))
+    in_a_row = field(
+        body(tmp_path, "X,Y,spacing\n# a row\n0,0.25,0.03\n0.5,0.25,0.03\n1,0.25,0.06")
+    )
     assert in_a_row.at(np.array([[0.75, 0.25]])) == pytest.approx(0.045)
     twice = field(body(tmp_path, "0,0,0.05\n1,0.5,0.04\n0,0,0.03\n"))
     assert twice.at(np.array([[0.0, 0.0]])) == pytest.approx(0.03)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from solidsph.commands.options import (
     output_option,
     set_option,
 )
+from solidsph.commands.refined import refined, refinement_facts
 from solidsph.commands.target import name_of, resolve, target_argument
 from solidsph.errors import SceneError
 from solidsph.studies.case import Case
@@ -36,7 +38,7 @@ from solidsph.studies.processes import Processes
 from solidsph.studies.report import write_report
 from solidsph.studies.report_figures import library
 from solidsph.studies.richardson import extrapolate
-from solidsph.studies.scene_case import SceneCase
+from solidsph.studies.scene_case import ABOUT, COARSER, SceneCase
 from solidsph.studies.search import Goal, SearchResult
 from solidsph.studies.variant import with_settings
 
@@ -63,6 +65,10 @@ class _Options(Output):
     )
     time: str | None = option(
         "Find the most accurate configuration in this time, such as 60s.", metavar="TIME"
+    )
+    refine: bool = flag(
+        "For a scene: run it first, and let its spacings follow its error: fine where the stress "
+        "bends most."
     )
     search: SearchOptions = option_group(SearchOptions)
     repeats: int = option(
@@ -97,11 +103,12 @@ def cost(target: str, options: _Options) -> None:
     """Show the time that accuracy costs for a scene or a case.
 
     A scene without a reference is run at three spacings or more, and the error of each is estimated
-    from what they tend to. Finished points are kept: the same command continues an interrupted
+    from what they tend to. With --refine its spacings follow its error first, and these three are
+    about the refined ones. Finished points are kept: the same command continues an interrupted
     sweep.
     """
     goal = goal_of(options.accuracy, options.time)
-    case = case_of(resolve(target, options.settings), target, options.search.of, options.references)
+    wanted, given = resolve(target, options.settings), target
     target = name_of(target)
     if options.accuracy is not None and options.time is not None:
         raise SceneError("--accuracy and --time are two questions; ask one at a time")
@@ -112,6 +119,12 @@ def cost(target: str, options: _Options) -> None:
         )
     if options.report:
         library()  # refused before anything runs if Plotly is missing
+    made = None
+    if options.refine:
+        made = refined(wanted, target, options.folder(target), shown=options.progress)
+        wanted = made.scene
+    levels = ABOUT if made is not None and made.bodies else COARSER
+    case = case_of(wanted, given, options.search.of, options.references, levels)
     axes = axes_of(options.axes, case)
     scheduler = options.scheduler
     runner = Processes(options.workers) if scheduler is None else Cluster(scheduler)
@@ -121,6 +134,9 @@ def cost(target: str, options: _Options) -> None:
             facts, text, passed = _sweep(target, options, case, axes, setup)
         else:
             facts, text, passed = _search(target, options, case, axes, setup, goal)
+    if made is not None:
+        facts = {**facts, "refined": refinement_facts(made)}
+        text = chain(made.sentences, [f"scene: {made.path}"] if made.bodies else [], text)
     present(facts, text, as_json=options.as_json, passed=passed)
 
 

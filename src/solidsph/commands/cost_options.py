@@ -12,7 +12,7 @@ from solidsph.errors import SceneError
 from solidsph.scene.scene import Scene
 from solidsph.studies.case import Case
 from solidsph.studies.cost import Axes, sweep_of
-from solidsph.studies.scene_case import SPACING, SceneCase
+from solidsph.studies.scene_case import COARSER, SPACING, SceneCase
 from solidsph.studies.scene_words import changed
 from solidsph.studies.search import Goal
 
@@ -20,11 +20,15 @@ _UNITS = {"": 1.0, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 def case_of(
-    wanted: Scene | Case, target: str, of: Sequence[str] = (), references: Sequence[str] = ()
+    wanted: Scene | Case,
+    target: str,
+    of: Sequence[str] = (),
+    references: Sequence[str] = (),
+    levels: Sequence[float] = COARSER,
 ) -> Case:
-    """The case to be priced: a scene becomes one."""
+    """The case to be priced: a scene becomes one, with a sweep over these parts of its spacing."""
     if isinstance(wanted, Scene):
-        return SceneCase.of(wanted, of, references)
+        return SceneCase.of(wanted, of, references, levels=levels)
     if of or references:
         raise SceneError(f"--of and --reference are for a scene; the case {target!r} has its own")
     return wanted

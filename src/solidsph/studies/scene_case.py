@@ -23,8 +23,11 @@ SPACING = "spacing"
 
 _NAME = "scene"
 
-# Spacings of a sweep before that of the scene, over it.
-_COARSER = (2.0, sqrt(2.0))
+COARSER = (2.0, sqrt(2.0), 1.0)
+"""Spacings of a sweep over that of a scene [-]."""
+
+ABOUT = (sqrt(2.0), 1.0, sqrt(0.5))
+"""Those for a scene whose own is as coarse as it should be [-]."""
 
 
 @final
@@ -40,6 +43,8 @@ class SceneCase(Case):
     references: Sequence[Reference] = ()
     spacing: float = attrs.field()  # the smallest of its bodies; others keep their ratio to it [m]
 
+    levels: Sequence[float] = COARSER  # spacings of its sweep over its own [-]
+
     @spacing.default
     def _own_spacing(self) -> float:
         return smallest_spacing(self.scene)
@@ -52,6 +57,7 @@ class SceneCase(Case):
         references: Sequence[str] = (),
         *,
         folder: Path | None = None,
+        levels: Sequence[float] = COARSER,
     ) -> SceneCase:
         """The case of a scene.
 
@@ -63,6 +69,7 @@ class SceneCase(Case):
                 file; or the value alone if there is one quantity. They come before those of the
                 scene.
             folder: where names of files begin.
+            levels: spacings of its sweep over its own, from coarse to fine [-].
 
         Raises:
             SceneError: there is no such column or file, or a reference is ambiguous.
@@ -85,7 +92,8 @@ class SceneCase(Case):
             known += references_of(scene, columns, folder=folder)
         if known and not wanted:
             asked = []
-        return cls(scene, list(dict.fromkeys([*asked, *(r.quantity for r in known)])), known)
+        wanted_ones = list(dict.fromkeys([*asked, *(r.quantity for r in known)]))
+        return cls(scene, wanted_ones, known, levels=tuple(levels))
 
     @property
     def title(self) -> str:  # type: ignore[override]  # of the scene
@@ -99,7 +107,7 @@ class SceneCase(Case):
     @property
     def sweep(self) -> Mapping[str, Sequence[Any]]:  # type: ignore[override]
         own = smallest_spacing(self.scene)
-        return {SPACING: (*(float(f"{own * level:.4g}") for level in _COARSER), own)}
+        return {SPACING: tuple(own if x == 1.0 else float(f"{own * x:.4g}") for x in self.levels)}
 
     @property
     def resolution(self) -> float:
@@ -173,7 +181,7 @@ def _in_time(reference: Reference, scene: Scene) -> Reference:
 def _columns(scene: Scene) -> Sequence[str]:
     """Columns of the history of a scene, from a coarser one where that can be built."""
     try:
-        coarse = changed(scene, SPACING, _COARSER[0] * smallest_spacing(scene))
+        coarse = changed(scene, SPACING, COARSER[0] * smallest_spacing(scene))
         return columns_of(Simulation.builder(coarse).build())
     except SolidsphError:
         return columns_of(Simulation.builder(scene).build())
