@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 import pytest
 
-from solidsph import BuildError, Scene, Simulation
+from solidsph import BuildError, Scene, SceneError, Simulation
 from solidsph.scene.graded_spacing import scaled
 from solidsph.studies.by_error import LEAST, WORTH, refined_by_error
 from solidsph.studies.local_error import LocalError
@@ -131,6 +131,23 @@ def test_an_even_stress_stays_as_it_is(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
     assert made.gain == pytest.approx(1.0)
     assert "nothing is refined" in made.sentences[0]
+
+
+def test_where_nothing_happens_nothing_is_refined(tmp_path: Path) -> None:
+    scene = block()
+    still = attrs.evolve(scene, boundaries=scene.boundaries[:2])
+    assert refined_by_error(still, tmp_path).gain == pytest.approx(1.0)
+
+
+def test_given_places_are_no_spacing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Simulation, "run", None)
+    scene = block()
+    X = Simulation.builder(scene).build().particles.positions
+    points = {"type": "points", "positions": X.tolist()}
+    bodies = {"block": attrs.evolve(scene.bodies["block"], discretisation=points)}
+    with pytest.raises(SceneError, match="which no spacing moves; leave") as told:
+        refined_by_error(attrs.evolve(scene, bodies=bodies), tmp_path)
+    assert "\n" not in str(told.value)
 
 
 def test_a_ring_of_little_stress_concentration_stays_as_it_is(tmp_path: Path) -> None:

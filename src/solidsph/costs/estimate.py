@@ -36,7 +36,7 @@ from solidsph.interfaces.shape import Shape
 from solidsph.interfaces.smoothing_kernel import UNIT_SPHERE
 from solidsph.registry.construct import construct
 from solidsph.scene.default_cover import cover_of
-from solidsph.scene.graded_spacing import is_graded, predicted_count, spacing_field
+from solidsph.scene.graded_spacing import is_graded, least_spacing, predicted_count, spacing_field
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_data import BodyScene, PartLike
 from solidsph.scene.scheme import SCHEMES, completed
@@ -125,7 +125,7 @@ def _body(scene: Scene, body: BodyScene, cover: float) -> BodyEstimate:
         field = spacing_field(body, shape)
         least, h = field.least, (volume / predicted_count(field, shape)) ** (1.0 / d)
     else:
-        least = h = float(body.spacing)
+        least = h = least_spacing(body)
     sides = np.maximum(1.0, (upper - lower) / h)
     lattice = _on_a_lattice(body) and not is_graded(body)
     particles = max(1.0, volume / h**d)

@@ -107,10 +107,12 @@ def spacing_field(body: BodyScene, shape: Shape) -> SpacingField:
     """
     entries = [_refinement(entry) for entry in body.refine]
     base = _base(body.spacing, shape)
-    varies = isinstance(body.spacing, (str, Mapping))
     if not entries:
         return _checked(base, body, shape)
-    coarse = _checked(base, body, shape).greatest if varies else float(body.spacing)
+    if isinstance(body.spacing, (str, Mapping)):
+        coarse = _checked(base, body, shape).greatest
+    else:
+        coarse = float(body.spacing)
     for entry in entries:
         _check_slope(entry, coarse)
     finer = [(entry, _distance(entry, shape, coarse)) for entry in entries]

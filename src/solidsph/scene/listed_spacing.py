@@ -25,7 +25,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Delaunay, cKDTree
 
 from solidsph.errors import SceneError
-from solidsph.maths.arrays import Array
+from solidsph.maths.arrays import Array, Indices
 from solidsph.model.regions import AXES
 from solidsph.model.spacing import STEEPEST
 from solidsph.scene.named_files import FILE
@@ -132,7 +132,7 @@ def _corners(places: Array, lower: Array, upper: Array) -> Array:
     return np.array(list(product(*zip(low - size, high + size, strict=True))))
 
 
-def _limited(places: Array, spacings: Array, edges: Array, slope: float) -> Array:
+def _limited(places: Array, spacings: Array, edges: Indices, slope: float) -> Array:
     """The largest spacings, none above those given, that grow by no more than a `slope` along
     `edges` (m, 2) between places (n, d), (n,) [m]: the shortest ways from a place beside them all,
     to which each is as far as its spacing."""
@@ -141,7 +141,7 @@ def _limited(places: Array, spacings: Array, edges: Array, slope: float) -> Arra
     growth = slope * np.linalg.norm(places[a] - places[b], axis=1)
     rows, columns = np.concatenate([a, np.full(n, n)]), np.concatenate([b, np.arange(n)])
     ways = csr_array((np.concatenate([growth, spacings]), (rows, columns)), shape=(n + 1, n + 1))
-    found: Array = dijkstra(ways, directed=False, indices=n)[:n]
+    found: Array = dijkstra(ways, directed=False, indices=np.array([n]))[0, :n]
     return found
 
 

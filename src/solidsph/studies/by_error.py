@@ -15,6 +15,7 @@ from typing import final
 import attrs
 import numpy as np
 
+from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.terms import Observation
 from solidsph.maths.arrays import Array
@@ -22,7 +23,13 @@ from solidsph.registry.construct import construct
 from solidsph.results.output_fields import stress
 from solidsph.run.built_scene import BuiltScene
 from solidsph.run.hooks import implementation
-from solidsph.scene.graded_spacing import is_graded, predicted_count, spacing_field
+from solidsph.scene.graded_spacing import (
+    is_graded,
+    least_spacing,
+    predicted_count,
+    scaled,
+    spacing_field,
+)
 from solidsph.scene.listed_spacing import list_of
 from solidsph.scene.named_files import FILE
 from solidsph.scene.scene import Scene
@@ -47,8 +54,8 @@ wide outside as inside, 1.8, 3.5 and 5.2 are expected; by the hoop stress inside
 _RUNS = 3
 _SETTLED, _ANY = 1.2, 1.1
 
-# A stress that is linear up to this part of the largest is linear.
-_LINEAR = 1e-3
+# A stress that is linear up to this part of the largest is linear; so is none at all.
+_LINEAR, _NOTHING = 1e-3, 1e-100
 
 
 @final
@@ -123,10 +130,11 @@ def refined_by_error(
 
     Raises:
         BuildError: the scene cannot be built, or has parts that no spacing that varies suits.
+        SceneError: particles of a body stand at given places.
         DivergedError, UnsoundError, ConvergenceError: a run failed.
     """
     simulation = Simulation.builder(scene).build()
-    Simulation.builder(_uneven(scene)).build()
+    _check_followed(scene, simulation)
     gain = _ANY / _SETTLED  # so that the first run is held to `_ANY`
     with TemporaryDirectory() as between:
         for run in range(1, _RUNS + 1):
@@ -143,28 +151,52 @@ def refined_by_error(
 
 
 @attrs.frozen(eq=False)
-class _Wanted:
-    """Spacings at the particles of one body."""
+class _Seen:
+    """What a run has shown of one body, at its particles."""
 
     positions: Array  # (n, d) [m]
     volumes: Array  # (n,) [m^d]
     own: Array  # spacing of the scene there, (n,) [m]
     bends: Array  # second derivative of the stress, each body's by its stiffness, (n,)
-    spacings: Array = attrs.field(factory=lambda: np.zeros(0))  # (n,) [m]
-    bounded: Array = attrs.field(factory=lambda: np.zeros(0))  # (n,) where `LEAST` is too large
+
+    @property
+    def level(self) -> Array:
+        """Own spacings over those that all particles alike should have, up to a constant, (n,)."""
+        return np.asarray(self.own * self.bends ** (2.0 / (4.0 + self.positions.shape[1])))
 
 
 @attrs.frozen(eq=False)
 class _AskedFor:
-    bodies: Mapping[str, _Wanted]
-    gain: float
+    """The spacings that the error of a run asks for."""
+
+    bodies: Mapping[str, _Seen]
+    usual: float  # the level at which the own spacing stays
+
+    def spacings(self, seen: _Seen) -> Array:
+        """Those of a body, (n,) [m]."""
+        return np.asarray(seen.own * np.clip(self.usual / seen.level, LEAST, 1.0))
+
+    @property
+    def gain(self) -> float:
+        """Particles of the scene's own spacings, all made finer alike, for one of those asked for,
+        where the sum of the squares of the error is the same [-]."""
+        squares = squares_before = count = count_before = 0.0
+        d = 1
+        for seen in self.bodies.values():
+            s, d = self.spacings(seen), seen.positions.shape[1]
+            squares += float(seen.volumes @ (seen.bends**2 * s**4))
+            squares_before += float(seen.volumes @ (seen.bends**2 * seen.own**4))
+            count += float(seen.volumes @ s**-d)
+            count_before += float(seen.volumes @ seen.own**-d)
+        finer = (squares / squares_before) ** 0.25
+        return float(finer**-d * count_before / count)
 
 
 def _asked_for(scene: Scene, simulation: Simulation, observers: Sequence[object]) -> _AskedFor:
     """The spacings that the error of a run asks for, of a scene whose own are coarser."""
     bending = _Bending.of(simulation)
     simulation.run(observers=[bending, *observers], progress=False)
-    linear = _LINEAR * max(bending.largest.values())
+    linear = max(_LINEAR * max(bending.largest.values()), _NOTHING)
     bodies = {}
     for body in simulation.model.bodies:
         p = body.particles
@@ -172,69 +204,39 @@ def _asked_for(scene: Scene, simulation: Simulation, observers: Sequence[object]
         own = _own_spacing(scene.bodies[body.name], body)[real]
         bends = np.sqrt(bending.squares[body.name][real]) / p.spacings[real] ** 2
         bends = np.maximum(bends, linear / own**2)
-        bodies[body.name] = _Wanted(p.positions[real], p.volumes[real], own, bends)
-    d = simulation.particles.dimension
-    every = list(bodies.values())
-    alike = [wanted.own * wanted.bends ** (2.0 / (4.0 + d)) for wanted in every]
-    usual = _median(np.concatenate(alike), np.concatenate([wanted.volumes for wanted in every]))
-    for name, level in zip(bodies, alike, strict=True):
-        share = usual / level
-        own = bodies[name].own
-        bodies[name] = attrs.evolve(
-            bodies[name], spacings=own * np.clip(share, LEAST, 1.0), bounded=share < LEAST
-        )
-    return _AskedFor(bodies, _gain(list(bodies.values()), d))
-
-
-def _gain(bodies: Sequence[_Wanted], d: int) -> float:
-    """Particles of the scene's own spacings, all made finer alike, for one of those wanted, where
-    the sum of the squares of the error is the same [-]."""
-    squares, squares_before, count, before = (
-        sum(float(np.sum(one.volumes * term(one))) for one in bodies)
-        for term in (
-            lambda one: one.bends**2 * one.spacings**4,
-            lambda one: one.bends**2 * one.own**4,
-            lambda one: one.spacings**-d,
-            lambda one: one.own**-d,
-        )
-    )
-    finer = (squares / squares_before) ** 0.25
-    return float(finer**-d * before / count)
+        bodies[body.name] = _Seen(p.positions[real], p.volumes[real], own, bends)
+    every = bodies.values()
+    levels = np.concatenate([seen.level for seen in every])
+    return _AskedFor(bodies, _median(levels, np.concatenate([seen.volumes for seen in every])))
 
 
 def _written(scene: Scene, found: _AskedFor, folder: Path, name: str) -> RefinedScene:
     """The scene with these spacings, in files."""
     folder.mkdir(parents=True, exist_ok=True)
-    finer = {
-        body: wanted
-        for body, wanted in found.bodies.items()
-        if np.any(wanted.spacings < wanted.own)
-    }
-    bodies = dict(scene.bodies)
-    for number, (body, wanted) in enumerate(finer.items(), 1):
-        which = f"-{number}" if len(finer) > 1 else ""
-        path = folder / f"{name}-spacing{which}.csv"
-        path.write_text(list_of(wanted.positions, wanted.spacings), encoding="utf-8")
+    finer = [body for body, seen in found.bodies.items() if seen.level.max() > found.usual]
+    bodies, told = dict(scene.bodies), {}
+    for number, body in enumerate(finer, 1):
+        seen = found.bodies[body]
+        path = folder / f"{name}-spacing{f'-{number}' if len(finer) > 1 else ''}.csv"
+        path.write_text(list_of(seen.positions, found.spacings(seen)), encoding="utf-8")
         bodies[body] = attrs.evolve(bodies[body], spacing={FILE: str(path)}, refine=())
+        told[body] = _told(bodies[body], seen, found.usual)
     graded = attrs.evolve(scene, bodies=bodies)
     path = folder / f"{name}.toml"
     path.write_text(graded.to_toml(folder), encoding="utf-8")
-    told = {body: _told(scene.bodies[body], bodies[body], wanted) for body, wanted in finer.items()}
     return RefinedScene(graded, found.gain, told, path)
 
 
-def _told(before: BodyScene, after: BodyScene, wanted: _Wanted) -> RefinedBody:
-    shape = construct("shapes", after.shape)
-    field = spacing_field(after, shape)
-    d = wanted.positions.shape[1]
-    least = wanted.positions[int(np.argmin(wanted.spacings))]
-    volumes = wanted.volumes
+def _told(body: BodyScene, seen: _Seen, usual: float) -> RefinedBody:
+    shape = construct("shapes", body.shape)
+    field = spacing_field(body, shape)
+    bounded = seen.level > usual / LEAST
     return RefinedBody(
         particles=predicted_count(field, shape),
-        before=float(np.sum(volumes / wanted.own**d)),
+        before=float(seen.volumes @ seen.own ** -seen.positions.shape[1]),
         spacings=(field.least, field.greatest),
-        place=tuple(least.tolist()),
-        bounded=float(np.sum(volumes * wanted.bounded) / np.sum(volumes)),
+        place=tuple(seen.positions[int(np.argmin(seen.own / seen.level))].tolist()),
+        bounded=float(seen.volumes @ bounded / seen.volumes.sum()),
     )
 
 
@@ -262,8 +264,8 @@ class _Bending:
         S = stress(observation)
         for body in simulation.model.bodies:
             name, material = body.name, body.material
-            scaled = S[body.extent] / np.sqrt(material.density * material.wave_speed**2)
-            squares, largest = self.local[name].squares(scaled), float(np.abs(scaled).max())
+            by_energy = S[body.extent] / np.sqrt(material.density * material.wave_speed**2)
+            squares, largest = self.local[name].squares(by_energy), float(np.abs(by_energy).max())
             if not self.last and name in self.squares:
                 squares = np.maximum(squares, self.squares[name])
                 largest = max(largest, self.largest[name])
@@ -275,7 +277,7 @@ def _own_spacing(scene: BodyScene, body: Body) -> Array:
     X = body.particles.positions
     if is_graded(scene):
         return spacing_field(scene, body.shape).at(X)
-    return np.full(len(X), float(scene.spacing))  # type: ignore[arg-type]  # a number
+    return np.full(len(X), least_spacing(scene))
 
 
 def _median(values: Array, weights: Array) -> float:
@@ -285,14 +287,19 @@ def _median(values: Array, weights: Array) -> float:
     return float(values[order][np.searchsorted(shares, 0.5 * shares[-1])])
 
 
-def _uneven(scene: Scene) -> Scene:
-    """The scene with spacings that vary hardly: it is refused by what none that varies suits."""
-    return attrs.evolve(
-        scene,
-        bodies={
-            name: body
-            if is_graded(body)
-            else attrs.evolve(body, spacing=f"{body.spacing!r}*(1 + 1e-3*cos(X/{body.spacing!r}))")
-            for name, body in scene.bodies.items()
-        },
-    )
+def _check_followed(scene: Scene, simulation: Simulation) -> None:
+    """Raise BuildError or SceneError, before anything runs, where a scene has parts or particles
+    that do not follow a spacing that varies, here hardly."""
+    bodies = {
+        name: scaled(body, 0.95)
+        if is_graded(body)
+        else attrs.evolve(body, spacing=f"{body.spacing!r}*(1 + 1e-3*cos(X/{body.spacing!r}))")
+        for name, body in scene.bodies.items()
+    }
+    other = Simulation.builder(attrs.evolve(scene, bodies=bodies)).build()
+    for one, same in zip(simulation.model.bodies, other.model.bodies, strict=True):
+        if np.array_equal(one.particles.positions, same.particles.positions):
+            raise SceneError(
+                f"body {one.name!r}: its particles stand at given places, which no spacing moves; "
+                "leave its discretisation out to refine it by its error"
+            )
