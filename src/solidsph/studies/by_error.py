@@ -45,8 +45,8 @@ WORTH = 2.5
 """Least number of particles of even spacings for one of those that follow the error.
 
 Particles in a lattice are more accurate than others. In rings under pressure, 2, 3 and 4 times as
-wide outside as inside, 1.8, 3.5 and 5.2 are expected; by the hoop stress inside, off by 0.14 %
-(root mean square), it is 1.2, 2.7 and 4.4.
+wide outside as inside, 1.8, 3.5 and 5.2 are expected; where the hoop stress inside is off by 0.14 %
+(root mean square), it is 0.9, 3.0 and 4.9, by interpolation between measured ones.
 """
 
 # A coarse run sees a narrow peak too low, and asks for too little: the next sees more of it. They
