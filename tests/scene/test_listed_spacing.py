@@ -158,11 +158,12 @@ def test_a_wrong_table_is_answered_by_one_sentence(spacing: Any, message: str) -
 
 
 def test_a_study_knows_files_by_what_they_hold(tmp_path: Path) -> None:
-    listed = body(tmp_path, "0,0,0.1\n")
+    text = "0,0,0.1\n0.5,0,0.1\n0,0.5,0.1\n0.5,0.5,0.1\n1,0.25,{}\n"
+    listed = body(tmp_path, text.format(0.12))
     builder = Simulation.builder().body("plate", shape=listed.shape, spacing=listed.spacing)
     scene = builder.material("neo-hookean", **SOFT).duration(1e-3).scene()
     case = SceneCase(scene, [], spacing=0.1)
     key = Task(case).key
     assert Task(case).key == key
-    body(tmp_path, "0,0,0.12\n")
+    body(tmp_path, text.format(0.14))  # the least spacing is the same
     assert Task(case).key != key
