@@ -51,6 +51,7 @@ def test_verbose_tells_what_is_done(scene: Path) -> None:
         assert done.returncode == 0
         for told in ("built 45 particles with", "the run begins: ", "recording into results/pull"):
             assert told in done.stderr
+        assert ": particles\n" in done.stderr
         assert "the run has ended: finished" in done.stderr
         assert "output at" not in done.stderr
         assert "bytes touched" in done.stdout
@@ -71,7 +72,8 @@ def test_a_program_hears_by_its_own_logging(caplog: pytest.LogCaptureFixture) ->
     with caplog.at_level(logging.DEBUG, "solidsph"):
         box(2).boundary("clamp", where="left").outputs(4).build().run()
     told = [record.getMessage() for record in caplog.records]
-    assert told[0].startswith("built 36 particles")
+    assert told[0].endswith("particles")
+    assert sum(line.startswith("built 36 particles") for line in told) == 1
     assert sum(line.startswith("output at t = ") for line in told) == 4
     assert told[-1] == "the run has ended: finished"
     assert all(record.levelno <= logging.INFO for record in caplog.records)

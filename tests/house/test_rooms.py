@@ -28,8 +28,8 @@ MAY_IMPORT = {
     "watch": "errors maths model interfaces scene run statics",
     "advice": "maths model interfaces registry scene run",
     "conformance": "errors maths model interfaces registry run",
-    "assembly": "errors maths model interfaces registry engines probes scene run results advice "
-    "conformance",
+    "assembly": "errors system maths model interfaces registry engines probes scene run results "
+    "advice conformance",
     "simulation": "errors interfaces scene run statics results watch assembly",
     "resumption": "errors system scene run results simulation",
     "costs": "errors system maths interfaces registry engines scene run simulation",

@@ -18,6 +18,7 @@ from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.particles import Face, Particles
+from solidsph.system.build_log import BUILD
 from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._pieces import finest_pieces
@@ -76,6 +77,7 @@ def fitted(
     """
     shape, real = sampled_once(shape), ~given.ghosts
     X, volumes = given.positions, given.volumes.copy()
+    BUILD.debug("volumes of %d", given.count)
     volumes[real] = fitted_volumes(
         discretisation, shape, spacing, X[real], volumes[real], disturbed
     )
@@ -86,6 +88,7 @@ def fitted(
             f"{volumes.min():.3g} m^{shape.dimension}; use a finer spacing, or another "
             "discretisation, such as 'conforming-lattice'",
         )
+    BUILD.debug("areas on the surface")
     faces = given.faces
     owners = np.unique(np.concatenate([face.particles for face in faces.values()]))
     # Areas of particles inside are those of whom the surface is nearest to.

@@ -17,6 +17,7 @@ from solidsph.maths.arrays import Array, Indices
 from solidsph.model.pair_search import PairSearch
 from solidsph.model.particles import Particles
 from solidsph.model.spacing import SpacingField, cells_over
+from solidsph.system.build_log import BUILD
 from solidsph_builtin.discretisations._checks import check_count, refusal
 from solidsph_builtin.discretisations._curves import graded_points
 from solidsph_builtin.discretisations._graded_fitting import graded_fit
@@ -49,6 +50,7 @@ def graded(discretisation: Discretisation, shape: Shape, spacing: SpacingField) 
         SceneError: there would be too many, or no particle has a place inside the surface.
     """
     shape = sampled_once(shape)
+    BUILD.debug("on the surface")
     outer = _outer(discretisation, shape, spacing)
     held = np.concatenate([outer, _row(shape, spacing, outer)])
     inner = _inner(discretisation, shape, spacing, held)

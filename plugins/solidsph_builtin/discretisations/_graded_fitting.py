@@ -13,6 +13,7 @@ from solidsph.interfaces.shape import Shape
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import Particles
 from solidsph.model.spacing import SpacingField, cells_over
+from solidsph.system.build_log import BUILD
 from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations._fitting import (
     FINER,
@@ -38,6 +39,7 @@ def graded_fit(
         SceneError: a volume would not be positive.
     """
     d, X = shape.dimension, given.positions
+    BUILD.debug("volumes of %d", given.count)
     points, weights = _quadrature(shape, spacing)
     everywhere = np.ones(given.count, dtype=np.bool_)
     volumes = Fit(X, spacing.at, None).positive_integrals(points, weights, everywhere)
@@ -50,6 +52,7 @@ def graded_fit(
             f"{X[worst].tolist()}: a particle would have the volume {volumes[worst]:.3g} m^{d}; "
             "use a finer spacing there",
         )
+    BUILD.debug("areas on the surface")
     faces = given.faces
     owners = np.unique(np.concatenate([face.particles for face in faces.values()]))
     off = np.abs(shape.signed_distance(X[owners])) / given.spacings[owners]

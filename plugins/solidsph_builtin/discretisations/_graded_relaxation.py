@@ -8,6 +8,7 @@ import numpy as np
 
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.pair_search import PairSearch
+from solidsph.system.build_log import BUILD
 from solidsph_builtin.discretisations._relaxation import REACH, pull
 
 # A step, and the longest, in spacings, from the first to the last.
@@ -33,6 +34,7 @@ def relaxed_by(
         return x
     for step in range(steps):
         if step % _SEARCH == 0:
+            BUILD.debug("spreading %d of %d, step %d of %d", free.sum(), len(x), step, steps)
             s = spacing(x)
             pairs = _near(x, free, (REACH + _SLACK) * s)
         a, b = pairs

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.maths.arrays import Array, Indices, Mask
+from solidsph.system.build_log import BUILD
 from solidsph_builtin.discretisations._nearest import beside
 
 # Particles repel each other up to this distance, in spacings: those across the diagonal of a cell.
@@ -56,8 +57,9 @@ def relaxed(
     some = np.flatnonzero(beside(X[free], X, 2.0 * widest))
     x, moves = X[some].copy(), free[some]
     sums, slack = _sums_by_arrays if moves.sum() < _MANY else _sums_by_loops, -1.0
-    for _ in range(steps):
+    for step in range(steps):
         if slack < 0.0:
+            BUILD.debug("spreading %d of %d, step %d of %d", moves.sum(), len(X), step, steps)
             sizes = spacing_at(x)
             slack = _SLACK * REACH * float(sizes.min())
             near = sums(x, sizes)

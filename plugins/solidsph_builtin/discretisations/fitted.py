@@ -13,6 +13,7 @@ from solidsph.interfaces.shape import Shape
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.particles import Particles
 from solidsph.model.spacing import SpacingField
+from solidsph.system.build_log import BUILD
 from solidsph_builtin.discretisations._cells import mean_spacing
 from solidsph_builtin.discretisations._checks import check_spacing
 from solidsph_builtin.discretisations._curves import even_points
@@ -108,8 +109,10 @@ class Fitted(GradedDiscretisation):
     ) -> tuple[Array, Mask, bool]:
         """Positions (n, d) [m], whether they are on the boundary (n,), and whether any particle is
         off the lattice."""
+        BUILD.debug("distances from the surface")
         reach = 2.0 * grid.half_diagonal
         distance = in_chunks(grid.size, lambda n: shape.distance_within(grid.positions(n), reach))
+        BUILD.debug("on the surface")
         outer, at_lattice = grid.snapped(_outer(shape, grid, distance, spacing, size))
         inner = grid.positions(_deep(shape, grid, distance, spacing, _CLEAR * size))
         inner = inner[~beside(outer, inner, _CLEAR * size)] if len(inner) else inner

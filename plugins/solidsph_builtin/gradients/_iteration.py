@@ -14,6 +14,7 @@ import numpy as np
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs, row_starts
 from solidsph.model.particles import Particles
+from solidsph.system.build_log import BUILD
 from solidsph_builtin.gradients._equal_rows import distinct_rows
 from solidsph_builtin.gradients._local_fits import LocalFits, portions
 from solidsph_builtin.gradients._overlapping_blocks import OverlappingBlocks
@@ -162,9 +163,10 @@ def _conjugate_gradients(
     best = x.copy()
     z = nearly_solved(r)
     p, along = z.copy(), np.sum(r * z, axis=(0, 1))
-    for _ in range(steps):
+    for done in range(steps):
         if least <= allowed:
             break
+        BUILD.debug("solving for the weights, step %d of %d at most", done, steps)
         gained = product(p)
         cost = np.sum(p * gained, axis=(0, 1))
         # What is left of polynomials is rounding, and may cost nothing or less.

@@ -36,6 +36,7 @@ from solidsph.scene.checks.terms import (
 from solidsph.scene.placed_parts import PlacedParts
 from solidsph.scene.scene import Scene
 from solidsph.scene.static_solver import expected_evaluations
+from solidsph.system.build_log import BUILD
 
 S = TypeVar("S", bound=BuiltScene)
 
@@ -88,6 +89,7 @@ class Assembler:
             probes=tuple(probes),
         )
         self._check_built(built)
+        BUILD.info("time step")
         stepped: S | None = self._problems.attempt(with_its_step, built)
         return self._problems.settled(stepped)
 
@@ -115,6 +117,7 @@ class Assembler:
 
     def _terms(self, model: DiscreteModel) -> list[Term]:
         """Bound boundaries and effects."""
+        BUILD.info("boundaries and effects")
         terms: list[Term] = []
         for kind, several in (
             ("boundaries", self._parts.handlers),
@@ -164,6 +167,7 @@ class Assembler:
         if statics is not None:
             n, d = model.particles.positions.shape
             evaluations = expected_evaluations(statics.solver, d, n * d)
+        BUILD.info("weights of neighbours")
         internal = problems.attempt(engine.prepare, model.bodies, stresses, evaluations)
         internal = problems.attempt(
             modified, problems.settled(internal), model.bodies, terms, stresses

@@ -9,7 +9,9 @@ from solidsph.errors import BuildError
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.smoothing_kernel import smoothing_kernel
+from solidsph.registry.registry import entry_of
 from solidsph.scene.part_maker import Parts
+from solidsph.system.build_log import BUILD
 
 
 def plain_body(name: str, parts: Parts, extent: slice) -> Body:
@@ -51,8 +53,12 @@ def make_body(name: str, parts: Parts, extent: slice) -> Body:
             ]
         )
     reach = smoothing.support_radius if smoothing.radii is None else smoothing.radii
+    if not body.shape.convex:
+        BUILD.info("body %r: which neighbours see each other", name)
     hidden = hidden_pairs(body.shape, particles, reach, moving=moving)
     body = attrs.evolve(body, hidden=hidden)
+    own = entry_of("gradients", formulation.gradient).name or type(formulation.gradient).__name__
+    BUILD.info("body %r: gradient %r", name, own)
     gradient = formulation.gradient.of_body(
         name, particles, body.smoothing, body.pairs, moving=moving
     )

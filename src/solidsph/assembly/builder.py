@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import time as clock
 from typing import TYPE_CHECKING, Generic, TypeVar, final
 
@@ -11,11 +10,10 @@ from solidsph.run.built_scene import BuiltScene
 from solidsph.run.hooks import load_hook_plugins
 from solidsph.scene.scene import Scene
 from solidsph.scene.scene_builder import SceneBuilder
+from solidsph.system.build_log import tell_built
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-LOG = logging.getLogger(__name__)
 
 S = TypeVar("S", bound=BuiltScene)
 
@@ -41,7 +39,7 @@ class Builder(SceneBuilder, Generic[S]):
         built = Assembler(self.scene(), manager).assemble(self._kind)
         seconds, pairs = clock.perf_counter() - begun, built.dynamics.internal.pair_count
         count = built.particles.count
-        LOG.info("built %d particles with %d pairs in %.3g s", count, pairs, seconds)
+        tell_built("built %d particles with %d pairs in %.3g s", count, pairs, seconds)
         return built
 
     def plot(self) -> Figure:

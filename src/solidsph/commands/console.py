@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import os
 import sys
+import time as clock
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from math import isfinite
-from typing import IO, Any
+from typing import IO, Any, final
 
 import attrs
 import click
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.markup import escape
 from rich.progress import (
     BarColumn,
@@ -24,6 +25,7 @@ from rich.progress import (
 )
 from rich.table import Table as RichTable
 
+from solidsph.commands.build_line import BuildLine
 from solidsph.interfaces.terms import Observation
 from solidsph.run.hooks import implementation
 from solidsph.run.progress import part_done
@@ -167,9 +169,29 @@ def known_facts() -> dict[str, Any]:
     return facts
 
 
+@final
+class _Display(Progress):
+    """Bars of runs, and while a scene is built the line that says what is done."""
+
+    def __init__(self, *columns: ProgressColumn, line: BuildLine, **settings: Any) -> None:
+        """Show the `columns` of every run; `settings` are those of `Progress`."""
+        self._line = line
+        super().__init__(*columns, **settings)
+
+    def get_renderables(self) -> Iterator[RenderableType]:
+        if not self.tasks:
+            yield self._line.text()
+            return
+        if text := self._line.text():
+            yield text
+        yield self.make_tasks_table(self.tasks)
+
+
 @contextmanager
 def progress(shown: bool, column: ProgressColumn | None = None) -> Iterator[Progress | None]:
     """Progress display on the standard error; None unless `shown` and on a terminal.
+
+    Builds within the block are shown too.
 
     Args:
         shown: whether it is wanted.
@@ -179,8 +201,11 @@ def progress(shown: bool, column: ProgressColumn | None = None) -> Iterator[Prog
         yield None
         return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    last = column or TimeRemainingColumn()
-    with Progress(*columns, last, console=err, transient=True) as display:
+    last, line = column or TimeRemainingColumn(), BuildLine(clock.monotonic)
+    with (
+        line.listening(),
+        _Display(*columns, last, line=line, console=err, transient=True) as display,
+    ):
         yield display
 
 

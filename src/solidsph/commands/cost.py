@@ -12,7 +12,7 @@ from typing import Any
 import attrs
 import click
 
-from solidsph.commands.console import Table, present, sweep_progress
+from solidsph.commands.console import Table, present, progress, sweep_progress
 from solidsph.commands.cost_options import axes_of, case_of, goal_of, seconds
 from solidsph.commands.limit_tables import ESTIMATED, limit_rows, measured_table, with_warnings
 from solidsph.commands.options import (
@@ -124,7 +124,8 @@ def cost(target: str, options: _Options) -> None:
         made = refined(wanted, target, options.folder(target), shown=options.progress)
         wanted = made.scene
     levels = ABOUT if made is not None and made.bodies else COARSER
-    case = case_of(wanted, given, options.search.of, options.references, levels)
+    with progress(options.progress):
+        case = case_of(wanted, given, options.search.of, options.references, levels)
     axes = axes_of(options.axes, case)
     scheduler = options.scheduler
     runner = Processes(options.workers) if scheduler is None else Cluster(scheduler)

@@ -9,7 +9,7 @@ import attrs
 import click
 
 from solidsph.advice import advise
-from solidsph.commands.console import Table, present
+from solidsph.commands.console import Table, present, progress
 from solidsph.commands.faces import face_rows, face_text
 from solidsph.commands.numbers import numbers, sizes
 from solidsph.commands.options import Output, flag, option, options, set_option
@@ -77,9 +77,10 @@ def explain(target: str, options: _Options) -> None:
     compiled: frozenset[Compilation] = frozenset()
     predictions = []
     for name, scene in scenes.items():
-        prediction, explanations[name] = _explained(
-            scene, machine, cluster, compiled, build=options.build
-        )
+        with progress(options.progress):
+            prediction, explanations[name] = _explained(
+                scene, machine, cluster, compiled, build=options.build
+            )
         compiled |= prediction.work.compilations
         predictions.append(prediction)
     facts = {

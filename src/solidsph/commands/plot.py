@@ -9,7 +9,7 @@ from pathlib import Path
 import attrs
 import click
 
-from solidsph.commands.console import present
+from solidsph.commands.console import present, progress
 from solidsph.commands.options import Output, option, options, output_option, set_option
 from solidsph.commands.records import records_in
 from solidsph.commands.target import name_of, resolve
@@ -93,7 +93,8 @@ def _of_scenes(target: str, options: _Options) -> Iterator[Path]:
     for path, scene in zip(
         _files(list(scenes), target, options.output), scenes.values(), strict=True
     ):
-        figure = Simulation.builder(scene).plot()
+        with progress(options.progress):
+            figure = Simulation.builder(scene).plot()
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=150, bbox_inches="tight")
         yield path

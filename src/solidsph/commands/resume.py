@@ -32,7 +32,8 @@ def resume(result: Path, options: _Options) -> None:
     """
     facts = []
     for path in records_in(result):
-        run = pending(path, until=options.until, force=options.force)
+        with progress(options.progress):
+            run = pending(path, until=options.until, force=options.force)
         if run is None:
             facts.append({"record": str(path), "outcome": f"{_outcome(path)} before"})
             text = f"{path} is {_outcome(path)}; --until T extends it"

@@ -182,7 +182,8 @@ def _run_scene(
     replaced = options.check_record(path)
     known = known_facts()
     known |= {"scene": target, "record": str(path), "warnings": []}
-    simulation, build = predictions.build_timed(scene)
+    with progress(options.progress):
+        simulation, build = predictions.build_timed(scene)
     references = references_of(scene, columns_of(simulation)) if scene.references else ()
     advice = advise(simulation)
     known["warnings"] += [warning.line for warning in advice]

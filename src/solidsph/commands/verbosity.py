@@ -44,3 +44,6 @@ def say_from(verbose: int, quiet: bool) -> None:
     logger.setLevel(level)
     if not any(isinstance(handler, _OnTheError) for handler in logger.handlers):
         logger.addHandler(_OnTheError())
+    for handler in logger.handlers:
+        if isinstance(handler, _OnTheError):
+            handler.setLevel(level)  # others hear more

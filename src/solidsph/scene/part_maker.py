@@ -43,6 +43,7 @@ from solidsph.scene.scene_data import (
     SceneData,
 )
 from solidsph.scene.scheme import completed
+from solidsph.system.build_log import BUILD
 
 # Up to this number, particles of a scene with mistakes are made to check its places too.
 _FEW = 1e6
@@ -246,6 +247,7 @@ def _readable(name: str, body: BodyScene) -> bool:
 def _particles_of(
     name: str, body: BodyScene, discretisation: Discretisation, shape: Shape
 ) -> Particles:
+    BUILD.info("body %r: particles", name)
     if not is_graded(body):
         return discretisation.particles(shape, body.spacing)  # type: ignore[arg-type]
     if not isinstance(discretisation, GradedDiscretisation):

@@ -10,6 +10,7 @@ from solidsph.interfaces.body import Body
 from solidsph.maths.arrays import Array, Mask
 from solidsph.model.neighbours import Pairs, listed_pairs
 from solidsph.model.pair_search import PairSearch
+from solidsph.system.build_log import BUILD
 
 _ROWS_AT_ONCE = 2048
 
@@ -25,6 +26,7 @@ def weighted_chunks(body: Body, wanted: Mask) -> Iterator[tuple[Pairs, Array]]:
     positions, cells = body.particles.positions, body.particles.cells
     search = PairSearch.of(positions, body.radii)
     for rows in _chunks(wanted):
+        BUILD.debug("%d of %d particles", rows.start, len(wanted))
         own, columns = search.near(np.arange(rows.start, rows.stop))
         count = rows.stop - rows.start
         pairs = listed_pairs(positions, own, columns, count, body.hidden, rows.start)
