@@ -37,8 +37,6 @@ _CLOSEST, _CLEAR = 0.7, 0.58
 _CELLS = 2.0
 # Steps of the relaxation.
 _STEPS = 200
-# Weight of a particle on the surface in sums over neighbours, in cells, as of `fitted`.
-_ON_SURFACE = 1.0 / 3.0
 # Bits of a place along an axis, for the order.
 _BITS = 20
 
@@ -74,9 +72,7 @@ def graded(discretisation: Discretisation, shape: Shape, spacing: SpacingField) 
     owners = attrs.evolve(owners, particles=at[owners.particles])
     owned = faces(surface, owners, X)
     given = without_ghosts(X, np.ones(len(X)), spacing.at(X), owned)
-    made = graded_fit(discretisation, shape, spacing, given)
-    on_surface = _ON_SURFACE * given.spacings**shape.dimension
-    return attrs.evolve(made, cells=np.where(onto, on_surface, made.volumes))
+    return graded_fit(discretisation, shape, spacing, given)
 
 
 def _outer(discretisation: Discretisation, shape: Shape, spacing: SpacingField) -> Array:

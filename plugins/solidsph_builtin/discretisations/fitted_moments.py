@@ -56,6 +56,10 @@ class FittedMoments(GradedDiscretisation):
             raise refusal(self, "the spacing varies, which `of` does not follow; use 'points'")
         return graded_fit(self, shape, spacing, self.of.graded_particles(shape, spacing))
 
+    def own_spacing(self, shape: Shape) -> SpacingField | None:
+        """That of the wrapped discretisation."""
+        return self.of.own_spacing(shape) if isinstance(self.of, GradedDiscretisation) else None
+
     def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
         """Where those of the wrapped discretisation do."""
         return self.of.ends_on_surface(shape, spacing)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
-import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from reprlib import repr as short
 from typing import Any, ClassVar
@@ -14,16 +12,24 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solidsph.interfaces.graded_discretisation import GradedDiscretisation
-from solidsph.interfaces.shape import Shape
+from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import Particles
 from solidsph.model.spacing import SpacingField
-from solidsph.system.encoding import decoded
-from solidsph.system.files import content, located
 from solidsph_builtin.discretisations._checks import check_spacing, refusal
+from solidsph_builtin.discretisations._fitting import ON_BOUNDARY
 from solidsph_builtin.discretisations._graded_fitting import graded_fit
 from solidsph_builtin.discretisations._grid import Grid, grid_over
-from solidsph_builtin.discretisations._nearest import nearest
+from solidsph_builtin.discretisations._nearest import Assignment, nearest
+from solidsph_builtin.discretisations._point_spacing import spacing_of_points
+from solidsph_builtin.discretisations._point_table import (
+    SPACING,
+    VOLUME,
+    PointTable,
+    check_columns,
+    point_table,
+    read_rows,
+)
 from solidsph_builtin.discretisations._surface import faces, sampled, without_ghosts
 
 # Closer than this, in spacings, two points coincide; a point outside by less than this is inside.
@@ -35,8 +41,6 @@ _ON_SURFACE = 0.1
 # Even, so that none lies half way between two points of a lattice.
 _SAMPLES = {1: 64, 2: 8, 3: 4}
 _CHUNK = 1 << 16
-# Size of a file of points: some 25 characters for each coordinate of 5e7 points in space.
-_MOST_BYTES = 2**32
 
 
 def _as_array(value: Any) -> Any:
@@ -51,6 +55,11 @@ def _as_array(value: Any) -> Any:
     return array
 
 
+def _as_tuple(value: Any) -> Any:
+    """A list as a tuple; anything else unchanged, for the check to refuse."""
+    return tuple(value) if isinstance(value, list) else value
+
+
 @attrs.frozen(eq=False)
 class Points(GradedDiscretisation):
     """Given points, in the order in which they are given.
@@ -58,21 +67,25 @@ class Points(GradedDiscretisation):
     They are either listed as `positions`, or read from a `file` with a row for each point and a
     column for each dimension: .npy, .csv with commas, or text with blanks; comments begin
     with #. It is a regular file of up to 4 GiB. A relative path begins in the
-    folder of the scene file, in Python in the working folder.
+    folder of the scene file, in Python in the working folder. Where rows hold more, or in another
+    order, `columns` names them: `["x", "y", "spacing", "volume"]`.
 
     Without given `volumes` that of a point is the part of the shape nearest to it, found by
     sampling and scaled to the exact total if the shape knows its volume. Each sample of the surface
     belongs to the nearest point. Tags are those of a lattice. There are no ghosts. A spacing that
     varies is to tell how far apart the points are: the support of each follows it, and volumes
-    that are not given integrate polynomials, as those of `fitted-moments` do.
+    that are not given integrate polynomials, as those of `fitted-moments` do. If the points have a
+    column with the spacing of each, that of the body is `"given"`.
 
     Raises:
-        SceneError: not exactly one of `positions` and `file` is given, or one cannot be read.
+        SceneError: not exactly one of `positions` and `file` is given, one cannot be read, or
+            `columns` are no columns.
     """
 
     positions: Array | None = attrs.field(default=None, converter=_as_array)  # (n, d) [m]
     file: str | Path | None = None
     volumes: Array | None = attrs.field(default=None, converter=_as_array)  # (n,) [m^d]
+    columns: Sequence[str] | None = attrs.field(default=None, converter=_as_tuple)
 
     # Points in the rectangle of the conformance kit.
     example: ClassVar[Mapping[str, Any]] = {
@@ -86,43 +99,69 @@ class Points(GradedDiscretisation):
         for name, value in (("positions", self.positions), ("volumes", self.volumes)):
             if value is not None and not isinstance(value, np.ndarray):
                 raise refusal(self, f"{name} must be numbers in equal rows, got {short(value)}")
+        if self.columns is not None:
+            check_columns(self, self.columns)
+            if VOLUME in self.columns and self.volumes is not None:
+                raise refusal(self, "volumes are given twice, also as a column; drop one")
 
     def particles(self, shape: Shape, spacing: float) -> Particles:
         """The points as particles, with the given `spacing`.
 
         Raises:
-            SceneError: the spacing is not positive, the file cannot be read, or a point is not
-                finite, outside the shape, at the same place as another, or without a volume.
+            SceneError: the spacing is not positive, the file cannot be read, the points come with
+                spacings, or a point is not finite, outside the shape, at the same place as another,
+                or without a volume.
         """
-        spacing = check_spacing(self, spacing)
-        return self._made(shape, spacing, lambda tree: self._nearest_volumes(shape, tree, spacing))
+        spacing, table = check_spacing(self, spacing), self._table(shape.dimension)
+        if table.spacings is not None:
+            raise refusal(
+                self,
+                f"the points come with spacings, and the body has the spacing {spacing:g} m; give "
+                'it spacing = "given", or leave out the column',
+            )
+        self._check_places(shape, table.positions, spacing)
+        tree, surface = cKDTree(table.positions), sampled(self, shape, spacing)
+        owned = faces(surface, nearest(tree, surface.points), table.positions)
+        if table.volumes is None:
+            volumes = self._nearest_volumes(shape, tree, spacing)
+        else:
+            volumes = self._checked(table.volumes, tree.n)
+        return without_ghosts(table.positions, volumes, spacing, owned)
 
     def graded_particles(self, shape: Shape, spacing: SpacingField) -> Particles:
         """The points as particles, with the spacing that the field has where they are.
 
         Raises:
-            SceneError: as of `particles`.
+            SceneError: as of `particles`, or the points come with other spacings.
         """
-        made = self._made(shape, spacing.least, lambda tree: np.ones(tree.n))
-        made = attrs.evolve(made, spacings=spacing.at(made.positions))
-        return made if self.volumes is not None else graded_fit(self, shape, spacing, made)
-
-    def _made(self, shape: Shape, spacing: float, volumes: Callable[[cKDTree], Array]) -> Particles:
-        """The points as particles with one spacing, and `volumes` (n,) where none are given."""
-        positions = self._positions(shape.dimension)
-        self._check_places(shape, positions, spacing)
-        tree = cKDTree(positions)
-        surface = sampled(self, shape, spacing)
-        owned = faces(surface, nearest(tree, surface.points), positions)
-        own = volumes(tree) if self.volumes is None else self._given_volumes(tree)
-        if not np.all(own > 0.0):
-            point = int(np.argmin(own > 0.0))
+        table = self._table(shape.dimension)
+        spacings = spacing.at(table.positions)
+        if table.spacings is not None and not np.allclose(spacings, table.spacings):
             raise refusal(
                 self,
-                f"point {point} is too close to others to be given a volume at a spacing of "
-                f"{spacing:g} m; use a smaller spacing, or give volumes",
+                'the points come with other spacings than the body; give it spacing = "given", or '
+                "leave out the column",
             )
-        return without_ghosts(positions, own, spacing, owned)
+        X = table.positions
+        self._check_places(shape, X, spacing.least)
+        surface = sampled(self, shape, spacing.least)
+        owned = faces(surface, _owners(shape, X, spacings, surface, spacing), X)
+        if table.volumes is not None:
+            return without_ghosts(X, self._checked(table.volumes, len(X)), spacings, owned)
+        return graded_fit(self, shape, spacing, without_ghosts(X, np.ones(len(X)), spacings, owned))
+
+    def own_spacing(self, shape: Shape) -> SpacingField | None:
+        """That of the column `spacing`, if there is one.
+
+        Raises:
+            SceneError: as of `particles`; a spacing is not positive, they are far from the
+                distances of the points, or those of neighbours are too different.
+        """
+        if self.columns is None or SPACING not in self.columns:
+            return None
+        table = self._table(shape.dimension)
+        assert table.spacings is not None
+        return spacing_of_points(self, table.positions, table.spacings)
 
     def ends_on_surface(self, shape: Shape, spacing: float) -> bool:
         """True if most of the surface is nearest to points on it.
@@ -131,44 +170,17 @@ class Points(GradedDiscretisation):
             SceneError: as of `particles`, where the file or the rows are wrong.
         """
         spacing = check_spacing(self, spacing)
-        positions, surface = self._positions(shape.dimension), sampled(self, shape, spacing)
+        positions, surface = self._table(shape.dimension).positions, sampled(self, shape, spacing)
         depths = np.abs(shape.signed_distance(positions)) / spacing
         on = depths[cKDTree(positions).query(surface.points)[1]] <= _ON_SURFACE
         areas = np.linalg.norm(surface.area_vectors, axis=1)
         return bool(areas[on].sum() > 0.5 * areas.sum())
 
-    def _positions(self, dimension: int) -> Array:
-        """The points as a new array (n, d) [m]."""
-        given = self._read(Path(self.file)) if self.file is not None else self.positions
-        points = np.array(given, dtype=np.float64, order="C")
-        if points.ndim == 1 and dimension == 1:
-            points = points[:, np.newaxis]
-        if points.ndim != 2 or points.shape[1] != dimension or not len(points):
-            raise refusal(
-                self,
-                f"the positions must be rows of {dimension} coordinates, as the shape has "
-                f"dimensions, got an array of shape {points.shape}",
-            )
-        bad = ~np.isfinite(points).all(axis=1)
-        if bad.any():
-            row = int(np.argmax(bad))
-            raise refusal(self, f"row {row} of the positions is not finite: {points[row].tolist()}")
-        return points
-
-    def _read(self, path: Path) -> Array:
-        try:
-            with warnings.catch_warnings():
-                # For a file without any number NumPy only warns.
-                warnings.simplefilter("error", UserWarning)
-                data, suffix = content(located(path), _MOST_BYTES), path.suffix.lower()
-                if suffix == ".npy":
-                    loaded = np.load(io.BytesIO(data), allow_pickle=False)
-                    return np.asarray(loaded, dtype=np.float64)
-                return _table(decoded(data), "," if suffix == ".csv" else None)
-        except (OSError, ValueError, TypeError, EOFError, UserWarning, MemoryError) as error:
-            raise refusal(
-                self, f"cannot read positions from {str(path)!r}: {error}; expected rows of numbers"
-            ) from error
+    def _table(self, dimension: int) -> PointTable:
+        """The points, read anew."""
+        given = self.positions if self.file is None else read_rows(self, Path(self.file))
+        table = point_table(self, given, self.columns, dimension)
+        return table if self.volumes is None else attrs.evolve(table, volumes=self.volumes)
 
     def _check_places(self, shape: Shape, positions: Array, spacing: float) -> None:
         distance = shape.signed_distance(positions)
@@ -189,22 +201,22 @@ class Points(GradedDiscretisation):
                 f"points {a} and {b} are at the same place, {positions[a].tolist()} m; drop one",
             )
 
-    def _given_volumes(self, tree: cKDTree) -> Array:
-        assert self.volumes is not None
-        if self.volumes.shape != (tree.n,):
+    def _checked(self, volumes: Array, count: int) -> Array:
+        """The given `volumes` as a new array."""
+        if volumes.shape != (count,):
             raise refusal(
                 self,
-                f"volumes must be one number for each of the {tree.n} points, got an array of "
-                f"shape {self.volumes.shape}",
+                f"volumes must be one number for each of the {count} points, got an array of "
+                f"shape {volumes.shape}",
             )
-        bad = ~(np.isfinite(self.volumes) & (self.volumes > 0.0))
+        bad = ~(np.isfinite(volumes) & (volumes > 0.0))
         if bad.any():
             row = int(np.argmax(bad))
             raise refusal(
                 self,
-                f"volumes must be positive and finite, got {self.volumes[row]} for point {row}",
+                f"volumes must be positive and finite, got {volumes[row]} for point {row}",
             )
-        return self.volumes.copy()
+        return volumes.copy()
 
     def _nearest_volumes(self, shape: Shape, tree: cKDTree, spacing: float) -> Array:
         """Volume of the shape nearest to each point, (n,) [m^d]."""
@@ -222,29 +234,28 @@ class Points(GradedDiscretisation):
             hits += nearest(tree, points).sums(np.ones(len(points)), tree.n)
         total = shape.volume()
         volumes: Array = hits * (samples.cell_volume if total is None else total / hits.sum())
+        if not np.all(volumes > 0.0):
+            point = int(np.argmin(volumes > 0.0))
+            raise refusal(
+                self,
+                f"point {point} is too close to others to be given a volume at a spacing of "
+                f"{spacing:g} m; use a smaller spacing, or give volumes",
+            )
         return volumes
 
 
-def _table(text: str, delimiter: str | None) -> Array:
-    """Rows of numbers.
+def _owners(
+    shape: Shape, positions: Array, spacings: Array, surface: Surface, spacing: SpacingField
+) -> Assignment:
+    """The owner of each sample of the `surface`: the nearest point.
 
-    Raises:
-        ValueError: a row holds something else.
+    If there are points on all of the surface, it is the nearest of those: where they are sparse, as
+    in the middle of faces, one inside may be nearer, and would leave the areas unfitted.
     """
-    try:
-        return np.loadtxt(io.StringIO(text), delimiter=delimiter, ndmin=2)
-    except ValueError as cause:
-        lines = (line.partition("#")[0].strip() for line in text.splitlines())
-        first = next(filter(None, lines), "")
-        if any(_is_number(word) for word in first.split(delimiter)):
-            raise
-        hint = f"its first line {short(first)} is not a row of numbers; begin a header with '#'"
-        raise ValueError(f"{cause}: {hint}") from None
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+    at = np.flatnonzero(np.abs(shape.signed_distance(positions)) <= ON_BOUNDARY * spacings)
+    if len(at):
+        outer = cKDTree(positions[at])
+        if np.all(outer.query(surface.points)[0] <= spacing.at(surface.points)):
+            found = nearest(outer, surface.points)
+            return attrs.evolve(found, particles=at[found.particles])
+    return nearest(cKDTree(positions), surface.points)

@@ -21,3 +21,12 @@ class GradedDiscretisation(Discretisation):
         Raises:
             SceneError: as of `particles`.
         """
+
+    def own_spacing(self, shape: Shape) -> SpacingField | None:
+        """The spacing that the particles come with, for bodies with `spacing = "given"`; None, the
+        default, if they follow what the scene says.
+
+        Raises:
+            SceneError: it cannot be read, or does not suit a body.
+        """
+        return None

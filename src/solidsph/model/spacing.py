@@ -15,6 +15,9 @@ STEEPEST = 0.5
 """Largest growth of a spacing over a distance [-]: less than twofold over a cubic spline's support.
 A particle's neighbours are then about as far apart as the particle itself is from them."""
 
+MOST_RATIO = 100.0
+"""Largest ratio of spacings in one body: its boundary is sampled for the least everywhere."""
+
 # A cell no larger than the spacing at its centre holds none below two thirds of that, as long as
 # the spacing grows no faster than `STEEPEST`.
 _FINEST_PART = 1.0

@@ -1,4 +1,5 @@
-"""The spacing of a body as a scene states it: a number, a formula, a list, or finer somewhere."""
+"""The spacing of a body as a scene states it: a number, a formula, a list, finer at some places, or
+that with which its particles come."""
 
 from __future__ import annotations
 
@@ -18,6 +19,7 @@ from solidsph.maths.formulas import Expression
 from solidsph.model.particles import Particles
 from solidsph.model.regions import AXES, select
 from solidsph.model.spacing import (
+    MOST_RATIO,
     STEEPEST,
     STEEPEST_STEP,
     Cells,
@@ -26,6 +28,7 @@ from solidsph.model.spacing import (
     smooth_step,
 )
 from solidsph.registry.construct import construct
+from solidsph.scene.given_spacing import GIVEN, check_given, given_field, given_scaled
 from solidsph.scene.listed_spacing import check_list, listed_spacing, with_factor
 from solidsph.scene.scene_data import BodyScene
 
@@ -36,9 +39,6 @@ _MOST_CELLS = 2_000_000
 
 # Places inside a region, at most, by which the distance from it is known.
 _MOST_PLACES = 400_000
-
-# The boundary is sampled for the least spacing everywhere.
-_MOST_RATIO = 100.0
 
 # A slope is read by differences over this part of the spacing, and may be too large by that of
 # the third derivative.
@@ -63,7 +63,12 @@ def scaled(body: BodyScene, factor: float) -> BodyScene:
     """The body with its spacing times a factor everywhere.
 
     Where it would then grow too fast, it returns over a longer way.
+
+    Raises:
+        SceneError: its particles come with spacings.
     """
+    if body.spacing == GIVEN:
+        return given_scaled(body, factor)
     if isinstance(body.spacing, (str, Mapping)):
         own = body.spacing
         finer = f"{factor!r}*({own})" if isinstance(own, str) else with_factor(own, factor)
@@ -91,7 +96,9 @@ def least_spacing(body: BodyScene) -> float:
 
 def check_words(body: BodyScene) -> None:
     """Raise SceneError if a spacing that varies cannot be read, whatever the shape."""
-    if isinstance(body.spacing, str):
+    if body.spacing == GIVEN:
+        check_given(body)
+    elif isinstance(body.spacing, str):
         Expression.parse(body.spacing, AXES)
     if isinstance(body.spacing, Mapping):
         check_list(body.spacing)
@@ -105,6 +112,8 @@ def spacing_field(body: BodyScene, shape: Shape) -> SpacingField:
     Raises:
         SceneError: it is not positive and finite, or grows too fast, or a place to refine is wrong.
     """
+    if body.spacing == GIVEN:
+        return given_field(body, shape)
     entries = [_refinement(entry) for entry in body.refine]
     base = _base(body.spacing, shape)
     if not entries:
@@ -172,10 +181,10 @@ def _checked(spacing: Callable[[Array], Array], body: BodyScene, shape: Shape) -
             f"{_MOST_CELLS:.0e} particles at most; use larger spacings, or check the unit of the "
             "shape"
         )
-    if greatest > _MOST_RATIO * least:
+    if greatest > MOST_RATIO * least:
         raise SceneError(
             f"the spacing is {least:.3g} m at {_place(X[worst])} and {greatest:.3g} m elsewhere; "
-            f"it may vary by a factor of {_MOST_RATIO:g} in one body"
+            f"it may vary by a factor of {MOST_RATIO:g} in one body"
         )
     if isinstance(body.spacing, str):  # the growth of the others is limited by what they are
         _check_growth(spacing, cells)

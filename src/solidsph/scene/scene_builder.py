@@ -54,8 +54,8 @@ class SceneBuilder(ABC):
     ) -> Self:
         """Add a body; `spacing` in metres, `tags` name sets of its particles.
 
-        The spacing may be a formula of X, Y and Z, or `{"file": path}`, a list of places and
-        spacings. Each entry of `refine` is a mapping with
+        The spacing may be a formula of X, Y and Z; `{"file": path}`, a list of places and
+        spacings; or "given" by the particles themselves. Each entry of `refine` is a mapping with
         `where`, a face or a condition, the `spacing` there, and the distance `over` which that of
         the body returns.
         """
