@@ -166,7 +166,7 @@ def _conjugate_gradients(
     for done in range(steps):
         if least <= allowed:
             break
-        BUILD.debug("solving for the weights, step %d of %d at most", done, steps)
+        BUILD.debug("step %d of %d at most", done, steps)
         gained = product(p)
         cost = np.sum(p * gained, axis=(0, 1))
         # What is left of polynomials is rounding, and may cost nothing or less.
