@@ -32,7 +32,13 @@ class FoldingStrip(Case):
     title = "A strip that folds onto itself"
     source = "matter does not pass through itself"
     sweep = {"across": (3, 4, 5)}
-    trials = {"folded flat": Trial(brief={"across": 3, "duration": 1.0})}
+    trials = {
+        "folded flat": Trial(
+            brief={"across": 3, "duration": 1.0},
+            known="the energy is off by 0.11 % at the default step, by 0.08 % at 0.6 of the "
+            "critical step; legs of three particles across pass through each other",
+        )
+    }
 
     nearer: float = number(default=0.82)  # way of the ends towards each other, over the length [-]
     across: int = 4  # spacings through the thickness

@@ -43,16 +43,12 @@ class NotchedSheet(Case):
     source = "the two grips carry the same force; matter does not turn inside out"
     sweep = {"across": (10, 20)}
     studies = {
-        "hourglass": "at 40 spacings a side neighbours beside the grips move against each other "
-        "from a stretch of 3.5 on; one trial has control, which resists",
+        "hourglass": "beside the grips neighbours may move against each other from a stretch of "
+        "3.5 on; one trial has control, which resists",
     }
     trials = {
         "to a stretch of 4": Trial(brief={"across": 10}),
-        "to a stretch of 4, finer": Trial(
-            {"across": 40},
-            known="beyond a stretch of 3.5 neighbours beside the grips move against each other, "
-            "which no energy resists; with hourglass control they do not",
-        ),
+        "to a stretch of 4, finer": Trial({"across": 40}),
         "to a stretch of 4, finer, with hourglass control": Trial(
             {"across": 40, "hourglass-control.strength": 0.5}
         ),
