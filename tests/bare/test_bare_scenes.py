@@ -29,8 +29,8 @@ SHORT = {
     "lame-ring": "8 across: radial stress 3.8 %, at the corners; elsewhere 1.7 %",
     "inflated-ring-0.4999": "8 across: growth 1.7 %; pressure zigzags by 10 %",
     "sheet-0.49-whole": "peak stress 0.45 % at 10 across, 0.46 % at 20, within its bar",
-    "kirsch": "peak stress 0.2 % at 20 across, 0.9 % at 40, within its bar",
-    "hollow-ball": "9 across: hoop stress 2.6 %",
+    "kirsch": "peak stress 0.1 % at 20 across, 0.6 % at 40, within its bar",
+    "hollow-ball": "9 across: radial stress 3.1 %, hoop stress 2.8 %",
     "heavy-ball": "8 across: shrinkage 2.5 %, pressure 2.9 %",
     "csm3": "0.04 % at 3 across, -0.24 % at 5, within its bar",
 }
