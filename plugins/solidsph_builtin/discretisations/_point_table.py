@@ -14,7 +14,7 @@ import numpy as np
 
 from solidsph.interfaces.discretisation import Discretisation
 from solidsph.maths.arrays import Array
-from solidsph.system.encoding import decoded
+from solidsph.system.encoding import decoded, is_number
 from solidsph.system.files import content, located
 from solidsph_builtin.discretisations._checks import refusal
 
@@ -126,15 +126,7 @@ def _table(text: str, delimiter: str | None) -> Array:
     except ValueError as cause:
         lines = (line.partition("#")[0].strip() for line in text.splitlines())
         first = next(filter(None, lines), "")
-        if any(_is_number(word) for word in first.split(delimiter)):
+        if any(is_number(word) for word in first.split(delimiter)):
             raise
         hint = f"its first line {short(first)} is not a row of numbers; begin a header with '#'"
         raise ValueError(f"{cause}: {hint}") from None
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

@@ -29,7 +29,7 @@ from solidsph.maths.arrays import Array, Indices
 from solidsph.model.regions import AXES
 from solidsph.model.spacing import STEEPEST
 from solidsph.scene.named_files import FILE
-from solidsph.system.encoding import decoded
+from solidsph.system.encoding import decoded, is_number
 from solidsph.system.files import content, located
 
 FACTOR = "factor"
@@ -158,7 +158,7 @@ def _read(text: str, dimension: int) -> tuple[Array, Array]:
     columns = f"its columns must be {', '.join(names)}, in metres"
     if heading == names:
         lines[lines.index(first)] = ""
-    elif first and not any(map(_is_number, heading)):
+    elif first and not any(map(is_number, heading)):
         raise ValueError(f"{columns}, got the heading {short(first)}")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of an empty file
@@ -177,11 +177,3 @@ def _read(text: str, dimension: int) -> tuple[Array, Array]:
     spacings = np.full(len(places), inf)
     np.minimum.at(spacings, which, rows[:, -1])
     return places, spacings
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

@@ -1,4 +1,4 @@
-"""Decodes text as editors and spreadsheets write it."""
+"""Text as editors and spreadsheets write it: decoded, and which of its words are numbers."""
 
 from __future__ import annotations
 
@@ -18,3 +18,12 @@ def decoded(data: bytes) -> str:
     except UnicodeDecodeError as cause:
         raise ValueError(f"it is not in UTF-8 ({cause}); save it so") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def is_number(word: str) -> bool:
+    """Whether a word of a text is a number, infinite ones and NaN included."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
