@@ -226,7 +226,7 @@ def faces_by(
         products = (area[:, :, None] * x[:, None, :]).reshape(len(x), d * d)
         sizes = np.linalg.norm(area, axis=1)
         weights = np.column_stack([area, products, sizes])
-        found = fit_of(X).integrals(points, weights, sizes)
+        found = fit_of(X).integrals(points, weights)
         some = np.flatnonzero(np.abs(found[:, -1]) > _ROUNDING * np.abs(found[:, -1]).max())
         vectors, about_middle = found[some, :d], found[some, d:-1].reshape(-1, d, d)
         moments = about_middle - vectors[:, :, None] * (X[some] - middle)[:, None, :]

@@ -96,15 +96,14 @@ class Fit:
     def _tree(self) -> cKDTree:
         return cKDTree(self.particles)
 
-    def integrals(self, points: Array, weights: Array, sizes: Array) -> Array:
+    def integrals(self, points: Array, weights: Array) -> Array:
         """Integrals of the functions by a quadrature, (n, k), from its points (m, d) [m] and their
-        weights (m, k); the integrals of the `sizes` (m,) are positive.
+        weights (m, k); those of the last are positive.
 
         Where a particle would get less than a part of what is nearest to it, the points around it
         get fits of lower degree.
         """
-        degree, _ = self._degrees(points, sizes, _LEAST_PART * self._nearest(points, sizes))
-        return self._integrals(points, weights, degree)
+        return self._above(points, weights, _LEAST_PART * self._nearest(points, weights[:, -1]))
 
     def positive_integrals(self, points: Array, weights: Array, wanted: Mask) -> Array:
         """The same with one weight for each point, (m,), and positive where `wanted`, (n,).
@@ -114,7 +113,7 @@ class Fit:
         lower degree. A particle that still has much less than what is nearest to it gets the rest
         from its neighbours.
         """
-        found = self._degrees(points, weights, np.where(wanted, 0.0, -np.inf))[1]
+        found = self._above(points, weights[:, None], np.where(wanted, 0.0, -np.inf))[:, 0]
         least = np.where(wanted, _LEAST_VOLUME * self._nearest(points, weights), -np.inf)
         return self._with_least(found, least)
 
@@ -159,14 +158,13 @@ class Fit:
             gain[refused], taken[refused] = 0.0, 0.0
         return integrals
 
-    def _degrees(self, points: Array, sizes: Array, least: Array) -> tuple[Indices, Array]:
-        """The degree of the fit at each point (m,), and the integrals of the `sizes` (m,) with it,
-        (n,), more than the `least` (n,) if some degree gives more."""
+    def _above(self, points: Array, weights: Array, least: Array) -> Array:
+        """Integrals of the weights (m, k), (n, k), by fits of a degree at each point with which
+        those of the last are more than the `least` (n,), if some degree gives more."""
         degree = np.full(len(points), self._rule.degree)
-        weights = sizes[:, None]
         result = self._integrals(points, weights, degree)
         for lower in (1, 0):
-            poor = np.flatnonzero(result[:, 0] <= least)
+            poor = np.flatnonzero(result[:, -1] <= least)
             if not poor.size:
                 break
             around = self._depending_on(points, poor)
@@ -174,7 +172,7 @@ class Fit:
             result -= self._integrals(*some, degree[around])
             degree[around] = lower
             result += self._integrals(*some, degree[around])
-        return degree, result[:, 0]
+        return result
 
     @cached_property
     def _rule(self) -> Rule:
@@ -323,14 +321,16 @@ def _fits(weight: Array, offsets: Array, degree: Indices, rule: Rule) -> Array:
         np.multiply(basis[:, known[tuple(power)]], offsets[:, :, axis], out=basis[:, number])
     moments = (basis * weight[:, None, :]) @ basis.transpose(0, 2, 1)
     accepted = np.zeros(weight.shape)
-    for number in range(1 + int(degree.max(initial=0))):
-        some = np.flatnonzero(degree >= number)
+    waiting = np.ones(len(degree), dtype=np.bool_)
+    for number in range(int(degree.max(initial=0)), -1, -1):
+        some = np.flatnonzero(waiting & (degree >= number))
         own = slice(None) if len(some) == len(degree) else some  # without copies
         size = int(np.sum(degrees <= number))
         factors = _first_column(moments[own, :size, :size], rule.determined)
         fitted = np.einsum("mjk,mj->mk", basis[own, :size], factors)
         safe = np.abs(weight[own] * fitted).sum(axis=1) <= rule.largest_sum
         accepted[some[safe]] = fitted[safe]
+        waiting[some[safe]] = False
     return accepted
 
 

@@ -18,7 +18,7 @@ def shares(particles: Array) -> Array:
     parts = (np.arange(400) + 0.5) / 400
     points = np.outer(1.0 - parts, particles[0]) + np.outer(parts, particles[-1])
     sizes = np.full(400, np.linalg.norm(particles[-1] - particles[0]) / 400)
-    found: Array = Fit(particles, 1.0, grid).integrals(points, sizes[:, None], sizes)[:, 0]
+    found: Array = Fit(particles, 1.0, grid).integrals(points, sizes[:, None])[:, 0]
     return found
 
 
@@ -57,7 +57,7 @@ def test_a_corner_gets_a_part_of_what_is_nearest_to_it() -> None:
     fit, (points, weights) = eighth_of_a_ball(), samples()
     wanted = np.ones(len(fit.particles), dtype=np.bool_)
     corner = int(np.argmin(np.linalg.norm(fit.particles, axis=1)))
-    alone = fit._degrees(points, weights, np.zeros(len(wanted)))[1]
+    alone = fit._above(points, weights[:, None], np.zeros(len(wanted)))[:, 0]
     assert alone[corner] < 0.25 / 8.0
     found = fit.positive_integrals(points, weights, wanted)
     assert found[corner] == pytest.approx(0.3 / 8.0)
