@@ -11,7 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solidsph.maths.arrays import Array, Mask
+from solidsph.engines.compiled.fixed.partition import thread_count
+from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.neighbours import Pairs, row_starts
 from solidsph.model.particles import Particles
 from solidsph.system.build_log import BUILD
@@ -40,6 +41,11 @@ _FIRST = 30
 _MOST, _LEAST_OF_SUMS = 300, 30
 _PAIR_STEPS, _PAIR_STEPS_OF_SUMS = 2e8, 3e8
 
+# Slices of the rows, each with sums of its own.
+_SLICES = 8
+# Nanoseconds that a pair takes in a pass, roughly.
+_PER_PAIR = 20
+
 
 def solved(
     pairs: Pairs,
@@ -66,7 +72,8 @@ def solved(
         sizes: spacings in units of the length, (n,).
     """
     d = particles.dimension
-    compiled = passes(d, degree)
+    threads = thread_count(_PER_PAIR * pairs.count)
+    compiled = passes(d, degree, threads > 1)
     sums = _sums(pairs, close, particles, free, degree, length)
     blocks = compiled.diagonal_blocks(sums)
     diagonal = np.einsum("nii->ni", blocks)
@@ -134,8 +141,9 @@ def _sums(
     root = np.concatenate(roots)
     kept = close > 0.0
     columns = pairs.columns[kept]
+    starts = row_starts(np.bincount(pairs.rows[kept], minlength=particles.count))
     return Sums(
-        row_starts(np.bincount(pairs.rows[kept], minlength=particles.count)),
+        starts,
         columns.astype(np.int32),
         particles.positions,
         close[kept] * particles.cells[columns],
@@ -143,7 +151,23 @@ def _sums(
         (root @ root.transpose(0, 2, 1))[kinds],
         np.concatenate(units)[kinds],
         length,
+        _slices(starts, columns, free > 0.0),
     )
+
+
+def _slices(starts: Indices, columns: Indices, counts: Mask) -> Indices:
+    """Slices of the rows with as many pairs each of those that count (n,), as `Sums` has them."""
+    rows = np.flatnonzero(counts)
+    done = np.cumsum(np.diff(starts)[rows])
+    parts = np.searchsorted(done, done[-1] * np.arange(1, _SLICES) / _SLICES)
+    slices = []
+    for own in np.split(rows, parts):
+        if own.size:
+            first, end = int(own[0]), int(own[-1]) + 1
+            reached = columns[starts[first] : starts[end]]
+            low, high = min(first, reached.min()), max(end, reached.max() + 1)
+            slices.append((first, end, low, high))
+    return np.array(slices, dtype=np.intp).reshape(-1, 4)
 
 
 def _conjugate_gradients(

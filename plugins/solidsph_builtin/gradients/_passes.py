@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import prange
 
 from solidsph.engines.compiled.jit import njit
 from solidsph_builtin.gradients._local_fits import factors_of
@@ -28,6 +29,8 @@ class Sums(NamedTuple):
     inverses: Any  # (n, k, k) of the moments of the functions that keep their gradient
     units: Any  # (n,) of the offsets in these functions [m]
     length: float  # unit of the offsets that L is multiplied by [m]
+    # (s, 4) first row and end of each slice of the rows, first particle that they reach and end
+    slices: Any
 
 
 class Passes(NamedTuple):
@@ -54,8 +57,11 @@ class Passes(NamedTuple):
 
 
 @cache
-def passes(dimension: int, degree: int) -> Passes:
-    """The passes for functions of the first or second `degree` that keep their gradient."""
+def passes(dimension: int, degree: int, threaded: bool) -> Passes:
+    """The passes for functions of the first or second `degree` that keep their gradient.
+
+    Results do not depend on the number of threads.
+    """
     d = dimension
     # In the order of the inverses; an array, since there may be none.
     factors = np.array(factors_of(d, degree), dtype=np.intp).reshape(-1, 2)
@@ -127,14 +133,13 @@ def passes(dimension: int, degree: int) -> Passes:
             out[p, 0, 0] += own * total
         return out
 
+    # What the rows from `first` to `end` add to particles from `low` on.
     @njit(fastmath=_FAST)
-    def product(sums, multipliers):
-        n = len(sums.starts) - 1
+    def add_rows(sums, multipliers, first, end, low, out):
         alone = multipliers.shape[1] == 1
-        out = np.zeros(multipliers.shape)
         w, x, b = scratch(sums.starts)
         y, t, part = np.zeros((d, len(w))), np.empty(k), np.empty(k)
-        for p in range(n):
+        for p in range(first, end):
             if sums.shares[p] == 0.0:
                 continue
             begin, count, whole = row(sums, p, w, x, b)
@@ -168,15 +173,32 @@ def passes(dimension: int, degree: int) -> Passes:
                     value = sums.shares[p] * (yc[m] - w[m] * kept)
                     yc[m] = value
                     total += value
-                out[p, 0, c] -= total
+                out[p - low, 0, c] -= total
             for m in range(count):
-                q = sums.columns[begin + m]
+                q = sums.columns[begin + m] - low
                 for c in range(d):
                     value = y[c, m]
                     out[q, 0, c] += value
                     if not alone:
                         for i in range(d):
                             out[q, 1 + i, c] -= value * x[i, m]
+
+    @njit(parallel=threaded)
+    def add_slices(sums, multipliers, ends, parts):
+        for s in prange(len(ends)):
+            first, end, low, high = sums.slices[s]
+            add_rows(sums, multipliers, first, end, low, parts[ends[s] - (high - low) : ends[s]])
+
+    @njit
+    def product(sums, multipliers):
+        slices = sums.slices
+        ends = np.cumsum(slices[:, 3] - slices[:, 2])
+        parts = np.zeros((ends[-1], multipliers.shape[1], d))
+        add_slices(sums, multipliers, ends, parts)
+        out = np.zeros(multipliers.shape)
+        for s in range(len(slices)):
+            low, high = slices[s, 2:]
+            out[low:high] += parts[ends[s] - (high - low) : ends[s]]
         return out
 
     @njit
@@ -311,34 +333,51 @@ def passes(dimension: int, degree: int) -> Passes:
             out[at : at + m + 1] = matrix[m, : m + 1]
             at += m + 1
 
-    # By loops, since the threads of a linear algebra library wait for each other at every block.
+    # The solution of a block from r (m, d), in its place.
     @njit(fastmath=_FAST)
-    def add_solutions(ends, members, factors, r, z):
-        x = np.empty((d, np.diff(ends).max()), np.float32)
+    def solve(factors, x):
         first = 0
-        for block in range(len(ends) - 1):
-            begin, count = ends[block], ends[block + 1] - ends[block]
-            for m in range(count):
-                line = factors[first : first + m + 1]
-                first += m + 1
+        for m in range(x.shape[1]):
+            line = factors[first : first + m + 1]
+            first += m + 1
+            for c in range(d):
+                xc, value = x[c], x[c, m]
+                for j in range(m):
+                    value -= line[j] * xc[j]
+                xc[m] = value / line[m]
+        for m in range(x.shape[1] - 1, -1, -1):
+            first -= m + 1
+            line = factors[first : first + m + 1]
+            for c in range(d):
+                xc = x[c]
+                xc[m] /= line[m]
+                value = xc[m]
+                for j in range(m):
+                    xc[j] -= line[j] * value
+
+    # By loops, since the threads of a linear algebra library wait for each other at every block.
+    @njit(parallel=threaded)
+    def solve_blocks(ends, members, factors, factor_ends, r, found):
+        for block in prange(len(factor_ends)):
+            own = members[ends[block] : ends[block + 1]]
+            x = np.empty((d, len(own)), np.float32)
+            for m in range(len(own)):
                 for c in range(d):
-                    xc, value = x[c], np.float32(r[members[begin + m], c])
-                    for j in range(m):
-                        value -= line[j] * xc[j]
-                    xc[m] = value / line[m]
-            at = first
-            for m in range(count - 1, -1, -1):
-                at -= m + 1
-                line = factors[at : at + m + 1]
+                    x[c, m] = r[own[m], c]
+            end = factor_ends[block]
+            solve(factors[end - len(own) * (len(own) + 1) // 2 : end], x)
+            for m in range(len(own)):
                 for c in range(d):
-                    xc = x[c]
-                    xc[m] /= line[m]
-                    value = xc[m]
-                    for j in range(m):
-                        xc[j] -= line[j] * value
-            for m in range(count):
-                for c in range(d):
-                    z[members[begin + m], c] += x[c, m]
+                    found[ends[block] + m, c] = x[c, m]
+
+    @njit
+    def add_solutions(ends, members, factors, r, z):
+        sizes = np.diff(ends)
+        found = np.empty((ends[-1], d), np.float32)
+        solve_blocks(ends, members, factors, np.cumsum(sizes * (sizes + 1) // 2), r, found)
+        for m in range(len(members)):
+            for c in range(d):
+                z[members[m], c] += found[m, c]
 
     return Passes(
         diagonal_blocks, product, rows_beside, add_block, add_functions, pack, add_solutions
