@@ -48,16 +48,12 @@ class ElasticSpin(Case):
     source = "conservation of angular momentum and energy"
     sweep = {
         "across": (11, 21),
-        "time_step_factor": (0.1, 0.2, 0.4, 0.7),
+        "time_step_factor": (0.1, 0.2, 0.4, 0.6),
         "gradient": ("consistent", "quadratic", "corrected"),
     }
     trials = {
         "10 turns": Trial({"across": 11}, {"turns": 5.0}),
-        "1000 turns": Trial(
-            {"turns": 1000.0, "across": 11},
-            known="at the default step, nearly four to the fastest vibration, the energy drifts "
-            "by 0.3 % within 1000 turns; by 0.003 % at 0.6 of the critical step",
-        ),
+        "1000 turns": Trial({"turns": 1000.0, "across": 11}),
     }
 
     turns: float = number(default=10.0)  # duration, in turns of the rigid square

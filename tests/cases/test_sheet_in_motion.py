@@ -60,7 +60,7 @@ def test_the_edge_moves_as_the_impedance_has_it(records: Mapping[str, Record]) -
     assert low.sum() == 5
     crossings = record.times / COARSE.crossing
     watched = (crossings > 0.29) & (crossings < 0.71)
-    assert watched.sum() == 8
+    assert watched.sum() == 9
     moved = (record.positions[:][watched][:, low, 0] - X[low, 0]).mean(axis=1)
     ahead = moved - velocity * record.times[watched]
     # The jump rings with the period of a few spacings, 0.25 W / c_p here, by 0.4 of what the edge

@@ -130,6 +130,6 @@ def test_a_run_shows_its_progress_in_one_place(outputs: Outputs) -> None:
 
 def test_a_run_that_ends_early_says_so(outputs: Outputs) -> None:
     bar, error = outputs["failure"]
-    assert "a pulled square: 30 %" in bar["data"]["text/plain"]  # three steps of ten
+    assert "a pulled square: 33 %" in bar["data"]["text/plain"]  # three steps of nine
     assert "ZeroDivisionError after" in bar["data"]["text/plain"]
     assert "for the test" in error["evalue"]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from solidsph.scene.scene_data import DEFAULT_FACTOR
 from solidsph.studies.case import Case
 from solidsph.studies.cost import SweepSetup, frontier
 from solidsph.studies.frontier import Frontier
@@ -43,10 +44,10 @@ def test_the_largest_step_saves_steps_and_costs_no_accuracy(tmp_path: Path) -> N
     assert [id(one.usual) for one in found] == [id(point) for point in made.front()]
     for one in found:
         assert one.point.finished
-        assert one.factor == 0.7
+        assert one.factor == DEFAULT_FACTOR
         assert one.point.settings == {**one.usual.settings, "time_step_factor": LARGEST}
         # No cut: the steps are fewer as the factors say, to a step of rounding up.
-        assert one.point.steps == pytest.approx(0.7 / LARGEST * one.usual.steps, abs=1)
+        assert one.point.steps == pytest.approx(DEFAULT_FACTOR / LARGEST * one.usual.steps, abs=1)
         # Steps of their own change a frequency by (omega dt)^2 / 24; in four transits of the bar
         # omega t is 4 pi.
         own = (4.0 * pi / one.point.steps) ** 2 / 24.0

@@ -36,7 +36,9 @@ class StepByStep(TimeLoop):
             self._check_progress(state, after)
             state = after
             # The sum is finite only if all entries are, and takes a fraction of a step.
-            if not np.isfinite(state.accelerations.sum()):
+            with np.errstate(all="ignore"):
+                finite = np.isfinite(state.accelerations.sum())
+            if not finite:
                 raise StepError(state, NOT_FINITE)
         return state
 

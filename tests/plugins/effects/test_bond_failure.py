@@ -206,6 +206,7 @@ def test_materials_remember_before_a_bond_fails() -> None:
             .material({**MATERIAL, **yielding})
             .initial(velocity={"x": "X"})
             .engine("matrix")
+            .integrator(time_step=1e-3)
             .duration(5e-3)
         )
 

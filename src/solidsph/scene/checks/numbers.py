@@ -42,7 +42,7 @@ def _motion(scene: SceneData) -> Iterator[str]:
         )
     factor: Any = scene.time_step_factor
     if _is_number(factor) and factor > 1.0:
-        yield f"time_step_factor must not exceed 1, got {factor}; 0.7 is usual"
+        yield f"time_step_factor must not exceed 1, got {factor}; 0.6 is usual"
     outputs: Any = scene.outputs
     if isinstance(outputs, bool) or not isinstance(outputs, Integral):
         yield f"outputs must be a whole number, got {outputs!r}; it is how many states to record"
