@@ -23,6 +23,15 @@ from solidsph_builtin.shapes._step_files import triangulated
 MOST_BYTES = 2**28
 MOST_TRIANGLES = 2_000_000
 
+# Types of Abaqus for plane stress, plane strain and rotational symmetry, by their points.
+_PLANE = re.compile(rb"(?im)^(\*ELEMENT\b.*?TYPE\s*=\s*)(?:CPS|CPE|CPEG|CAX)([3468])\w*")
+# The head of a surface and its lines: the name of a set of elements, and the face of each.
+_SURFACE = re.compile(
+    rb'(?im)^\*SURFACE\s*,.*?\bNAME\s*=\s*"?([^",\r\n]+).*\n((?:(?:\*\*|[^*]).*(?:\n|$))*)'
+)
+_FACE = re.compile(rb"(?im)^([^,\r\n]+),\s*S([1-6])\b")
+_LEFT_OUT = re.compile(r"skipping unsupported element type '(C3D\w*)'")
+
 # Bytes of a binary STL before its triangles, and of each.
 _STL_HEAD, _STL_TRIANGLE = 84, 50
 
@@ -124,17 +133,45 @@ def _by_trimesh(data: bytes, suffix: str, **options: Any) -> Soup:
     )
 
 
-def _by_meshlane(data: bytes, suffix: str) -> Soup:
+def _by_meshlane(
+    data: bytes, suffix: str, faces_of_sets: Mapping[str, Sequence[tuple[str, int]]] | None = None
+) -> Soup:
     """Read by meshlane, whose readers take the path of a file only."""
     meshlane = geometry_library("meshlane")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"mesh{suffix}"
         path.write_bytes(data)
+        said = io.StringIO()
         try:
-            mesh = meshlane.read(path, _FORMATS[suffix])
+            with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+                mesh = meshlane.read(path, _FORMATS[suffix])
         except (Exception, SystemExit) as cause:  # meshlane ends the program where it fails
             raise _unreadable(cause, suffix) from cause
-    return Soup(*outer_triangles(mesh))
+    # A body without some of its cells would have another surface.
+    left_out = sorted(set(_LEFT_OUT.findall(said.getvalue())))
+    if left_out:
+        raise ValueError(
+            f"solid elements of the type {', '.join(left_out)} are not read; use others, such as "
+            "C3D4, C3D8, C3D10 or C3D20"
+        )
+    return Soup(*outer_triangles(mesh, faces_of_sets or {}))
+
+
+def _abaqus(data: bytes, suffix: str) -> Soup:
+    """With plane elements as the shells that have their points, and surfaces by element faces."""
+
+    def renamed(found: re.Match[bytes]) -> bytes:
+        degree = {b"3": b"S3", b"4": b"S4", b"6": b"STRI65", b"8": b"S8R"}
+        return found[1] + degree[found[2]]
+
+    surfaces = {
+        found[1].decode(errors="replace"): [
+            (cells.decode(errors="replace").strip(), int(face))
+            for cells, face in _FACE.findall(found[2])
+        ]
+        for found in _SURFACE.finditer(data)
+    }
+    return _by_meshlane(_PLANE.sub(renamed, data), suffix, surfaces)
 
 
 def _step(data: bytes, suffix: str) -> Soup:
@@ -147,6 +184,7 @@ _READERS: Mapping[str, Callable[[bytes, str], Soup]] = {
     ".obj": _obj,
     ".ply": _ply,
     **dict.fromkeys(_FORMATS, _by_meshlane),
+    ".inp": _abaqus,
     ".step": _step,
     ".stp": _step,
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import meshlane
 import numpy as np
@@ -202,6 +203,118 @@ def test_cells_with_four_corners(tmp_path: Path) -> None:
     assert shape.volume() == pytest.approx(2.0, rel=1e-14)
     assert areas_of(shape)["HELD"] == pytest.approx(1.0, rel=1e-14)
     assert len(areas_of(shape)) == 6
+
+
+# Two cells of a kind in a part, placed by an instance, as a preprocessor writes it.
+DECK = """*Heading
+*Part, name=PART-1
+*Node
+{nodes}
+*Element, type={kind}
+{elements}
+*End Part
+*Assembly, name=Assembly
+*Instance, name=PART-1-1, part=PART-1
+*End Instance
+*Elset, elset=_Top_S2, internal, instance=PART-1-1
+ 1, 2
+*Elset, elset=_End_S4, internal, instance=PART-1-1
+ 2,
+*Surface, type=ELEMENT, name=Top
+** all of it
+_Top_S2, S2
+*Surface, type=ELEMENT, name="End"
+_END_S4, S4
+*End Assembly
+"""
+
+
+@pytest.mark.parametrize("kind", ["C3D8R", "C3D20"])
+def test_surfaces_by_faces_of_elements(kind: str, tmp_path: Path) -> None:
+    """The second face of a brick has its last corners, the fourth the second and the third."""
+    corners = np.array(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
+    )
+    edges = [*((i, (i + 1) % 4) for i in range(4)), *((4 + i, 4 + (i + 1) % 4) for i in range(4))]
+    edges += [(i, i + 4) for i in range(4)]
+    brick = np.vstack([corners, [0.5 * (corners[a] + corners[b]) for a, b in edges]])
+    brick = brick[: int(kind[3:5].rstrip("R"))]
+    both = np.concatenate([brick, brick + np.array([1.0, 0.0, 0.0])])
+    nodes, numbers = np.unique(both, axis=0, return_inverse=True)
+    numbers = numbers.reshape(2, -1) + 1
+    deck = DECK.format(
+        kind=kind,
+        nodes="\n".join(f"{n + 1}, {x}, {y}, {z}" for n, (x, y, z) in enumerate(nodes.tolist())),
+        elements="\n".join(
+            ",\n".join(", ".join(map(str, line)) for line in (row[:12], row[12:]) if line)
+            for row in np.column_stack([[1, 2], numbers]).tolist()
+        ),
+    )
+    (tmp_path / "two.inp").write_text(deck)
+    shape = Mesh(tmp_path / "two.inp")
+    assert shape.volume() == pytest.approx(2.0, rel=1e-14)
+    surface = shape.surface(0.1)
+    names = np.array(surface.faces)
+    for name, wanted in (("Top", [0.0, 0.0, 2.0]), ("End", [1.0, 0.0, 0.0])):
+        area = surface.area_vectors[names == name].sum(axis=0)
+        assert area == pytest.approx(np.array(wanted), abs=1e-14)
+
+
+def written(path: Path, *, recombined: bool, incomplete: bool) -> Path:
+    """A cylinder of bricks of 20 or 27 points, or of wedges of 15 or 18."""
+
+    def build(occ: Any) -> None:
+        disc = occ.addDisk(0.0, 0.0, 0.0, 1.0, 1.0)
+        occ.extrude([(2, disc)], 0.0, 0.0, 2.0, numElements=[3], recombine=True)
+
+    with modelled(build) as gmsh:
+        gmsh.option.setNumber("Mesh.SecondOrderIncomplete", incomplete)
+        gmsh.option.setNumber("Mesh.RecombineAll", recombined)
+        (base,) = [
+            tag
+            for _, tag in gmsh.model.getEntities(2)
+            if gmsh.model.occ.getCenterOfMass(2, tag)[2] == pytest.approx(0.0)
+        ]
+        gmsh.model.addPhysicalGroup(2, [base], name="base")
+        gmsh.model.addPhysicalGroup(3, [1], name="body")
+        gmsh.model.mesh.clear()
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        gmsh.write(str(path))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "recombined", "incomplete"),
+    [
+        ("a.msh", True, True),
+        ("a.msh", True, False),
+        ("a.msh", False, True),
+        ("a.inp", True, True),
+        ("a.inp", False, True),
+    ],
+)
+def test_cells_of_the_second_degree(
+    name: str, recombined: bool, incomplete: bool, tmp_path: Path
+) -> None:
+    shape = Mesh(written(tmp_path / name, recombined=recombined, incomplete=incomplete))
+    # Sides of a polygon with 32 corners or more.
+    assert shape.volume() == pytest.approx(2.0 * np.pi, rel=0.01)
+    assert areas_of(shape)["base"] == pytest.approx(np.pi, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("name", "recombined", "message"),
+    [
+        ("a.inp", True, "solid elements of the type C3D27 are not read; use others, such as C3D4"),
+        ("a.msh", False, "cells of the kind 'wedge18' are not read; use triangle, quad, tetra"),
+    ],
+)
+def test_cells_that_are_not_read(name: str, recombined: bool, message: str, tmp_path: Path) -> None:
+    """They are not left out: the body would have another surface."""
+    path = written(tmp_path / name, recombined=recombined, incomplete=False)
+    with pytest.raises(SceneError, match=message):
+        Mesh(path)
 
 
 def test_step(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
