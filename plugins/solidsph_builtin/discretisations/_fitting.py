@@ -36,6 +36,15 @@ HALVINGS = {1: 3, 2: 3, 3: 2}
 ON_BOUNDARY = 1e-6
 """Particles this close to the boundary, in spacings, are on it."""
 
+# Weight of a particle on the surface in fits to neighbours, in cells; on a plane such a particle
+# stands for 3/8 of one. With 8 particles across, the radial stress in a ring is off by 2.8 % with
+# 0.5, by 2.1 % with 0.375, by 1.9 % with 1/3, by 1.7 % with 0.3, and the peak beside a hole with
+# 20 particles a side by -4.5 to -5.0 %. Fitted volumes as weights are too uneven on surfaces in
+# space; inside they are the weights, with which sums of the kernel are 1 to 1 % where particles are
+# crowded, as in small balls. Where the spacing varies, a uniform stress in a cube of 492 particles
+# balanced to 1.5e-4 of the loads with volumes as weights everywhere.
+_ON_SURFACE = 1.0 / 3.0
+
 # Particles along a face for functions of its own.
 _ENOUGH_ALONG = 4
 
@@ -97,6 +106,14 @@ def fitted(
         faces = agreeing(faces, X[real], volumes[real])
     areas = area_vectors(faces, given.count, shape.dimension)
     return attrs.evolve(given, volumes=volumes, faces=faces, area_vectors=areas)
+
+
+def lighter_on_surface(given: Particles, shape: Shape) -> Particles:
+    """`given` particles that weigh a part of a cell in sums over neighbours where they are on the
+    surface, and their volumes inside."""
+    onto = np.abs(shape.signed_distance(given.positions)) <= ON_BOUNDARY * given.spacings
+    cells = np.where(onto, _ON_SURFACE * given.spacings**shape.dimension, given.volumes)
+    return attrs.evolve(given, cells=cells)
 
 
 def fitted_volumes(

@@ -22,16 +22,13 @@ from solidsph_builtin.discretisations._fitting import (
     agreeing,
     faces_by,
     gauss_points,
+    lighter_on_surface,
     with_moments,
 )
 from solidsph_builtin.discretisations._graded_samples import graded_samples
 from solidsph_builtin.discretisations._pieces import finest_pieces
 from solidsph_builtin.discretisations._reproducing import Fit
 from solidsph_builtin.discretisations._surface import area_vectors
-
-# Weight of a particle on the surface in sums over neighbours, in cells, as of `fitted`. With the
-# volume as weight a uniform stress in a cube of 492 particles balanced to 1.5e-4 of the loads.
-_ON_SURFACE = 1.0 / 3.0
 
 
 def graded_fit(
@@ -65,9 +62,8 @@ def graded_fit(
         faces = faces_by(surface, X, given.spacings, faces, lambda own: Fit(own, spacing.at, None))
         faces = agreeing(faces, X, volumes)
     areas = area_vectors(faces, given.count, d)
-    onto = np.abs(shape.signed_distance(X)) <= ON_BOUNDARY * given.spacings
-    cells = np.where(onto, _ON_SURFACE * given.spacings**d, volumes)
-    return attrs.evolve(given, volumes=volumes, cells=cells, faces=faces, area_vectors=areas)
+    made = attrs.evolve(given, volumes=volumes, faces=faces, area_vectors=areas)
+    return lighter_on_surface(made, shape)
 
 
 def _quadrature(shape: Shape, spacing: SpacingField) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from solidsph.system.build_log import BUILD
 from solidsph_builtin.discretisations._cells import mean_spacing
 from solidsph_builtin.discretisations._checks import check_spacing
 from solidsph_builtin.discretisations._curves import even_points
-from solidsph_builtin.discretisations._fitting import fitted
+from solidsph_builtin.discretisations._fitting import fitted, lighter_on_surface
 from solidsph_builtin.discretisations._graded import graded
 from solidsph_builtin.discretisations._grid import Grid, grid_over, in_chunks
 from solidsph_builtin.discretisations._nearest import beside, nearest
@@ -39,13 +39,6 @@ _MOVES = 4.0
 _AT = 1e-6
 # Particles that the others push closer to the boundary than this are left out.
 _PUSHED_OUT = 0.2
-# Weight of a particle on the surface in fits to neighbours, in cells; on a plane such a particle
-# stands for 3/8 of one. With 8 particles across, the radial stress in a ring is off by 2.8 % with
-# 0.5, by 2.1 % with 0.375, by 1.9 % with 1/3, by 1.7 % with 0.3, and the peak beside a hole with
-# 20 particles a side by -4.5 to -5.0 %. Fitted volumes as weights are too uneven on surfaces in
-# space; inside they are the weights, with which sums of the kernel are 1 to 1 % where particles are
-# crowded, as in small balls.
-_ON_SURFACE = 1.0 / 3.0
 
 
 @final
@@ -87,9 +80,7 @@ class Fitted(GradedDiscretisation):
         given = without_ghosts(X, whole, size, owned)
         if not irregular:
             return fitted(self, shape, spacing, given)
-        made = fitted(self, shape, spacing, given, _MOVES * size)
-        cells = np.where(onto, _ON_SURFACE * grid.cell_volume, made.volumes)
-        return attrs.evolve(made, cells=cells)
+        return lighter_on_surface(fitted(self, shape, spacing, given, _MOVES * size), shape)
 
     def graded_particles(self, shape: Shape, spacing: SpacingField) -> Particles:
         """Particles on the surface and inside that repel each other until their distances are even

@@ -13,7 +13,7 @@ from solidsph.interfaces.shape import Shape
 from solidsph.model.particles import Particles
 from solidsph_builtin.discretisations._checks import refusal
 from solidsph_builtin.discretisations._noise import check_noise, moved_inside
-from solidsph_builtin.discretisations.points import Points
+from solidsph_builtin.discretisations.points import nearest_volumes
 from solidsph_builtin.shapes._checks import as_number
 
 
@@ -56,7 +56,7 @@ class Jittered(Discretisation):
         steps = self.amplitude * given.spacings[inside, None] * noise[inside]
         positions = given.positions.copy()
         positions[inside] = moved_inside(shape, positions[inside], steps)
-        volumes = Points(positions=positions).particles(shape, spacing).volumes
+        volumes = nearest_volumes(self, shape, positions, spacing)
         volumes *= given.volumes.sum() / volumes.sum()
         return attrs.evolve(
             given, positions=positions, images=positions.copy(), volumes=volumes, cells=volumes

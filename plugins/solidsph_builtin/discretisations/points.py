@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from reprlib import repr as short
 from typing import Any, ClassVar
@@ -11,15 +11,16 @@ import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
+from solidsph.interfaces.discretisation import Discretisation
 from solidsph.interfaces.graded_discretisation import GradedDiscretisation
 from solidsph.interfaces.shape import Shape, Surface
 from solidsph.maths.arrays import Array
 from solidsph.model.particles import Particles
 from solidsph.model.spacing import SpacingField
 from solidsph_builtin.discretisations._checks import check_spacing, refusal
-from solidsph_builtin.discretisations._fitting import ON_BOUNDARY
+from solidsph_builtin.discretisations._fitting import ON_BOUNDARY, fitted, lighter_on_surface
 from solidsph_builtin.discretisations._graded_fitting import graded_fit
-from solidsph_builtin.discretisations._grid import Grid, grid_over
+from solidsph_builtin.discretisations._grid import grid_over
 from solidsph_builtin.discretisations._nearest import Assignment, nearest
 from solidsph_builtin.discretisations._point_spacing import spacing_of_points
 from solidsph_builtin.discretisations._point_table import (
@@ -70,12 +71,13 @@ class Points(GradedDiscretisation):
     folder of the scene file, in Python in the working folder. Where rows hold more, or in another
     order, `columns` names them: `["x", "y", "spacing", "volume"]`.
 
-    Without given `volumes` that of a point is the part of the shape nearest to it, found by
-    sampling and scaled to the exact total if the shape knows its volume. Each sample of the surface
-    belongs to the nearest point. Tags are those of a lattice. There are no ghosts. A spacing that
-    varies is to tell how far apart the points are: the support of each follows it, and volumes
-    that are not given integrate polynomials, as those of `fitted-moments` do. If the points have a
-    column with the spacing of each, that of the body is `"given"`.
+    If there are points on the surface, `volumes` that are not given integrate polynomials of the
+    second degree, as those of `fitted-moments` do; otherwise that of a point is the part of the
+    shape nearest to it, found by sampling and scaled to the exact total if the shape knows its
+    volume. Each sample of the surface belongs to the nearest point. Tags are those of a lattice.
+    There are no ghosts. A spacing that varies is to tell how far apart the points are: the support
+    of each follows it. If the points have a column with the spacing of each, that of the body is
+    `"given"`.
 
     Raises:
         SceneError: not exactly one of `positions` and `file` is given, one cannot be read, or
@@ -120,13 +122,16 @@ class Points(GradedDiscretisation):
                 'it spacing = "given", or leave out the column',
             )
         self._check_places(shape, table.positions, spacing)
-        tree, surface = cKDTree(table.positions), sampled(self, shape, spacing)
-        owned = faces(surface, nearest(tree, surface.points), table.positions)
-        if table.volumes is None:
-            volumes = self._nearest_volumes(shape, tree, spacing)
-        else:
-            volumes = self._checked(table.volumes, tree.n)
-        return without_ghosts(table.positions, volumes, spacing, owned)
+        X, surface = table.positions, sampled(self, shape, spacing)
+        owned = faces(surface, _owners(shape, X, surface, lambda at: np.full(len(at), spacing)), X)
+        if table.volumes is not None:
+            return without_ghosts(X, self._checked(table.volumes, len(X)), spacing, owned)
+        volumes = nearest_volumes(self, shape, X, spacing)
+        made = without_ghosts(X, volumes, spacing, owned)
+        if not self.ends_on_surface(shape, spacing):
+            return made
+        size = float(np.ptp(X, axis=0).max())
+        return lighter_on_surface(fitted(self, shape, spacing, made, size), shape)
 
     def graded_particles(self, shape: Shape, spacing: SpacingField) -> Particles:
         """The points as particles, with the spacing that the field has where they are.
@@ -145,7 +150,7 @@ class Points(GradedDiscretisation):
         X = table.positions
         self._check_places(shape, X, spacing.least)
         surface = sampled(self, shape, spacing.least)
-        owned = faces(surface, _owners(shape, X, spacings, surface, spacing), X)
+        owned = faces(surface, _owners(shape, X, surface, spacing.at), X)
         if table.volumes is not None:
             return without_ghosts(X, self._checked(table.volumes, len(X)), spacings, owned)
         return graded_fit(self, shape, spacing, without_ghosts(X, np.ones(len(X)), spacings, owned))
@@ -218,44 +223,58 @@ class Points(GradedDiscretisation):
             )
         return volumes.copy()
 
-    def _nearest_volumes(self, shape: Shape, tree: cKDTree, spacing: float) -> Array:
-        """Volume of the shape nearest to each point, (n,) [m^d]."""
-        grid: Grid = grid_over(self, shape, spacing)
-        fine = _SAMPLES[shape.dimension]
-        samples = attrs.evolve(
-            grid,
-            cells=tuple(fine * count for count in grid.cells),
-            counts=tuple(fine * count for count in grid.counts),
+
+def nearest_volumes(
+    discretisation: Discretisation, shape: Shape, points: Array, spacing: float
+) -> Array:
+    """Volume of the shape nearest to each of the `points` (n, d) [m], (n,) [m^d].
+
+    Args:
+        discretisation: the part that messages name.
+        shape: the body.
+        points: of the body.
+        spacing: of the points [m].
+
+    Raises:
+        SceneError: a point has none.
+    """
+    tree, grid = cKDTree(points), grid_over(discretisation, shape, spacing)
+    fine = _SAMPLES[shape.dimension]
+    samples = attrs.evolve(
+        grid,
+        cells=tuple(fine * count for count in grid.cells),
+        counts=tuple(fine * count for count in grid.counts),
+    )
+    hits = np.zeros(tree.n)
+    for start in range(0, samples.size, _CHUNK):
+        places = samples.positions(np.arange(start, min(start + _CHUNK, samples.size)))
+        places = places[shape.signed_distance(places) <= 0.0]
+        hits += nearest(tree, places).sums(np.ones(len(places)), tree.n)
+    total = shape.volume()
+    volumes: Array = hits * (samples.cell_volume if total is None else total / hits.sum())
+    if not np.all(volumes > 0.0):
+        point = int(np.argmin(volumes > 0.0))
+        raise refusal(
+            discretisation,
+            f"point {point} is too close to others to be given a volume at a spacing of "
+            f"{spacing:g} m; use a smaller spacing, or give volumes",
         )
-        hits = np.zeros(tree.n)
-        for start in range(0, samples.size, _CHUNK):
-            points = samples.positions(np.arange(start, min(start + _CHUNK, samples.size)))
-            points = points[shape.signed_distance(points) <= 0.0]
-            hits += nearest(tree, points).sums(np.ones(len(points)), tree.n)
-        total = shape.volume()
-        volumes: Array = hits * (samples.cell_volume if total is None else total / hits.sum())
-        if not np.all(volumes > 0.0):
-            point = int(np.argmin(volumes > 0.0))
-            raise refusal(
-                self,
-                f"point {point} is too close to others to be given a volume at a spacing of "
-                f"{spacing:g} m; use a smaller spacing, or give volumes",
-            )
-        return volumes
+    return volumes
 
 
 def _owners(
-    shape: Shape, positions: Array, spacings: Array, surface: Surface, spacing: SpacingField
+    shape: Shape, positions: Array, surface: Surface, spacing_at: Callable[[Array], Array]
 ) -> Assignment:
     """The owner of each sample of the `surface`: the nearest point.
 
     If there are points on all of the surface, it is the nearest of those: where they are sparse, as
     in the middle of faces, one inside may be nearer, and would leave the areas unfitted.
     """
-    at = np.flatnonzero(np.abs(shape.signed_distance(positions)) <= ON_BOUNDARY * spacings)
+    depths = np.abs(shape.signed_distance(positions))
+    at = np.flatnonzero(depths <= ON_BOUNDARY * spacing_at(positions))
     if len(at):
         outer = cKDTree(positions[at])
-        if np.all(outer.query(surface.points)[0] <= spacing.at(surface.points)):
+        if np.all(outer.query(surface.points)[0] <= spacing_at(surface.points)):
             found = nearest(outer, surface.points)
             return attrs.evolve(found, particles=at[found.particles])
     return nearest(cKDTree(positions), surface.points)
