@@ -11,7 +11,6 @@ from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import EllipseCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -21,7 +20,7 @@ from solidsph.model.particles import Particles
 from solidsph.results.arrangement import Arrangement
 from solidsph.results.mark_drawing import COLOURS, Painter
 from solidsph.results.named_places import NamedPlace, named_places
-from solidsph.results.picture import Picture
+from solidsph.results.picture import Picture, discs
 from solidsph.results.projection import PAGE, SLANTED, UPRIGHT, View
 
 _BODIES = ("#9ecae1", "#fdc086", "#b2df8a", "#cab2d6", "#fb9a99", "#d9d9d9")
@@ -137,19 +136,9 @@ def _draw_particles(
         colours[own] = to_rgb(_BODIES[number % len(_BODIES)])
     colours *= _brightness(particles, view, chosen)[:, None]
     colours[particles.ghosts[chosen]] = to_rgb(_GHOSTS)
-    discs = EllipseCollection(
-        sizes,
-        sizes,
-        np.zeros(len(sizes)),
-        units="xy",
-        facecolors=colours,
-        edgecolors="none",
-        offsets=flat[order],
-        offset_transform=axis.transData,
-        zorder=2.0,
-    )
-    discs.set_rasterized(len(chosen) > _MANY)
-    axis.add_collection(discs)
+    drawn = discs(flat[order], sizes, axis, facecolors=colours, zorder=2.0)
+    drawn.set_rasterized(len(chosen) > _MANY)
+    axis.add_collection(drawn)
 
 
 def _brightness(particles: Particles, view: View, chosen: Indices) -> Array:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from solidsph.errors import RecordError
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import largest_principal
-from solidsph.results.picture import Picture
+from solidsph.results.picture import Picture, discs
 from solidsph.results.probe_picture import draw_probes, probe_columns
 from solidsph.results.recorded import Recorded
 
@@ -111,15 +111,21 @@ def _draw_bodies(record: Recorded, field: str) -> Figure:
     axes = drawn.subplots(1, 2, subplot_kw={"projection": "3d"} if solid else {})
     values = [magnitudes(record.field(field)[k][real]) for k in (0, -1)]
     low, high = min(v.min() for v in values), max(v.max() for v in values)
-    # Size of a marker that about fills a spacing, on an axis some 300 points wide.
-    size = max(1.0, (280.0 * float(particles.spacings[0]) / extent) ** 2)
+    spacings = particles.spacings[real]
+    colouring = {"cmap": "cividis", "clim": (low, high)}
     for axis, k, colours in zip(axes, (0, -1), values, strict=True):
         x = record.positions[k][real]
-        shades = {"depthshade": False} if solid else {}  # colours as in the bar
-        dots = axis.scatter(*x.T, c=colours, s=size, cmap="cividis", vmin=low, vmax=high, **shades)
         axis.set_title(f"t = {record.times[k]:.4g} s", fontsize=10)
         axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
-        if solid:  # few ticks and room for labels, which a slender body leaves little of
+        if not solid:
+            dots = axis.add_collection(discs(x, spacings, axis, array=colours, **colouring))
+            axis.margins(0.02 + float(spacings.max()) / extent)
+        else:
+            # A marker about fills a spacing, on an axis some 300 points wide; colours as in the
+            # bar.
+            sizes = np.maximum(1.0, (280.0 * spacings / extent) ** 2)
+            dots = axis.scatter(*x.T, c=colours, s=sizes, depthshade=False, **colouring)
+            # Few ticks and room for labels, which a slender body leaves little of.
             axis.set(zlabel="z [m]")
             axis.locator_params(nbins=3)
             limits = (axis.get_xlim(), axis.get_ylim(), axis.get_zlim())

@@ -26,6 +26,8 @@ _ZOOM, _CENTRE = 0.85, (0.15, -0.1)
 
 _AXES = (0.0, 0.14, 0.16, 0.3)  # place of the small axes in the window, above the sliders
 
+_RADIUS = 0.6  # of spheres [spacings]: a little more than that of touching ones, to hide gaps
+
 _TITLE = 18  # letters of the colour bar's title in a line
 
 _PICTURES = (".png", ".jpeg", ".jpg", ".bmp", ".tif", ".tiff")
@@ -53,6 +55,7 @@ class View:
         self._real = ~self.record.particles.ghosts
         self.cloud = library.PolyData(self._points())
         self.cloud["colour"] = self._colours()
+        self.cloud["spacing"] = self.record.particles.spacings[self._real]
 
     def show(self, picture: Path | None = None) -> None:
         """Open a window, or draw a picture without one.
@@ -121,9 +124,9 @@ class View:
                 "height": 0.5,
             },
         )
-        # The radius of spheres, in metres: a little more than that of touching ones, to hide gaps.
-        radius = 0.6 * float(self.record.particles.spacings.max())
-        actor.mapper.scale_factor = radius
+        actor.mapper.scale_array = "spacing"
+        actor.mapper.scale_factor = _RADIUS
+        radius = _RADIUS * float(self.record.particles.spacings.max())
         plotter.add_text(self._caption(), font_size=10, color="black", name="caption")
         plotter.add_axes(color="black", viewport=_AXES)
         if self.record.dimension < 3:
