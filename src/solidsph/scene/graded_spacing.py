@@ -5,53 +5,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from math import inf
-from numbers import Real
 from typing import Any
 
 import attrs
 import numpy as np
-from scipy.spatial import cKDTree
 
 from solidsph.errors import SceneError
 from solidsph.interfaces.shape import Shape
 from solidsph.maths.arrays import Array, Mask
 from solidsph.maths.formulas import Expression
-from solidsph.model.particles import Particles
-from solidsph.model.regions import AXES, select
-from solidsph.model.spacing import (
-    MOST_RATIO,
-    STEEPEST,
-    STEEPEST_STEP,
-    Cells,
-    SpacingField,
-    cells_over,
-    smooth_step,
-)
+from solidsph.model.regions import AXES
+from solidsph.model.spacing import MOST_RATIO, STEEPEST, Cells, SpacingField, cells_over
 from solidsph.registry.construct import construct
 from solidsph.scene.given_spacing import GIVEN, check_given, given_field, given_scaled
 from solidsph.scene.listed_spacing import check_list, listed_spacing, with_factor
+from solidsph.scene.refine_entries import AtRegion, length_of, refinement
 from solidsph.scene.scene_data import BodyScene
-
-_KEYS = ("where", "spacing", "over")
 
 # Cells at which a spacing is read, at most: then it is that of a body beyond any machine.
 _MOST_CELLS = 2_000_000
 
-# Places inside a region, at most, by which the distance from it is known.
-_MOST_PLACES = 400_000
-
 # A slope is read by differences over this part of the spacing, and may be too large by that of
 # the third derivative.
 _STEP, _ROUNDING = 1e-3, 1e-3
-
-
-@attrs.frozen
-class _Refinement:
-    """One entry of `refine`."""
-
-    where: str
-    spacing: float  # [m]
-    over: float  # distance over which the body's own spacing returns [m]
 
 
 def is_graded(body: BodyScene) -> bool:
@@ -69,18 +45,18 @@ def scaled(body: BodyScene, factor: float) -> BodyScene:
     """
     if body.spacing == GIVEN:
         return given_scaled(body, factor)
-    if isinstance(body.spacing, (str, Mapping)):
-        own = body.spacing
-        finer = f"{factor!r}*({own})" if isinstance(own, str) else with_factor(own, factor)
-        refine = [{**entry, "spacing": factor * entry["spacing"]} for entry in body.refine]
-        return attrs.evolve(body, spacing=finer, refine=tuple(refine))
-    coarse = factor * body.spacing
-    refine = []
-    for entry in body.refine:
-        fine = factor * entry["spacing"]
-        over = max(entry["over"], _needed(fine, coarse))
-        refine.append({**entry, "spacing": fine, "over": over})
-    return attrs.evolve(body, spacing=coarse, refine=tuple(refine))
+    own = body.spacing
+    spacing: float | str | Mapping[str, Any]
+    if isinstance(own, str):
+        spacing = f"{factor!r}*({own})"
+    else:
+        spacing = with_factor(own, factor) if isinstance(own, Mapping) else factor * own
+    entries = [refinement(entry) for entry in body.refine]
+    refine: tuple[Mapping[str, Any], ...] = ()
+    if entries:
+        coarse = _greatest(body, construct("shapes", body.shape))
+        refine = tuple(entry.scaled(factor, coarse) for entry in entries)
+    return attrs.evolve(body, spacing=spacing, refine=refine)
 
 
 def least_spacing(body: BodyScene) -> float:
@@ -89,9 +65,11 @@ def least_spacing(body: BodyScene) -> float:
     Raises:
         SceneError: the spacing varies, and cannot be read.
     """
-    if isinstance(body.spacing, (str, Mapping)):
+    entries = [refinement(entry) for entry in body.refine]
+    known = [entry.spacing for entry in entries if isinstance(entry, AtRegion)]
+    if isinstance(body.spacing, (str, Mapping)) or len(known) < len(entries):
         return spacing_field(body, construct("shapes", body.shape)).least
-    return min([float(body.spacing), *(_refinement(entry).spacing for entry in body.refine)])
+    return min([float(body.spacing), *known])
 
 
 def check_words(body: BodyScene) -> None:
@@ -103,7 +81,7 @@ def check_words(body: BodyScene) -> None:
     if isinstance(body.spacing, Mapping):
         check_list(body.spacing)
     for entry in body.refine:
-        _refinement(entry)
+        refinement(entry)
 
 
 def spacing_field(body: BodyScene, shape: Shape) -> SpacingField:
@@ -114,23 +92,17 @@ def spacing_field(body: BodyScene, shape: Shape) -> SpacingField:
     """
     if body.spacing == GIVEN:
         return given_field(body, shape)
-    entries = [_refinement(entry) for entry in body.refine]
+    entries = [refinement(entry) for entry in body.refine]
     base = _base(body.spacing, shape)
     if not entries:
         return _checked(base, body, shape)
-    if isinstance(body.spacing, (str, Mapping)):
-        coarse = _checked(base, body, shape).greatest
-    else:
-        coarse = float(body.spacing)
-    for entry in entries:
-        _check_slope(entry, coarse)
-    finer = [(entry, _distance(entry, shape, coarse)) for entry in entries]
+    coarse = _greatest(body, shape)
+    places = [place for entry in entries for place in entry.places(shape, coarse)]
 
     def wanted(X: Array) -> Array:
-        least = s = base(X)
-        for entry, distance in finer:
-            way = smooth_step(distance(X) / entry.over)
-            least = np.minimum(least, entry.spacing + way * (s - entry.spacing))
+        least = own = base(X)
+        for place in places:
+            least = np.minimum(least, place.finer(X, own))
         return least
 
     return _checked(wanted, body, shape)
@@ -146,12 +118,19 @@ def predicted_count(field: SpacingField, shape: Shape) -> float:
     return inside + 0.5 * float(np.sum(areas / field.at(surface.points) ** (shape.dimension - 1)))
 
 
+def _greatest(body: BodyScene, shape: Shape) -> float:
+    """The largest spacing of a body, wherever it is refined [m]."""
+    if isinstance(body.spacing, (str, Mapping)):
+        return _checked(_base(body.spacing, shape), body, shape).greatest
+    return float(body.spacing)
+
+
 def _base(spacing: float | str | Mapping[str, Any], shape: Shape) -> Callable[[Array], Array]:
     """What `spacing` says, at X (n, d), (n,) [m]."""
     if isinstance(spacing, Mapping):
         return listed_spacing(spacing, *shape.bounds())
     if not isinstance(spacing, str):
-        number = _length("spacing", spacing)
+        number = length_of("spacing", spacing)
         return lambda X: np.full(len(X), number)
     axes = AXES[: shape.dimension]
     formula = Expression.parse(spacing, axes)
@@ -234,95 +213,6 @@ def _check_growth(spacing: Callable[[Array], Array], cells: Cells) -> None:
             f"{s[worst]:.4g} m; at most {STEEPEST:g} keeps neighbours alike: let it grow more "
             "slowly, over a longer way"
         )
-
-
-def _refinement(entry: Any) -> _Refinement:
-    what = "refine"
-    if not isinstance(entry, Mapping) or set(entry) != set(_KEYS):
-        raise SceneError(
-            f"{what}: each entry is {{where = ..., spacing = ..., over = ...}}, got {entry!r}"
-        )
-    if not isinstance(entry["where"], str):
-        raise SceneError(f"{what}: where must be a face or a condition, got {entry['where']!r}")
-    lengths = [_length(f"{what}: {name}", entry[name]) for name in ("spacing", "over")]
-    return _Refinement(entry["where"], *lengths)
-
-
-def _check_slope(entry: _Refinement, coarse: float) -> None:
-    if entry.spacing > coarse:
-        raise SceneError(
-            f"refine at {entry.where!r}: spacing = {entry.spacing:g} m is above the largest of the "
-            f"body, {coarse:.4g} m; it must be finer"
-        )
-    needed = _needed(entry.spacing, coarse)
-    if entry.over < needed * (1.0 - _ROUNDING):
-        raise SceneError(
-            f"refine at {entry.where!r}: from {entry.spacing:g} to {coarse:.4g} m over "
-            f"{entry.over:g} m the spacing grows too fast for neighbours to be alike; use over = "
-            f"{_rounded_up(needed):g} or more"
-        )
-
-
-def _needed(fine: float, coarse: float) -> float:
-    """Least distance over which a spacing may return from fine to coarse [m]."""
-    return STEEPEST_STEP * (coarse - fine) / STEEPEST
-
-
-def _distance(entry: _Refinement, shape: Shape, coarse: float) -> Callable[[Array], Array]:
-    """The distance (n,) [m] of places (n, d) from where an entry refines."""
-    places = _places(shape, max(entry.spacing, 0.02 * entry.over), coarse)
-    tree = cKDTree(places.positions[select(places, entry.where)])
-
-    def distance(X: Array) -> Array:
-        return np.asarray(tree.query(X, distance_upper_bound=entry.over)[0])
-
-    return lambda X: np.minimum(distance(X), entry.over)
-
-
-def _places(shape: Shape, fine: float, coarse: float) -> Particles:
-    """Samples of the surface, with their faces as tags, and of the inside."""
-    surface = shape.surface(fine)
-    lower, upper = shape.bounds()
-    lengths = upper - lower
-    step = max(fine, float(np.prod(lengths) / _MOST_PLACES) ** (1.0 / len(lengths)))
-    axes = [
-        low + (np.arange(count) + 0.5) * length / count
-        for low, length, count in zip(
-            lower, lengths, np.maximum(1, np.ceil(lengths / step)).astype(np.intp), strict=True
-        )
-    ]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(lengths))
-    inner = grid[shape.signed_distance(grid) < 0.0]
-    positions = np.concatenate([surface.points, inner])
-    n, outer = len(positions), len(surface.points)
-    names, none = np.array(surface.faces), np.zeros(n, dtype=np.bool_)
-    on_surface = np.arange(n) < outer
-    tags = {"surface": on_surface, "interior": ~on_surface}
-    for name in dict.fromkeys(surface.faces):
-        tags[name] = none.copy()
-        tags[name][:outer] = names == name
-    return Particles(
-        positions=positions,
-        volumes=np.ones(n),
-        spacings=np.full(n, coarse),
-        area_vectors=np.zeros_like(positions),
-        ghosts=none,
-        images=positions,
-        tags=tags,
-    )
-
-
-def _length(what: str, value: Any) -> float:
-    number = isinstance(value, Real) and not isinstance(value, bool)
-    if not (number and 0.0 < value < inf):
-        raise SceneError(f"{what} must be a positive finite length in m, got {value!r}")
-    return float(value)
-
-
-def _rounded_up(length: float) -> float:
-    """`length` with two digits, none smaller."""
-    digit = 10.0 ** (np.floor(np.log10(length)) - 1.0)
-    return float(f"{np.ceil(length / digit * (1.0 - 1e-9)) * digit:.2g}")
 
 
 def _place(X: Array) -> str:
