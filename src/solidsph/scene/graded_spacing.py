@@ -100,9 +100,9 @@ def spacing_field(body: BodyScene, shape: Shape) -> SpacingField:
     places = [place for entry in entries for place in entry.places(shape, coarse)]
 
     def wanted(X: Array) -> Array:
-        least = own = base(X)
+        least = base(X)
         for place in places:
-            least = np.minimum(least, place.finer(X, own))
+            least = np.minimum(least, place.at(X))
         return least
 
     return _checked(wanted, body, shape)

@@ -40,14 +40,16 @@ class FinePlaces:
     """Places around which a body is finer."""
 
     spacing: float  # there [m]
-    over: float  # distance over which that of the body returns [m]
+    coarse: float  # the largest of the body [m]
+    over: float  # distance over which it grows to that [m]
     tree: cKDTree
 
-    def finer(self, X: Array, spacing: Array) -> Array:
-        """What the body's own `spacing` (n,) [m] at X (n, d) [m] becomes, (n,) [m]."""
+    def at(self, X: Array) -> Array:
+        """The largest spacing that they allow at X (n, d) [m], (n,) [m]."""
+        # Not a share of the body's own: where that grows, too, both together would be too steep.
         distance = np.minimum(self.tree.query(X, distance_upper_bound=self.over)[0], self.over)
         way = smooth_step(distance / self.over)
-        return np.asarray(self.spacing + way * (spacing - self.spacing))
+        return np.asarray(self.spacing + way * (self.coarse - self.spacing))
 
 
 @final
@@ -68,7 +70,7 @@ class AtRegion:
         _check(f"at {self.where!r}", "spacing", self.spacing, self.over, coarse)
         samples = _samples(shape, max(self.spacing, 0.02 * self.over), coarse)
         tree = cKDTree(samples.positions[select(samples, self.where)])
-        return [FinePlaces(self.spacing, self.over, tree)]
+        return [FinePlaces(self.spacing, coarse, self.over, tree)]
 
     def scaled(self, factor: float, coarse: float) -> Mapping[str, Any]:
         """The entry of such a body with all spacings times a factor."""
@@ -132,7 +134,7 @@ class ByShape:
             cubes = np.floor(X[own] / (_ENOUGH * spacing))
             _, first = np.unique(cubes, axis=0, return_index=True)
             way = over * (coarse - spacing) / (coarse - self.least)
-            found.append(FinePlaces(spacing, way, cKDTree(X[own[first]])))
+            found.append(FinePlaces(spacing, coarse, way, cKDTree(X[own[first]])))
         return found
 
     def scaled(self, factor: float, coarse: float) -> Mapping[str, Any]:
