@@ -13,7 +13,7 @@ import trimesh
 from solidsph import BuildError, SceneError, Simulation
 from solidsph.interfaces.shape import Shape
 from solidsph.maths.arrays import Array
-from solidsph.model.spacing import STEEPEST, SpacingField
+from solidsph.model.spacing import STEEPEST, STEEPEST_STEP, SpacingField
 from solidsph.registry import registry
 from solidsph.registry.construct import construct
 from solidsph.scene.graded_spacing import least_spacing, predicted_count, scaled, spacing_field
@@ -41,6 +41,11 @@ def by_curvature(least: float, angle: float = 15.0, **more: float) -> dict[str, 
 
 def by_thickness(least: float, across: float = 6.0, **more: float) -> dict[str, Any]:
     return {"by": "thickness", "across": across, "least": least, **more}
+
+
+def shortest(spacing: float, least: float) -> float:
+    """The shortest way from one to the other [m]: growth then hides least of what is asked for."""
+    return 1.001 * STEEPEST_STEP * (spacing - least) / STEEPEST
 
 
 def field(shape: Any, spacing: Any, *refine: dict[str, Any]) -> SpacingField:
@@ -136,7 +141,8 @@ def test_the_spacing_is_an_angle_of_the_circle_that_fits(name: str) -> None:
     shape, spacing, least, radius, where = CURVED[name]
     X = rounded(construct("shapes", shape), 0.3 * spacing)
     X = X[where(X)]
-    ratio = field(shape, spacing, by_curvature(least)).at(X) / (TURN * radius(X))
+    entry = by_curvature(least, over=shortest(spacing, least))
+    ratio = field(shape, spacing, entry).at(X) / (TURN * radius(X))
     # Measured 0.94 to 1.013: places with alike spacings have the least of them, up to a tenth
     # finer, and a fit beside the end of a curve has neighbours on one side only.
     assert ratio.min() > 0.9
@@ -203,7 +209,7 @@ def test_a_single_bend_is_no_curve_either() -> None:
 
 def test_a_blade_is_thin_towards_its_edge_down_to_the_least() -> None:
     blade = {"type": "polygon", "vertices": [[0.0, 0.0], [1.0, -0.1], [1.0, 0.1]]}
-    found = field(blade, 0.1, by_thickness(0.005))
+    found = field(blade, 0.1, by_thickness(0.005, over=shortest(0.1, 0.005)))
     x = np.array([0.3, 0.5, 0.9])
     # The ball that touches both sides of a wedge at a distance r from its edge has the diameter
     # 2 r tan(a / 2). Places with alike spacings have the least of them: up to a tenth less, and a
@@ -252,7 +258,9 @@ def test_a_mesh_from_a_file_and_what_libraries_say(tmp_path: Path) -> None:
     path = tmp_path / "bracket.stl"
     body.make().export(path)
     shape = {"type": "mesh", "file": str(path)}
-    found = field(shape, 0.15, by_curvature(0.02), by_thickness(0.02, across=3.0))
+    over = shortest(0.15, 0.02)
+    entries = by_curvature(0.02, over=over), by_thickness(0.02, across=3.0, over=over)
+    found = field(shape, 0.15, *entries)
     # Holes of radius 0.12, and a fillet of the same; walls of 0.2.
     assert found.least == pytest.approx(0.12 * TURN, rel=0.1)
     # Far from both the wall decides; alike spacings are joined up to a tenth.

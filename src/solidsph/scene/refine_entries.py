@@ -33,6 +33,11 @@ _FINEST = 0.25
 # enough for this part of it.
 _ALIKE, _ENOUGH = 1.1, 0.25
 
+# The way back to the body's own spacing over the shortest, unless it is given. Beside a hole in
+# rubber with 48 particles around, the peak stress is off by 28 % with the shortest, by 2.8 % with
+# 1.4 and by 0.05 % with 1.9 of it.
+_WAY = 2.0
+
 
 @final
 @attrs.frozen(eq=False)
@@ -110,7 +115,7 @@ class ByShape:
     by: str  # one of the measures
     number: float  # of it
     least: float  # [m]
-    over: float | None  # distance from the least to the body's own spacing [m]; None: the shortest
+    over: float | None  # distance from the least to the body's own spacing [m]; None: `_WAY`
 
     def places(self, shape: Shape, coarse: float) -> Sequence[FinePlaces]:
         """Places with alike spacings, where a body is finer whose own spacing is `coarse` [m] at
@@ -148,7 +153,7 @@ class ByShape:
         return {**own, "over": over} if over > 0.0 else own
 
     def _over(self, coarse: float) -> float:
-        return self.over if self.over is not None else _shortest(self.least, coarse)
+        return self.over if self.over is not None else _WAY * _shortest(self.least, coarse)
 
 
 Refinement: TypeAlias = AtRegion | ByShape

@@ -57,7 +57,8 @@ class SceneBuilder(ABC):
         The spacing may be a formula of X, Y and Z; `{"file": path}`, a list of places and
         spacings; or "given" by the particles themselves. Each entry of `refine` is a mapping with
         `where`, a face or a condition, the `spacing` there, and the distance `over` which that of
-        the body returns.
+        the body returns; or with `by`, "curvature" and its `angle` [degrees] or "thickness" and a
+        number `across`, and the `least` spacing, maybe `over`.
         """
         bodies = self._values.get("bodies", {})
         if name in bodies:

@@ -27,7 +27,7 @@ class BodyScene:
     discretisation: PartLike | None = None  # that of the scheme if None
     material: PartLike | None = None  # that of the scene if None
     tags: Mapping[str, Where] = attrs.field(factory=dict)  # named sets of its particles
-    refine: Sequence[Mapping[str, Any]] = ()  # where it is finer: {where, spacing, over}
+    refine: Sequence[Mapping[str, Any]] = ()  # where it is finer; see `refine_entries`
 
 
 @attrs.frozen
