@@ -17,14 +17,18 @@ from solidsph.maths.arrays import Array
 class Passes(NamedTuple):
     """Compiled passes; i, j (k,) are the particles of each pair, of (m,) in all."""
 
-    # (x, i, j, reach, norm, params) -> i, j, offsets x_i - x_j (k, d), W (k,), dW/dr / r (k,) of
-    # those within reach
+    # (x, i, j, reaches (k,), normalisation, params) -> places in the lists, i, j, offsets
+    # x_i - x_j (k, d), W (k,), dW/dr / r (k,) of those within reach
     near: Any
     filled: Any  # (i, j, W, V (m,)) -> volume fraction of the others around each, (m,)
-    pushes: Any  # (i, j, offsets, dW/dr / r, V, excess (m,), modulus) -> force on i, (k, d)
+    # (i, j, W, V, room that j leaves i (k,), room that i leaves j) -> their sums with V W, (m,)
+    left: Any
+    # (i, j, offsets, derivatives of o_i and of o_j over V and the distance, V, pressures K o (m,))
+    # -> force on i, (k, d)
+    pushes: Any
     summed: Any  # (i, j, pushes, m) -> force on each, opposite on j, (m, d)
-    # (i, j, offsets, W, dW/dr / r, V, excess, x, v, least moment of inertia [m^2]) ->
-    # `Surroundings` of those with an excess
+    # (i, j, offsets, W, derivatives as in `pushes`, V, excess, x, v, least moments of inertia (m,)
+    # [m^2]) -> `Surroundings` of those with an excess
     surroundings: Any
     # (surroundings, i, j, W, V, x, forces (m, d), pull (count, d)): the reactions to these pulls
     react: Any
@@ -53,7 +57,7 @@ class Surroundings(NamedTuple):
 
     number: Any  # (m,) place of a particle below, or -1
     own: Any  # (count,) the particles
-    slope: Any  # (count, d) gradient of the volume fraction [1/m]
+    slope: Any  # (count, d) gradient of the excess [1/m]
     total: Any  # (count,) sum of V W
     centre: Any  # (count, d) [m]
     velocity: Any  # (count, d) of the other body at the particle [m/s]
@@ -125,24 +129,27 @@ def passes(kernel: Kernel, dimension: int) -> Passes:
     )
 
     @njit
-    def near(x, i, j, reach, norm, params):
+    def near(x, i, j, reaches, normalisation, params):
         count = 0
-        one, other = np.empty_like(i), np.empty_like(j)
+        kept, one, other = np.empty_like(i), np.empty_like(i), np.empty_like(j)
         offsets, values, slopes = np.empty((len(i), d)), np.empty(len(i)), np.empty(len(i))
         for k in range(len(i)):
             square = 0.0
             for c in range(d):
                 offsets[count, c] = x[i[k], c] - x[j[k], c]
                 square += offsets[count, c] ** 2
+            reach = reaches[k]
             q = np.sqrt(square) / reach
             if q < 1.0:
-                one[count], other[count] = i[k], j[k]
+                norm = normalisation / reach**d
+                kept[count], one[count], other[count] = k, i[k], j[k]
                 values[count] = norm * w(q, params)
                 slopes[count] = 0.0
                 if q > 0.0:
                     slopes[count] = norm * dw(q, params) / (q * reach**2)
                 count += 1
-        return one[:count], other[:count], offsets[:count], values[:count], slopes[:count]
+        ends = one[:count], other[:count]
+        return kept[:count], *ends, offsets[:count], values[:count], slopes[:count]
 
     @njit
     def filled(i, j, values, volumes):
@@ -153,11 +160,19 @@ def passes(kernel: Kernel, dimension: int) -> Passes:
         return found
 
     @njit
-    def pushes(i, j, offsets, slopes, volumes, excess, modulus):
+    def left(i, j, values, volumes, of_i, of_j):
+        found = np.zeros(len(volumes))
+        for k in range(len(i)):
+            found[i[k]] += values[k] * volumes[j[k]] * of_i[k]
+            found[j[k]] += values[k] * volumes[i[k]] * of_j[k]
+        return found
+
+    @njit
+    def pushes(i, j, offsets, of_i, of_j, volumes, pressures):
         found = np.empty(offsets.shape)
         for k in range(len(i)):
-            both = excess[i[k]] + excess[j[k]]
-            pull = modulus * volumes[i[k]] * volumes[j[k]] * both * slopes[k]
+            both = pressures[i[k]] * of_i[k] + pressures[j[k]] * of_j[k]
+            pull = volumes[i[k]] * volumes[j[k]] * both
             for c in range(d):
                 found[k, c] = -pull * offsets[k, c]
         return found
@@ -172,7 +187,7 @@ def passes(kernel: Kernel, dimension: int) -> Passes:
         return forces
 
     @njit
-    def surroundings(i, j, offsets, values, slopes, volumes, excess, x, v, floor):
+    def surroundings(i, j, offsets, values, of_i, of_j, volumes, excess, x, v, floors):
         number = np.full(len(x), -1, np.intp)
         own = np.flatnonzero(excess > 0.0)
         for n in range(len(own)):
@@ -183,13 +198,13 @@ def passes(kernel: Kernel, dimension: int) -> Passes:
         # of the particle itself: in one pass, and so near that little is lost in differences.
         sums = np.zeros((count, 15))
         for k in range(len(i)):
-            for p, q, sign in ((i[k], j[k], 1.0), (j[k], i[k], -1.0)):
+            for p, q, sign, steep in ((i[k], j[k], 1.0, of_i[k]), (j[k], i[k], -1.0, of_j[k])):
                 n = number[p]
                 if n >= 0:
                     share = volumes[q] * values[k]
                     total[n] += share
                     for c in range(d):
-                        slope[n, c] += volumes[q] * slopes[k] * sign * offsets[k, c]
+                        slope[n, c] += volumes[q] * steep * sign * offsets[k, c]
                     rx, ux = -sign * offsets[k, 0], v[q, 0] - v[p, 0]
                     ry = rz = uy = uz = 0.0
                     if d > 1:  # constants of the compilation
@@ -232,7 +247,7 @@ def passes(kernel: Kernel, dimension: int) -> Passes:
             own_inertia[1, 2] = own_inertia[2, 1] = -yz
             own_inertia[0, 2] = own_inertia[2, 0] = -xz
             own_inertia[0, 1] = own_inertia[1, 0] = -xy
-            sound[n] = _is_sound(own_inertia, d, floor)
+            sound[n] = _is_sound(own_inertia, d, floors[p])
             if sound[n]:
                 _solve(own_inertia, spin[0], d, rate[0])
                 _add_turning(mean, n, 1.0, rate, 0, reach, d)
@@ -259,4 +274,4 @@ def passes(kernel: Kernel, dimension: int) -> Passes:
                         forces[q, c] -= share * pull[n, c]
                     _add_turning(forces, q, share, turn, n, r, d)
 
-    return Passes(near, filled, pushes, summed, surroundings, react)
+    return Passes(near, filled, left, pushes, summed, surroundings, react)

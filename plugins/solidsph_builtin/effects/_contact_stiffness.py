@@ -8,6 +8,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array
 from solidsph.interfaces.smoothing_kernel import COMPLEX_STEP, SmoothingKernel
 from solidsph.maths.arrays import Array, Indices
 from solidsph_builtin.effects._meeting import Meeting, Rubbing, Touch
+from solidsph_builtin.effects._room import Near
 from solidsph_builtin.effects._slip import slip_stiffness
 
 
@@ -16,15 +17,22 @@ def normal_stiffness(meeting: Meeting, touch: Touch) -> csr_array:
 
     K sum of V_a (grad o_a grad o_a^T + o_a grad^2 o_a) over the particles with an excess.
     """
-    i, j, V, K = touch.i, touch.j, meeting.volumes, meeting.modulus
-    m, d = len(V), touch.offsets.shape[1]
-    own = K * V * (touch.excess > 0.0)
-    G = _excess_gradient(meeting, touch)
-    risen = csr_array(G.T @ diags_array(own, format="csr") @ G)
-    factors = K * V[i] * V[j] * (touch.excess[i] + touch.excess[j])
-    bends = factors[:, None, None] * _second_derivatives(meeting.kernel, touch)
-    bent = csr_array(_blocks(i, j, bends, m, d) + _blocks(j, i, bends, m, d))
-    return csr_array(risen + bent)
+    near, beyond, V = touch.near, touch.beyond, meeting.volumes
+    i, j, m, d = near.i, near.j, len(V), near.offsets.shape[1]
+    own = meeting.modulus * V
+    G = _gradients(near, V, *beyond.slopes)
+    active = diags_array(own * (beyond.excess > 0.0), format="csr")
+    total = csr_array(G.T @ active @ G)
+    pressures = meeting.modulus * beyond.excess
+    both = pressures[i] * beyond.factors[0] + pressures[j] * beyond.factors[1]
+    bends = (V[i] * V[j] * both)[:, None, None] * _second_derivatives(meeting.kernel, near)
+    total = csr_array(total + _blocks(i, j, bends, m, d) + _blocks(j, i, bends, m, d))
+    if beyond.bend is not None:
+        # grad^2 o has the part grad S (grad S - grad o)^T / S and its transpose.
+        S = _gradients(near, V, near.slopes, near.slopes)
+        turned = S.T @ diags_array(V * pressures * beyond.bend, format="csr") @ csr_array(S - G)
+        total = csr_array(total + turned + turned.T)
+    return total
 
 
 def friction_stiffness(
@@ -43,7 +51,7 @@ def friction_stiffness(
         slip[own], step * rub.relative, rub.normals, meeting.spring[own], rub.limits
     )
     relative = _relative_motion(meeting, touch, rub, x)
-    rises = csr_array(_excess_gradient(meeting, touch)[own])
+    rises = csr_array(_gradients(touch.near, meeting.volumes, *touch.beyond.slopes)[own])
     by_limit = csr_array(_diagonal(springs.by_limit[:, :, None] * rub.rise[:, None, None]) @ rises)
     pulls = csr_array(_diagonal(springs.by_motion) @ relative + by_limit)
     return csr_array(relative.T @ pulls)
@@ -55,9 +63,10 @@ def _relative_motion(meeting: Meeting, touch: Touch, rub: Rubbing, x: Array) -> 
     (m, d), count = x.shape, len(rub.own)
     number = np.full(m, -1)
     number[rub.own] = np.arange(count)
-    p = np.concatenate([touch.i, touch.j])
-    q = np.concatenate([touch.j, touch.i])
-    W = np.concatenate([touch.values, touch.values])
+    near = touch.near
+    p = np.concatenate([near.i, near.j])
+    q = np.concatenate([near.j, near.i])
+    W = np.concatenate([near.values, near.values])
     held = number[p] >= 0
     n, q, W = number[p[held]], q[held], W[held]
     places, around = rub.places[n], rub.around
@@ -96,13 +105,13 @@ def _diagonal(blocks: Array) -> csr_array:
     return csr_array(bsr_array((blocks, np.arange(k), np.arange(k + 1)), shape=(a * k, b * k)))
 
 
-def _excess_gradient(meeting: Meeting, touch: Touch) -> csr_array:
-    """Gradients of the volume fractions around all particles, (m, d m) [1/m]."""
-    i, j, V = touch.i, touch.j, meeting.volumes
-    m, d = len(V), touch.offsets.shape[1]
-    steep = touch.slopes[:, None] * touch.offsets  # of W by x_i, (k, d)
-    of_i = _blocks(i, j, (V[j, None] * steep)[:, None, :], m, d)
-    return csr_array(of_i - _blocks(j, i, (V[i, None] * steep)[:, None, :], m, d))
+def _gradients(near: Near, V: Array, of_i: Array, of_j: Array) -> csr_array:
+    """Of sums over pairs whose derivatives by distance, over V and the distance, are `of_i` for
+    the sum of i and `of_j` for that of j (k,): by all places, (m, d m) [1/m]."""
+    i, j, m, d = near.i, near.j, len(V), near.offsets.shape[1]
+    forth = _blocks(i, j, ((V[j] * of_i)[:, None] * near.offsets)[:, None, :], m, d)
+    back = _blocks(j, i, ((V[i] * of_j)[:, None] * near.offsets)[:, None, :], m, d)
+    return csr_array(forth - back)
 
 
 def spread(matrix: csr_array, particles: Indices, n: int) -> csr_array:
@@ -127,15 +136,15 @@ def _blocks(p: Indices, q: Indices, blocks: Array, m: int, d: int) -> csr_array:
     return csr_array(csr_array(across) + csr_array(own))
 
 
-def _second_derivatives(kernel: SmoothingKernel, touch: Touch) -> Array:
+def _second_derivatives(kernel: SmoothingKernel, near: Near) -> Array:
     """Second derivatives of W by the offset of each pair, (k, d, d) [m^-(d+2)]."""
-    square = np.einsum("kc,kc->k", touch.offsets, touch.offsets)
-    d, H = kernel.dimension, kernel.support_radius
+    square = np.einsum("kc,kc->k", near.offsets, near.offsets)
+    d, H = kernel.dimension, near.reaches
     q = np.sqrt(square) / H
     stepped = np.asarray(kernel.kernel.slope(q + 1j * COMPLEX_STEP, kernel.kernel.params))
     curvature = np.imag(stepped) / COMPLEX_STEP * kernel.normalisation / H ** (d + 2)
-    along = np.einsum("kc,ke->kce", touch.offsets, touch.offsets)
+    along = np.einsum("kc,ke->kce", near.offsets, near.offsets)
     along /= np.where(square > 0.0, square, 1.0)[:, None, None]
     # In one place W is bent alike in every direction.
-    across = np.where(square > 0.0, touch.slopes, curvature)[:, None, None]
+    across = np.where(square > 0.0, near.slopes, curvature)[:, None, None]
     return np.asarray(across * np.eye(d) + (curvature[:, None, None] - across) * along)

@@ -10,26 +10,25 @@ from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph_builtin.effects._contact_passes import Passes, Surroundings, passes
 from solidsph_builtin.effects._crowding import REACH
-from solidsph_builtin.effects._search import NeighbourList, Search, together
+from solidsph_builtin.effects._room import Excess, Near, Room
+from solidsph_builtin.effects._search import Candidates, NeighbourList, Search, candidates, together
 from solidsph_builtin.effects._slip import slid
 
 # Relative to the squared reach: moments of inertia below this are those of particles on a line.
 _SLENDER = 1e-6
-
-# Bound on the relative rounding of sums of the same terms, in another order or after a translation.
-_ROUNDING = 1e-9
 
 
 @attrs.frozen(eq=False)
 class Touch:
     """Pairs within reach, and the excess of the volume fraction at every particle."""
 
-    i: Indices  # (k,)
-    j: Indices  # (k,)
-    offsets: Array  # (k, d) x_i - x_j [m]
-    values: Array  # (k,) W [m^-d]
-    slopes: Array  # (k,) dW/dr / r [m^-(d+2)]
-    excess: Array  # (m,) o, volume fraction of the other body beyond the room [-]
+    near: Near
+    beyond: Excess
+
+    @property
+    def excess(self) -> Array:
+        """o of every particle, (m,) [-]."""
+        return self.beyond.excess
 
 
 @attrs.frozen(eq=False)
@@ -54,18 +53,19 @@ class Meeting:
     particles: Indices  # (m,) among all particles
     belongs: Mask  # (m,) True for those of the first body
     volumes: Array  # (m,) V [m^d]
-    room: Array  # (m,) volume fraction that the other may fill around them [-]
     depths: Array  # (m,) below the surface of their body [m]
-    modulus: float  # K [Pa]
+    room: Room
+    modulus: Array  # (m,) K [Pa]
     spring: Array  # (m,) of friction [N/m]
-    kernel: SmoothingKernel
+    frequency: float  # the contact adds at most this angular frequency [rad/s]
+    kernel: SmoothingKernel  # with the largest reach
     search: Search
     # A cache, which does not influence results.
     _near: NeighbourList = attrs.field(init=False, repr=False)
 
     @_near.default
     def _no_list(self) -> NeighbourList:
-        return NeighbourList(self.search, self.kernel.support_radius)
+        return NeighbourList(self.search, self.room.brought)
 
     places: slice | Indices = attrs.field(init=False, repr=False)  # the particles
 
@@ -86,16 +86,16 @@ class Meeting:
         """Pairs at `positions` (n, d) of all particles [m]; None while the boxes are apart."""
         if self.search.far_apart(positions):
             return None
-        return self._touch(positions[self.places], *self._near.pairs(positions[self.places]))
+        x = positions[self.places]
+        near = self._within_reach(x, self._near.candidates(x))
+        return Touch(near, self.room.excess(self._passes, self.volumes, near))
 
-    def _touch(self, x: Array, i: Indices, j: Indices) -> Touch:
+    def _within_reach(self, x: Array, found: Candidates) -> Near:
         kernel = self.kernel
-        H, d = kernel.support_radius, kernel.dimension
-        norm = kernel.normalisation / H**d
-        near = self._passes.near(x, i, j, H, norm, kernel.kernel.params)
-        i, j, offsets, values, slopes = near
-        filled = self._passes.filled(i, j, values, self.volumes)
-        return Touch(i, j, offsets, values, slopes, np.maximum(filled - self.room, 0.0))
+        of_kernel = kernel.normalisation, kernel.kernel.params
+        lists = found.i, found.j, found.reaches
+        places, i, j, offsets, values, slopes = self._passes.near(x, *lists, *of_kernel)
+        return Near(i, j, offsets, values, slopes, found, places)
 
     def unloaded(self, X: Array) -> Meeting:
         """The meeting without forces at the reference positions X (m, d) of its particles [m].
@@ -104,20 +104,21 @@ class Meeting:
         Faces that lie on each other initially then touch to rounding, also with scattered particles
         and in corners of the other, which fill more than a plane face does.
         """
-        i, j = self.search.within(X, self.kernel.support_radius)
-        touch = attrs.evolve(self, room=np.zeros_like(self.room))._touch(X, i, j)
-        return attrs.evolve(self, room=np.maximum(self.room, (1.0 + _ROUNDING) * touch.excess))
+        near = self._within_reach(X, candidates(self.search, self.room.brought, X))
+        return attrs.evolve(self, room=self.room.at_least(self._passes, self.volumes, near))
 
     def pushes(self, touch: Touch) -> Array:
         """Force on i of every pair along the line between the two, (k, d) [N]; opposite on j."""
-        of_pairs = touch.i, touch.j, touch.offsets, touch.slopes
-        found: Array = self._passes.pushes(*of_pairs, self.volumes, touch.excess, self.modulus)
+        near, beyond = touch.near, touch.beyond
+        pressures = self.modulus * beyond.excess
+        of_pairs = near.i, near.j, near.offsets, *beyond.slopes
+        found: Array = self._passes.pushes(*of_pairs, self.volumes, pressures)
         return found
 
     def normal_forces(self, touch: Touch) -> Array:
         """Normal force on every particle, (m, d) [N]: minus the derivative of the energies."""
         pushes = self.pushes(touch)
-        forces: Array = self._passes.summed(touch.i, touch.j, pushes, len(self.volumes))
+        forces: Array = self._passes.summed(touch.near.i, touch.near.j, pushes, len(self.volumes))
         return forces
 
     def energies(self, touch: Touch) -> Array:
@@ -144,15 +145,16 @@ class Meeting:
         )
         pull = np.zeros_like(rub.around.slope)
         pull[rub.places] = forces[own] = -self.spring[own][:, None] * slipped[own]
-        of_pairs = touch.i, touch.j, touch.values
+        of_pairs = touch.near.i, touch.near.j, touch.near.values
         self._passes.react(rub.around, *of_pairs, self.volumes, x, forces, pull)
         return forces, slipped
 
     def rubbing(self, touch: Touch, x: Array, v: Array, friction: float) -> Rubbing:
         """The particles with a spring at positions x (m, d) [m] and velocities v (m, d) [m/s]."""
-        V, floor = self.volumes, _SLENDER * self.kernel.support_radius**2
-        of_pairs = touch.i, touch.j, touch.offsets, touch.values, touch.slopes
-        around = self._passes.surroundings(*of_pairs, V, touch.excess, x, v, floor)
+        V, K, near = self.volumes, self.modulus, touch.near
+        of_pairs = near.i, near.j, near.offsets, near.values, *touch.beyond.slopes
+        floors = _SLENDER * self.search.radii**2
+        around = self._passes.surroundings(*of_pairs, V, touch.excess, x, v, floors)
         steep = np.linalg.norm(around.slope, axis=1)
         k = np.flatnonzero((steep > 0.0) & around.sound)
         own = around.own[k]
@@ -162,14 +164,14 @@ class Meeting:
             own=own,
             relative=v[own] - around.velocity[k],
             normals=around.slope[k] / steep[k][:, None],
-            limits=friction * self.modulus * V[own] * touch.excess[own] * steep[k],
-            rise=friction * self.modulus * V[own] * steep[k],
+            limits=friction * K[own] * V[own] * touch.excess[own] * steep[k],
+            rise=friction * K[own] * V[own] * steep[k],
         )
 
     def least_gap(self, positions: Array) -> float:
         """Distance of the surfaces of two bodies [m], by their nearest outermost particles."""
         x = positions[self.particles]
-        outer = self.depths <= self.kernel.support_radius / REACH
+        outer = self.depths <= self.search.radii / REACH
         one, other = np.flatnonzero(outer & self.belongs), np.flatnonzero(outer & ~self.belongs)
         distances, nearest = cKDTree(x[other]).query(x[one])
         gaps = distances - self.depths[one] - self.depths[other[nearest]]

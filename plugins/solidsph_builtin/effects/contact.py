@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from math import sqrt
 from typing import ClassVar, final
 
 import attrs
@@ -16,27 +15,13 @@ from solidsph.interfaces.body import Body
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.effect import Effect, Need
 from solidsph.interfaces.memory import Memory
-from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.interfaces.terms import EnergyTerm, FieldTerm, Load, Observation
 from solidsph.maths.arrays import Array, Indices
 from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.effects._contact_stiffness import friction_stiffness, normal_stiffness, spread
-from solidsph_builtin.effects._crowding import REACH, crowding_kernel, sensitivity, sites, steepest
 from solidsph_builtin.effects._meeting import Meeting, Touch
-from solidsph_builtin.effects._search import Between, Search, Within, together
-
-# Depth of the compressed layer, 1 / integral of (dS/dz)^2 dz, relative to the support radius.
-_LAYER = 0.87
-
-# Smallest initial distance of particles of one body that may touch, in support radii.
-_APART = 2.0
-
-# Tangential over normal stiffness, as between elastic bodies of usual Poisson's ratio (Mindlin
-# 1949: 2 (1 - nu) / (2 - nu)).
-_TANGENTIAL = 0.8
-
-# Largest excess assumed for the stable step, that of a penetration by half a spacing.
-_EXCESS = 0.2
+from solidsph_builtin.effects._meeting_of_bodies import meeting_of
+from solidsph_builtin.effects._search import together
 
 _NAMES = ("x", "y", "z")
 
@@ -108,13 +93,7 @@ class Contact(Effect):
 
     def bind(self, model: DiscreteModel, label: str) -> Load:
         pairs = self._pairs_of_bodies(model.bodies)
-        for body in {body.name: body for pair in pairs for body in pair}.values():
-            if body.particles.graded:
-                raise SceneError(
-                    f"contact: the spacing of body {body.name!r} varies, which contact does not "
-                    "follow yet; give it one spacing, or leave it out with `between`"
-                )
-        meetings = [_meeting(one, other, self.strength, self.margin) for one, other in pairs]
+        meetings = [meeting_of(one, other, self.strength, self.margin) for one, other in pairs]
         return _Contact(
             label=label,
             particles=np.unique(np.concatenate([meeting.particles for meeting in meetings])),
@@ -122,15 +101,8 @@ class Contact(Effect):
             meetings=meetings,
             friction=self.friction,
             dimension=model.particles.dimension,
-            stiffness_rate=max(self._frequency(one, other) for one, other in pairs),
+            stiffness_rate=max(meeting.frequency for meeting in meetings),
         )
-
-    def _frequency(self, one: Body, other: Body) -> float:
-        """Angular frequency that the contact of two bodies adds at most [rad/s]."""
-        kernel = _kernel(one, other)
-        density = min(one.material.density, other.material.density)
-        modulus = _modulus(one, other, kernel.support_radius, self.strength)
-        return sqrt(modulus / density * sensitivity(kernel, _EXCESS))
 
     def pair_work(self, particles: float, pairs: float) -> float:
         # While bodies are apart only boxes are compared; touching surfaces have few pairs.
@@ -286,8 +258,8 @@ class _Contact(EnergyTerm, FieldTerm, Load):
             touch = meeting.touch(positions)
             force = np.zeros(positions.shape[1])
             if touch is not None:
-                excess = touch.excess
-                pairs += int(np.sum((excess[touch.i] > 0.0) | (excess[touch.j] > 0.0)))
+                excess, near = touch.excess, touch.near
+                pairs += int(np.sum((excess[near.i] > 0.0) | (excess[near.j] > 0.0)))
                 # A step of length 0 leaves the springs as they are: the forces that acted.
                 acted, _ = self._contact_force(
                     meeting, touch, positions, state.velocities, 0.0, state.memory
@@ -324,50 +296,6 @@ class _Contact(EnergyTerm, FieldTerm, Load):
     @property
     def _asleep(self) -> str:
         return f"{self.label} evaluations asleep"
-
-
-def _meeting(one: Body, other: Body, strength: float, margin: float) -> Meeting:
-    kernel, alone = _kernel(one, other), one is other
-    reach = kernel.support_radius
-    margin *= reach / REACH
-    own = [sites(one, other, kernel, near_surface=alone)]
-    if not alone:
-        own.append(sites(other, one, kernel))
-    split = len(own[0].particles)
-    modulus = _modulus(one, other, reach, strength)
-    volumes = np.concatenate([part.volumes for part in own])
-    X = np.concatenate([part.positions for part in own])
-    search: Search = Between(
-        together(own[0].particles), together(own[-1].particles), split, reach + margin
-    )
-    if alone:
-        search = Within(own[0].particles, X, _APART * reach, reach + margin)
-    meeting = Meeting(
-        first=one.name,
-        second=other.name,
-        particles=np.concatenate([part.particles for part in own]),
-        belongs=np.arange(len(volumes)) < split,
-        volumes=volumes,
-        room=np.concatenate([part.room for part in own]),
-        depths=np.concatenate([part.depths for part in own]),
-        modulus=modulus,
-        spring=_TANGENTIAL * 0.5 * modulus * volumes * steepest(kernel) ** 2,
-        kernel=kernel,
-        search=search,
-    )
-    return meeting.unloaded(X)
-
-
-def _kernel(one: Body, other: Body) -> SmoothingKernel:
-    spacing = max(float(body.particles.spacings.max()) for body in (one, other))
-    return crowding_kernel(one.particles.dimension, REACH * spacing)
-
-
-def _modulus(one: Body, other: Body, reach: float, strength: float) -> float:
-    """K [Pa]: the pressure of a penetration z is K z over the depth of the compressed layer."""
-    first, second = (body.material.density * body.material.wave_speed**2 for body in (one, other))
-    spacing = 0.5 * sum(float(body.particles.spacings.max()) for body in (one, other))
-    return strength * 2.0 * first * second / (first + second) * _LAYER * reach / spacing
 
 
 def _names(field: str, given: Sequence[str]) -> tuple[str, ...]:

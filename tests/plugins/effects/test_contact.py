@@ -421,9 +421,9 @@ class Sideways(Meeting):
 def test_the_kit_finds_a_wrong_contact(
     wrong: type[Meeting], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from solidsph_builtin.effects import contact
+    from solidsph_builtin.effects import _meeting_of_bodies
 
-    monkeypatch.setattr(contact, "Meeting", wrong)
+    monkeypatch.setattr(_meeting_of_bodies, "Meeting", wrong)
     (momentum,) = [one for one in checks("effects") if one.__name__ == "momentum"]
     assert not momentum(Contact()).passed
 
