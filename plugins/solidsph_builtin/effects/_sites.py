@@ -8,7 +8,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
-from solidsph.maths.arrays import Array, Indices
+from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph_builtin.effects._crowding import REACH, crowding_kernel, layer
 
 # Number of depths at which the volume fraction beside a plane face is tabulated; interpolation is
@@ -75,7 +75,7 @@ class FilledBeside:
         heights = np.linspace(0.0, 1.0, _TABULATED)
         across = layer(kernel, heights)
         filled = np.zeros((len(_RATIOS), _TABULATED))
-        for depth, thickness in _rows(body, REACH / float(_RATIOS[0])):
+        for depth, thickness in _graded_rows(body, REACH / float(_RATIOS[0])):
             for k, width in enumerate(_RATIOS / REACH):
                 below = heights + depth * width
                 filled[k] += thickness * width * np.interp(below, heights, across, right=0.0)
@@ -93,16 +93,12 @@ def _rows(body: Body, reach: float) -> list[tuple[float, float]]:
     """Depth and thickness of the rows of particles below a plane face, down to `reach`; all in
     spacings.
 
-    The first is at the median depth of the particles that own the surface: half a spacing for
-    centres of cells, and 0 on the surface. A row is as thick as its particles' volumes say, which
-    for particles on the surface are a half of the others, or what a fit of volumes gives them.
+    A row is as thick as its particles' volumes say, which for particles on the surface are a half
+    of the others, or what a fit of volumes gives them.
     """
     own = body.particles
-    below = -body.shape.signed_distance(own.positions) / own.spacings
-    owners = np.any(own.area_vectors != 0.0, axis=1) & ~own.ghosts
-    first = 0.5
-    if owners.any():
-        first = min(max(float(np.median(below[owners])), 0.0), 1.0)
+    below, owners = _below(body)
+    first = _first(below, owners)
     thick = own.volumes / own.spacings**own.dimension
     rows = []
     for k, z in enumerate(np.arange(first, reach, 1.0)):
@@ -110,3 +106,32 @@ def _rows(body: Body, reach: float) -> list[tuple[float, float]]:
         usual = 1.0 if k else first + 0.5
         rows.append((float(z), float(np.median(there)) if there.size else usual))
     return rows
+
+
+def _graded_rows(body: Body, reach: float) -> list[tuple[float, float]]:
+    """The same where rows are soon lost. The first is as thick as volumes are for their areas, and
+    the second makes good for that."""
+    own = body.particles
+    below, owners = _below(body)
+    first = _first(below, owners)
+    thickness = first + 0.5
+    if owners.any():
+        areas = np.linalg.norm(own.area_vectors[owners], axis=1)
+        thickness = float(np.median(own.volumes[owners] / areas / own.spacings[owners]))
+    depths = np.arange(first, reach, 1.0)
+    thick = np.ones(len(depths))
+    thick[0], thick[1] = thickness, first + 1.5 - thickness
+    return list(zip(depths.tolist(), thick.tolist(), strict=True))
+
+
+def _below(body: Body) -> tuple[Array, Mask]:
+    """Depths of all particles (n,) [spacings], and which ones own the surface, (n,)."""
+    own = body.particles
+    below = -body.shape.signed_distance(own.positions) / own.spacings
+    return below, np.any(own.area_vectors != 0.0, axis=1) & ~own.ghosts
+
+
+def _first(below: Array, owners: Mask) -> float:
+    """Depth of the first row [spacings], the median of those that own the surface: half a spacing
+    for centres of cells, and 0 on the surface."""
+    return min(max(float(np.median(below[owners])), 0.0), 1.0) if owners.any() else 0.5
