@@ -14,7 +14,7 @@ from solidsph_builtin.effects._crowding import REACH, crowding_kernel, sensitivi
 from solidsph_builtin.effects._meeting import Meeting
 from solidsph_builtin.effects._room import ConstantRoom, MeanRoom, Room
 from solidsph_builtin.effects._search import Between, Search, Within, together
-from solidsph_builtin.effects._sites import FilledBeside, filled_beside, sites
+from solidsph_builtin.effects._sites import FilledBeside, Sites, filled_beside, first_row, sites
 
 # Depth of the compressed layer, 1 / integral of (dS/dz)^2 dz, relative to the support radius.
 _LAYER = 0.87
@@ -68,7 +68,7 @@ def meeting_of(one: Body, other: Body, strength: float, margin: float) -> Meetin
         belongs=belongs,
         volumes=volumes,
         depths=depths,
-        room=_room(bodies, belongs, spacings, depths, kernel),
+        room=_room(bodies, own, belongs, kernel),
         modulus=modulus,
         spring=_TANGENTIAL * 0.5 * modulus * volumes * steep**2,
         frequency=sqrt(float(np.max(modulus * sensitive)) / _density(bodies)),
@@ -90,10 +90,18 @@ def _modulus(bodies: Sequence[Body], strength: float) -> float:
 
 
 def _room(
-    bodies: Sequence[Body], belongs: Mask, spacings: Array, depths: Array, kernel: SmoothingKernel
+    bodies: Sequence[Body], own: Sequence[Sites], belongs: Mask, kernel: SmoothingKernel
 ) -> Room:
+    spacings, depths = (
+        np.concatenate([getattr(part, name) for part in own]) for name in ("spacings", "depths")
+    )
     if any(body.particles.graded for body in bodies):
         filled = [FilledBeside.of(body) for body in bodies]
-        return MeanRoom(depths, spacings, filled, np.zeros(len(depths)))
+        rows = [
+            first_row(body)[part.particles - body.extent.start]
+            for part, body in zip(own, bodies, strict=False)
+        ]
+        none = np.zeros(len(depths))
+        return MeanRoom(depths, spacings, np.concatenate(rows), filled, none)
     one, other = (filled_beside(body, kernel, depths) for body in bodies)
     return ConstantRoom(np.where(belongs, other, one))

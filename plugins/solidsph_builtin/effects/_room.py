@@ -97,7 +97,7 @@ class MeanRoom(Room):
     """That of bodies whose spacing varies: the mean of what the other's particles nearby leave.
 
     Each b leaves a the room R_ab, the volume fraction at a of a plane face that lies on the
-    surface of A and has the spacing of b everywhere. The mean is weighted by what b contributes to
+    surface of A and has the rows beside b everywhere. The mean is weighted by what b contributes to
     the volume fraction S_a, so that the excess is
 
         o_a = S_a - Q_a / S_a,   S_a = sum of V_b W_ab,   Q_a = sum of V_b W_ab R_ab,
@@ -107,14 +107,15 @@ class MeanRoom(Room):
 
     depths: Array  # (m,) below the surface of their body [m]
     spacings: Array  # (m,) s [m]
+    first_row: Array  # (m,) thickness of the first row of their body there [s]
     bodies: Sequence[FilledBeside]  # that of i and that of j
     extra: Array  # (m,) beyond the mean [-]
 
     def brought(self, i: Indices, j: Indices, reaches: Array) -> tuple[Array, ...]:
         first, second = self.bodies
         return (
-            second.at(self.depths[i], self.spacings[j], reaches),
-            first.at(self.depths[j], self.spacings[i], reaches),
+            second.at(self.depths[i], self.spacings[j], self.first_row[j], reaches),
+            first.at(self.depths[j], self.spacings[i], self.first_row[i], reaches),
         )
 
     def excess(self, passes: Passes, volumes: Array, near: Near) -> Excess:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import attrs
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
+from scipy.spatial import cKDTree
 
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
@@ -18,6 +19,9 @@ _TABULATED = 1000
 # Ratios of two spacings at which it is tabulated. It changes with their square, by some hundredths:
 # interpolation is right to 1e-5.
 _RATIOS = np.linspace(0.02, 1.0, 50)
+
+# Owners of the surface that are beside a particle, by dimension: as far as some spacings.
+_BESIDE = {1: 1, 2: 7, 3: 25}
 
 # Particles this close to the depth of a row belong to it, in spacings.
 _ROW = 0.3
@@ -65,28 +69,67 @@ def filled_beside(body: Body, kernel: SmoothingKernel, heights: Array) -> Array:
 
 @attrs.frozen(eq=False)
 class FilledBeside:
-    """The same of a body whose spacing varies: rows are as far apart as it says there."""
+    """The same of a body whose spacing varies, by the spacing and the thickness of its first row.
 
-    _table: RegularGridInterpolator
+    Rows that are further in are soon lost: they count as a spacing thick, and the second one makes
+    good for the first.
+    """
+
+    _usual: RegularGridInterpolator  # by ratio of spacings and height, of a first row as usual
+    _change: RegularGridInterpolator  # of a first row that is a spacing thicker
+    thickness: float  # of the first row, as usual [spacings]
 
     @classmethod
     def of(cls, body: Body) -> FilledBeside:
         kernel = crowding_kernel(body.particles.dimension, 1.0)
         heights = np.linspace(0.0, 1.0, _TABULATED)
         across = layer(kernel, heights)
-        filled = np.zeros((len(_RATIOS), _TABULATED))
-        for depth, thickness in _graded_rows(body, REACH / float(_RATIOS[0])):
-            for k, width in enumerate(_RATIOS / REACH):
-                below = heights + depth * width
-                filled[k] += thickness * width * np.interp(below, heights, across, right=0.0)
-        return cls(RegularGridInterpolator((_RATIOS, heights), filled))
+        first = _first(*_below(body))
+        widths = _RATIOS[:, None] / REACH  # of a spacing, in reaches
 
-    def at(self, heights: Array, spacings: Array, reaches: Array) -> Array:
-        """Volume fraction at `heights` above a plane face with these `spacings` of the body,
-        smoothed over these `reaches`, all (k,) [m]: (k,) [-]."""
+        def row(depth: float) -> Array:
+            below = heights + depth * widths
+            return np.asarray(widths * np.interp(below, heights, across, right=0.0))
+
+        rows = [row(depth) for depth in np.arange(first, REACH / float(_RATIOS[0]), 1.0)]
+        usual = (first + 0.5) * rows[0] + sum(rows[1:])
+        grid = _RATIOS, heights
+        return cls(
+            RegularGridInterpolator(grid, usual),
+            RegularGridInterpolator(grid, rows[0] - rows[1]),
+            first + 0.5,
+        )
+
+    def at(self, heights: Array, spacings: Array, thicknesses: Array, reaches: Array) -> Array:
+        """Volume fraction at `heights` above a plane face [m], (k,) [-].
+
+        Args:
+            heights: (k,) [m].
+            spacings: of the body there, (k,) [m].
+            thicknesses: of its first row there, (k,) [spacings].
+            reaches: over which it is smoothed, (k,) [m].
+        """
         ratios = np.clip(REACH * spacings / reaches, _RATIOS[0], 1.0)
-        found = self._table(np.stack([ratios, np.minimum(heights / reaches, 1.0)], axis=1))
-        return np.asarray(found)
+        places = np.stack([ratios, np.minimum(heights / reaches, 1.0)], axis=1)
+        change = (thicknesses - self.thickness) * self._change(places)
+        return np.asarray(self._usual(places) + change)
+
+
+def first_row(body: Body) -> Array:
+    """Thickness of the first row of particles below the surface, beside each particle (n,)
+    [spacings]: that of the volumes of those who own the surface, over their areas.
+
+    It is the median of some, among which those at an edge, with two areas, do not count.
+    """
+    own = body.particles
+    below, owners = _below(body)
+    if not owners.any():
+        return np.full(own.count, _first(below, owners) + 0.5)
+    areas = np.linalg.norm(own.area_vectors[owners], axis=1)
+    thick = own.volumes[owners] / areas / own.spacings[owners]
+    count = min(_BESIDE[own.dimension], len(thick))
+    _, near = cKDTree(own.positions[owners]).query(own.positions, count)
+    return np.asarray(np.median(thick[near.reshape(own.count, count)], axis=1))
 
 
 def _rows(body: Body, reach: float) -> list[tuple[float, float]]:
@@ -106,22 +149,6 @@ def _rows(body: Body, reach: float) -> list[tuple[float, float]]:
         usual = 1.0 if k else first + 0.5
         rows.append((float(z), float(np.median(there)) if there.size else usual))
     return rows
-
-
-def _graded_rows(body: Body, reach: float) -> list[tuple[float, float]]:
-    """The same where rows are soon lost. The first is as thick as volumes are for their areas, and
-    the second makes good for that."""
-    own = body.particles
-    below, owners = _below(body)
-    first = _first(below, owners)
-    thickness = first + 0.5
-    if owners.any():
-        areas = np.linalg.norm(own.area_vectors[owners], axis=1)
-        thickness = float(np.median(own.volumes[owners] / areas / own.spacings[owners]))
-    depths = np.arange(first, reach, 1.0)
-    thick = np.ones(len(depths))
-    thick[0], thick[1] = thickness, first + 1.5 - thickness
-    return list(zip(depths.tolist(), thick.tolist(), strict=True))
 
 
 def _below(body: Body) -> tuple[Array, Mask]:

@@ -31,8 +31,8 @@ _NAMES = ("x", "y", "z")
 class Contact(Effect):
     """Repulsion of two bodies whose volume fractions add up to more than one.
 
-    Let S_B(x) = sum over b of V_b W(x - x_b) be the volume fraction of body B around x, smoothed
-    over 2.5 spacings. A particle a of body A has the room r_a, the volume fraction at a of a body
+    Let S_B(x_a) = sum over b of V_b W(x_a - x_b) be the volume fraction of body B around x_a,
+    smoothed over 2.5 spacings, the larger of a and b. A particle a of body A has the room r_a, the volume fraction at a of a body
     whose plane face lies on the surface of A, and the excess o_a = max(0, S_B(x_a) - r_a). The
     energy
 
@@ -46,6 +46,10 @@ class Contact(Effect):
     The usual pair force with a range of one spacing lets a lattice sink into another one, half a
     spacing off, by 0.13 spacings, so that sliding bodies interlock; here it is below 0.001.
 
+    Bodies whose spacing varies may be refined where they touch. The reach of W is that of each
+    pair, and r_a the mean of the rooms that the particles of B nearby leave, weighted by their
+    parts of S_B: it follows the spacing on both sides, and is still a function of distances alone.
+
     K makes the contact as compliant as `1 / strength` spacings of material with the harmonic mean
     of both confined moduli. Deep inside, where S_B is constant, there is no force: a body may pass
     if the strength is too low or a body is thinner than two spacings.
@@ -55,9 +59,9 @@ class Contact(Effect):
     contact itself (Cundall & Strack 1979). The spring acts on the particles of the other body
     nearby, moment included. The stretches are in `State.memory`.
 
-    Particles of one body touch only if they were more than two support radii apart, so a crease
+    Particles of one body touch only if they were more than two reaches apart, so a crease
     does not close. The search begins when the boxes of two bodies come within `margin` of the
-    reach. All particles in both boxes take part, so that deep penetration is not missed; of a body
+    largest reach. All particles in both boxes take part, so that deep penetration is not missed; of a body
     with itself, only those near its surface.
     """
 
@@ -68,7 +72,7 @@ class Contact(Effect):
     itself: Sequence[str] = ()  # names of bodies that may touch themselves; ["all"] for each
     friction: float = number(default=0.0)  # coefficient [-]
     strength: float = number(default=1.0)  # [-]
-    margin: float = number(default=1.0)  # [spacings]; infinite to search at every step
+    margin: float = number(default=1.0)  # [least spacings]; infinite to search at every step
 
     def __attrs_post_init__(self) -> None:
         check_positive("contact", "strength", self.strength, "1 / spacings that it yields, near 1")

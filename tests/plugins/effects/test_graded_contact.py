@@ -16,7 +16,7 @@ from solidsph import Record, Simulation
 from solidsph.maths.arrays import Array
 from solidsph.scene.scene_builder import SceneBuilder
 from solidsph_builtin.effects._crowding import REACH, crowding_kernel
-from solidsph_builtin.effects._sites import FilledBeside, filled_beside
+from solidsph_builtin.effects._sites import FilledBeside, filled_beside, first_row
 from tests.helpers.examples import examples
 from tests.helpers.scenes import SOFT
 from tests.plugins.effects.test_contact import MODULUS, condition, energies, forces
@@ -212,7 +212,8 @@ def test_the_table_of_ratios_is_that_of_one_spacing(d: int, ratio: float) -> Non
     heights = np.linspace(0.0, H, 50)
     # Rows of one lattice alone, as deep as the reach; the last of the body is 0.95 below.
     beside = filled_beside(body, crowding_kernel(d, H), heights)
-    found = FilledBeside.of(body).at(heights, np.full(50, 0.1), np.full(50, H))
+    rows = np.full(50, first_row(body)[0])
+    found = FilledBeside.of(body).at(heights, np.full(50, 0.1), rows, np.full(50, H))
     # Linear interpolation between ratios that are 0.02 apart.
     assert np.abs(found - beside).max() < 3e-5
 
