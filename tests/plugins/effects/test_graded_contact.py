@@ -165,7 +165,8 @@ def test_momenta_stay_and_the_ledger_closes(friction: float, tmp_path: Path) -> 
     ],
 )
 def test_faces_touch_where_their_surfaces_are(where: str, ratio: float) -> None:
-    """Within some hundredths of the spacing where they meet."""
+    """Within some hundredths of the spacing where they meet; where it grows by 0.47 m per metre from
+    the face on, 0.06 early."""
     check_touching(2, where, 0.1, ratio)
 
 
@@ -189,9 +190,9 @@ def check_touching(d: int, where: str, coarse: float, ratio: float) -> None:
         "opposite": (low, refined("Y > 0.9", coarse, ratio, over), coarse),
     }[where]
     simulation = pair(d, block, other).build()
-    # By a tenth of what a scattered particle is off; a face yields by about a spacing.
+    # A face yields by about a spacing: a pressure of 0.05 is a twentieth of one.
     assert pressure(simulation, -0.2 * spacing) == 0.0
-    assert pressure(simulation, 0.0) < 0.03
+    assert pressure(simulation, 0.0) < 0.05
     assert pressure(simulation, 0.2 * spacing) > 0.02
 
 
