@@ -9,7 +9,7 @@ import numpy as np
 
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
-from solidsph.maths.arrays import Array, Mask
+from solidsph.maths.arrays import Mask
 from solidsph_builtin.effects._crowding import REACH, crowding_kernel, sensitivity, steepest
 from solidsph_builtin.effects._meeting import Meeting
 from solidsph_builtin.effects._room import ConstantRoom, MeanRoom, Room

@@ -32,9 +32,9 @@ class Contact(Effect):
     """Repulsion of two bodies whose volume fractions add up to more than one.
 
     Let S_B(x_a) = sum over b of V_b W(x_a - x_b) be the volume fraction of body B around x_a,
-    smoothed over 2.5 spacings, the larger of a and b. A particle a of body A has the room r_a, the volume fraction at a of a body
-    whose plane face lies on the surface of A, and the excess o_a = max(0, S_B(x_a) - r_a). The
-    energy
+    smoothed over 2.5 spacings, the larger of a and b. A particle a of body A has the room r_a, the
+    volume fraction at a of a body whose plane face lies on the surface of A, and the excess
+    o_a = max(0, S_B(x_a) - r_a). The energy
 
         U = K / 2 (sum over a of V_a o_a^2 + sum over b of V_b o_b^2)
 
@@ -61,8 +61,8 @@ class Contact(Effect):
 
     Particles of one body touch only if they were more than two reaches apart, so a crease
     does not close. The search begins when the boxes of two bodies come within `margin` of the
-    largest reach. All particles in both boxes take part, so that deep penetration is not missed; of a body
-    with itself, only those near its surface.
+    largest reach. All particles in both boxes take part, so that deep penetration is not missed; of
+    a body with itself, only those near its surface.
     """
 
     conserves_momentum: ClassVar[bool] = True
