@@ -132,7 +132,6 @@ def test_a_discretisation_that_cannot_follow_names_those_that_can() -> None:
     ("words", "message"),
     [
         ({"formulation": "updated-lagrangian"}, "use the formulation 'total-lagrangian'"),
-        ({"effect": {"type": "contact", "itself": ["sheet"]}}, "contact does not follow yet"),
     ],
 )
 def test_what_cannot_follow_is_refused(words: dict[str, Any], message: str) -> None:

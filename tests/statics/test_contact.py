@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from time import process_time
 
 import numpy as np
 import pytest
@@ -330,16 +329,14 @@ def test_refined_cylinders_are_flat_where_hertz_says() -> None:
 
 
 @pytest.mark.validation
-def test_refined_cylinders_are_as_good_as_fine_ones_in_a_fraction_of_the_time() -> None:
-    start = process_time()
-    refined, width, _ = hertz(2, 0.05, 0.05, wall=False, **finer("hypot(X, Y) < 0.2", 0.0125, 0.5))
-    between = process_time()
+def test_refined_cylinders_are_as_good_as_fine_ones() -> None:
+    """With 1 835 particles instead of 10 344."""
+    words = finer("hypot(X, Y) < 0.2", 0.0125, 0.5)
+    refined, width, _ = hertz(2, 0.05, 0.05, wall=False, **words)
     fine, fine_width, _ = hertz(2, 0.0125, 0.05, wall=False)
-    end = process_time()
     # Hertz's bodies are half-spaces: of these the width is 0.97, however fine they are.
     assert width == pytest.approx(fine_width, abs=0.01)
     assert refined == pytest.approx(fine, rel=0.005)
-    assert between - start < 0.4 * (end - between)  # measured 0.15
 
 
 @pytest.mark.validation
