@@ -27,7 +27,7 @@ from solidsph.errors import DivergedError, RecordError
 from solidsph.model.particles import Face, Particles
 from solidsph.results.contents import Output, Reference
 from solidsph.results.hdf5_source import _lookup3
-from solidsph.results.layout import FORMAT, MOST_TAGS, Field, PluginUsed
+from solidsph.results.layout import FORMAT, MOST_TAGS, Field, PluginUsed, tag_name
 from solidsph.results.record import Record
 from solidsph.results.record_writer import RecordWriter
 from solidsph.results.repair import repaired
@@ -383,11 +383,24 @@ def test_tags_are_bits_of_one_integer(tmp_path: Path) -> None:
         assert list(record.particles.tags) == list(tags)
         for name, mask in tags.items():
             np.testing.assert_array_equal(record.particles.tags[name], mask)
-    tags["one more"] = tags["t0"]
-    with pytest.raises(
-        RecordError, match=f"at most {MOST_TAGS} tags besides those of bodies, and the scene has 63"
-    ):
-        opened(tmp_path / "run", attrs.evolve(some, tags=tags))
+
+
+def test_tags_beyond_the_bits_of_an_integer(tmp_path: Path) -> None:
+    """As a polygon with many edges has."""
+    some = some_particles(3, 2)
+    tags = {f"t/{k}": np.arange(3) == k % 3 for k in range(MOST_TAGS + 8)}
+    tags |= {"bar": np.arange(3) < 1}
+    with opened(tmp_path / "run", attrs.evolve(some, tags=tags)) as writer:
+        append(writer, some_step(0, some))
+    with Record(tmp_path / "run") as record:
+        assert list(record.particles.tags) == list(tags)
+        for name, mask in tags.items():
+            np.testing.assert_array_equal(record.particles.tags[name], mask)
+    last = f"t/{MOST_TAGS + 7}"
+    with h5py.File(tmp_path / "run", "a") as file:
+        del file[f"VTKHDF/PointData/{tag_name(last)}"]
+    with pytest.raises(RecordError, match="t/69"):
+        Record(tmp_path / "run").particles  # noqa: B018
 
 
 def test_a_record_of_the_format_before_is_read(tmp_path: Path) -> None:

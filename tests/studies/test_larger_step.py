@@ -96,7 +96,7 @@ def test_the_command_shows_it(tmp_path: Path) -> None:
     done = solidsph(*arguments, "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
-    assert told["largest step"].startswith("with 0.8 of the critical step in place of 0.7, along")
+    assert told["largest step"].startswith("with 0.8 of the critical step in place of 0.6, along")
     for row in told["points"]:
         assert (row[ERROR] != "") is (row[TIME] != "") is row["on the front"]
     assert ERROR in (tmp_path / told["table"]).read_text().splitlines()[0]

@@ -37,12 +37,6 @@ _LARGEST_CHUNK = 2**30  # bytes; HDF5 allows just under 4 GiB
 def check_fields(fields: Sequence[Field], particles: Particles) -> None:
     """Raise RecordError unless a record of these particles can hold these fields."""
     d = particles.dimension
-    tags = _own_tags(particles)
-    if len(tags) > MOST_TAGS:
-        raise RecordError(
-            f"a record holds at most {MOST_TAGS} tags besides those of bodies, and the scene has "
-            f"{len(tags)}; leave some out"
-        )
     taken = {field.name for field in static_fields(d)}
     for field in fields:
         if field.name in taken or not field.name.strip(".") or "/" in field.name:
@@ -107,7 +101,8 @@ def _write_grid(file: Any, particles: Particles, fields: Sequence[Field]) -> Non
     arrays["body"] = np.full(n, -1, dtype=np.int32)
     for number, extent in enumerate(particles.bodies.values()):
         arrays["body"][extent] = number
-    bits = tag_bits(_own_tags(particles))
+    own_tags = _own_tags(particles)
+    bits, further = tag_bits(own_tags[:MOST_TAGS]), own_tags[MOST_TAGS:]
     arrays[TAGS] = np.zeros(n, dtype=np.int64)
     for tag, bit in bits.items():
         arrays[TAGS][particles.tags[tag]] |= bit
@@ -116,6 +111,9 @@ def _write_grid(file: Any, particles: Particles, fields: Sequence[Field]) -> Non
         values = rows.astype(np.uint8) if rows.dtype == np.bool_ else rows
         _describe(data.create_dataset(field.name, data=padded(values, field.components)), field)
         offsets[field.name] = shared
+    for tag in further:
+        data[tag_name(tag)] = particles.tags[tag].astype(np.uint8)
+        offsets[tag_name(tag)] = shared
     names = {tag_name(tag): bit for tag, bit in bits.items()}
     names |= {body_name(body): number for number, body in enumerate(particles.bodies)}
     _write_names(grid, names, shared)
@@ -165,7 +163,7 @@ def _write_run(file: Any, reference: Reference) -> None:
     run["versions"] = _texts([f"{name} {version}" for name, version in reference.versions.items()])
     run["fields"] = _texts([field.name for field in reference.fields])
     run["tags"] = _texts(list(particles.tags))
-    run["bits"] = _texts(_own_tags(particles))
+    run["bits"] = _texts(_own_tags(particles)[:MOST_TAGS])
     run["bodies"] = _texts(list(particles.bodies))
     ranges = [rows.indices(particles.count)[:2] for rows in particles.bodies.values()]
     run["body_ranges"] = np.array(ranges, dtype=np.int64).reshape(-1, 2)

@@ -76,6 +76,8 @@ def _tags(run: Any, data: Any, bodies: Mapping[str, slice]) -> Iterator[tuple[st
     for name in names:
         if name in bits:
             mask = (rows & bits[name]).astype(np.bool_)
+        elif tag_name(name) in data:
+            mask = data[tag_name(name)][()].astype(np.bool_)
         else:
             mask = np.zeros(len(rows), dtype=np.bool_)
             mask[bodies[name]] = True

@@ -32,7 +32,7 @@ from solidsph.registry.registry import Entry
 
 FORMAT = 3  # that is written
 READABLE = (2, FORMAT)  # a reader refuses any other; in 2, each tag is a field of its own
-MOST_TAGS = 62  # bits of a signed integer
+MOST_TAGS = 62  # that are bits of a signed integer; others have arrays of their own
 VTKHDF_VERSION = (2, 0)  # the first with time; higher ones add nothing that is used here
 RECORD_SUFFIXES = (".h5", ".vtkhdf")  # `.vtkhdf` is what VTK and PyVista know it by
 RUNNING = "running"  # the outcome until the writer is closed
@@ -103,7 +103,8 @@ def static_fields(dimension: int) -> tuple[Field, ...]:
 
 
 def tag_name(tag: str) -> str:
-    """Name of the number that is the bit of a tag; in format 2, of the array that marks it."""
+    """Name of the number that is the bit of a tag; of those beyond `MOST_TAGS`, and in format 2, of
+    the array that marks it."""
     return "tag " + field_name(tag)
 
 

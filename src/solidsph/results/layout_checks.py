@@ -104,9 +104,10 @@ def _rest(tree: Tree, steps: int, fields: Sequence[str], tags: Sequence[str]) ->
             continue
         kind = _WHOLE if field.name in ("ghost", "body", TAGS) else _FLOAT
         yield Entry(f"{data}/{field.name}", kind, (n, *_width(field.components)))
-    if old:
-        yield from (Entry(f"{data}/{tag_name(tag)}", _WHOLE, (n,)) for tag in tags)
-    else:
+    for path in (f"{data}/{tag_name(tag)}" for tag in tags):
+        if old or tree.item(path, is_optional=True) is not None:
+            yield Entry(path, _WHOLE, (n,))
+    if not old:
         yield Entry("solidsph/bits", _TEXT, (ANY,))
     for path in ("VTKHDF/Points", *(f"{data}/{name}" for name in fields)):
         yield Entry(path, _WHOLE, (ANY,), "components")
