@@ -22,6 +22,7 @@ import numpy as np
 from solidsph import Record, Simulation, resume
 from solidsph.results import checkpointer
 from solidsph.run.hooks import implementation
+from solidsph.run.outcome import FINISHED
 from solidsph.scene.scene_builder import SceneBuilder
 
 OFTEN, NEVER = 1e9, 0.0  # shares of the time for checkpoints
@@ -133,6 +134,9 @@ def main(folder: Path, count: int, seed: int) -> None:
                 with Record(path) as record:
                     lost += record.count < had
                     had = record.count
+                    over = record.outcome == FINISHED
+                if over:  # killed on its way out
+                    break
                 act = go_on
         assert_same_record(whole, path)
     print(f"kills {kills} runs {runs} lost {lost} seconds of a run {took:.2f}")

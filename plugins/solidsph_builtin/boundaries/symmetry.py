@@ -24,6 +24,8 @@ from solidsph_builtin.boundaries._reports import COMPONENTS, reaction
 
 # A particle this close to the plane, in spacings, lies on it.
 _ON_PLANE = 1e-6
+# Particles this close are beside it, and so large a part of these must lie on it.
+_BESIDE, _ENOUGH = 0.5, 0.5
 
 
 @final
@@ -54,6 +56,8 @@ class Symmetry(BoundaryHandler):
         height = particles.positions[:, normal] - self.at
         on_plane = np.flatnonzero(~particles.ghosts & (np.abs(height) < _on_plane_tolerance(model)))
         beyond = _ghosts_of(model, normal, self.at)
+        if not len(beyond):
+            self._check_held(height[~particles.ghosts], particles.spacings[~particles.ghosts])
         if not len(on_plane) and not len(beyond):
             raise SceneError(
                 f"symmetry: no particle lies on the plane {self.axis} = {self.at:.6g} m and no "
@@ -78,6 +82,22 @@ class Symmetry(BoundaryHandler):
                 )
             )
         return terms
+
+    def _check_held(self, heights: Array, spacings: Array) -> None:
+        """Raise SceneError if the plane runs through a body whose particles are not on it.
+
+        They are above it by `heights` (n,) [m], with their `spacings` (n,) [m].
+        """
+        beside = np.abs(heights) < _BESIDE * spacings
+        on_plane = np.abs(heights) < _ON_PLANE * spacings.min()
+        through = min(-heights.min(), heights.max()) > spacings.min()
+        if through and on_plane.sum() < _ENOUGH * beside.sum():
+            raise SceneError(
+                f"symmetry: the plane {self.axis} = {self.at:.6g} m runs through the body, and "
+                f"{on_plane.sum()} of {beside.sum()} particles beside it lie on it; cut the body "
+                "there, so that one side is left (the shape 'difference' with a box), or hold "
+                "other places, by a clamp of one axis"
+            )
 
     def marks(self, model: DiscreteModel, label: str) -> Sequence[Mark]:
         held = tuple(marks_of(self.bind(model, label), model.particles, model.end))

@@ -288,6 +288,26 @@ def test_planes_with_particles_and_ghosts_report_their_reaction_once() -> None:
     assert len(columns) == len(set(columns))
 
 
+def test_a_plane_through_a_body_needs_particles_on_it() -> None:
+    """A lattice has a row in the middle of a square; points whose spacing varies have few there."""
+
+    def built(spacing: object) -> Simulation:
+        box = {"type": "box", "lengths": [1.0, 1.0], "origin": [-0.5, -0.5]}
+        builder = Simulation.builder().body("square", shape=box, spacing=spacing)
+        return (
+            builder.material("neo-hookean", **SOFT)
+            .boundary("symmetry", axis="x")
+            .duration(1e-4)
+            .build()
+        )
+
+    built(0.125)
+    with pytest.raises(
+        BuildError, match=r"x = 0 m runs through the body, and .* of .* lie on it; cut"
+    ):
+        built("0.08 + 0.1*Y**2 + 0.05*X")
+
+
 def test_symmetry_needs_something_to_act_on() -> None:
     model = box(2).build().model
     with pytest.raises(SceneError, match="no particle lies on the plane"):
