@@ -261,7 +261,7 @@ def test_a_case_from_the_command_line(tmp_path: Path) -> None:
 @pytest.mark.validation
 @pytest.mark.parametrize("clamp", CLAMPS)
 def test_csm1_keeps_within_its_bars(clamp: str, tmp_path: Path) -> None:
-    # At 5 across a straight clamp, whose corners are sharper, leaves 0.8 % of the way along the beam.
+    # At 5 across a straight clamp, whose corners are sharper, leaves 0.8 % along the beam.
     for n, most in {5: 0.008, 9: 0.003, 17: 0.003}.items():
         found = errors(run_case(Csm1(clamp=clamp, across=n), tmp_path))
         assert max(map(abs, found.values())) < most
