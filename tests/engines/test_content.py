@@ -193,7 +193,7 @@ from solidsph_builtin.materials.neo_hookean import NeoHookean
 formulation = TotalLagrangian()
 law = compiled_flux(formulation, NeoHookean(1e6, 0.3, 1000.0), 2)
 apply = block_law(2, "float64", without_history(law), 0, 2)
-print(content(force_sweep(2, "float64", apply), frozenset("abc"), passes(2, 2).product))
+print(content(force_sweep(2, "float64", apply), frozenset("abc"), passes(2, 2, False).product))
 """
     found = {
         subprocess.run(

@@ -244,7 +244,6 @@ def test_outputs_of_a_motion_count_by_the_largest(tmp_path: Path) -> None:
     ("words", "message"),
     [
         ({"formulation": "updated-lagrangian"}, "use the formulation 'total-lagrangian'"),
-        ({"effect": {"type": "contact", "itself": ["block"]}}, "contact does not follow yet"),
         ({"scheme": "corrected"}, "'lattice' does not follow; use"),
     ],
 )

@@ -38,6 +38,9 @@ _TOLERANCE = 1e-6
 # A point is on the surface up to this depth, in spacings: nodes of a mesh stand on its facets, and
 # files hold few digits. Up to here 'consistent' errs less than 'corrected' in bending and torsion.
 _ON_SURFACE = 0.1
+# Median distance of nearest points, in spacings, from which on volumes are fitted: 0.65 where those
+# of a lattice are moved by up to half a spacing.
+_APART = 0.5
 # Samples along a spacing from which the volumes nearest to points are found, for each dimension.
 # Even, so that none lies half way between two points of a lattice.
 _SAMPLES = {1: 64, 2: 8, 3: 4}
@@ -71,13 +74,13 @@ class Points(GradedDiscretisation):
     folder of the scene file, in Python in the working folder. Where rows hold more, or in another
     order, `columns` names them: `["x", "y", "spacing", "volume"]`.
 
-    If there are points on the surface, `volumes` that are not given integrate polynomials of the
-    second degree, as those of `fitted-moments` do; otherwise that of a point is the part of the
-    shape nearest to it, found by sampling and scaled to the exact total if the shape knows its
-    volume. Each sample of the surface belongs to the nearest point. Tags are those of a lattice.
-    There are no ghosts. A spacing that varies is to tell how far apart the points are: the support
-    of each follows it. If the points have a column with the spacing of each, that of the body is
-    `"given"`.
+    If there are points on the surface and most are about a spacing apart, `volumes` that are not
+    given integrate polynomials of the second degree, as those of `fitted-moments` do; otherwise
+    that of a point is the part of the shape nearest to it, found by sampling and scaled to the
+    exact total if the shape knows its volume. Each sample of the surface belongs to the nearest
+    point. Tags are those of a lattice. There are no ghosts. A spacing that varies is to tell how
+    far apart the points are: the support of each follows it. If the points have a column with the
+    spacing of each, that of the body is `"given"`.
 
     Raises:
         SceneError: not exactly one of `positions` and `file` is given, one cannot be read, or
@@ -128,7 +131,9 @@ class Points(GradedDiscretisation):
             return without_ghosts(X, self._checked(table.volumes, len(X)), spacing, owned)
         volumes = nearest_volumes(self, shape, X, spacing)
         made = without_ghosts(X, volumes, spacing, owned)
-        if not self.ends_on_surface(shape, spacing):
+        # Fits over the spacing are no good where most points are much closer.
+        apart = np.median(cKDTree(X).query(X, k=[2])[0]) if len(X) > 1 else 0.0
+        if apart < _APART * spacing or not self.ends_on_surface(shape, spacing):
             return made
         size = float(np.ptp(X, axis=0).max())
         return lighter_on_surface(fitted(self, shape, spacing, made, size), shape)
