@@ -377,11 +377,15 @@ def test_tags_are_bits_of_one_integer(tmp_path: Path) -> None:
     some = some_particles(3, 2)
     tags = {f"t{k}": np.arange(3) == 1 for k in range(MOST_TAGS)}
     tags |= {"bar": np.arange(3) < 1}  # the body, which takes no bit
-    with opened(tmp_path / "run", attrs.evolve(some, tags=tags)) as writer:
-        append(writer, some_step(0, some))
-    with Record(tmp_path / "run") as record:
-        assert list(record.particles.tags) == list(tags)
-        for name, mask in tags.items():
+    assert_tags_kept(tmp_path / "run", attrs.evolve(some, tags=tags))
+
+
+def assert_tags_kept(path: Path, particles: Particles) -> None:
+    with opened(path, particles) as writer:
+        append(writer, some_step(0, particles))
+    with Record(path) as record:
+        assert list(record.particles.tags) == list(particles.tags)
+        for name, mask in particles.tags.items():
             np.testing.assert_array_equal(record.particles.tags[name], mask)
 
 
@@ -390,12 +394,7 @@ def test_tags_beyond_the_bits_of_an_integer(tmp_path: Path) -> None:
     some = some_particles(3, 2)
     tags = {f"t/{k}": np.arange(3) == k % 3 for k in range(MOST_TAGS + 8)}
     tags |= {"bar": np.arange(3) < 1}
-    with opened(tmp_path / "run", attrs.evolve(some, tags=tags)) as writer:
-        append(writer, some_step(0, some))
-    with Record(tmp_path / "run") as record:
-        assert list(record.particles.tags) == list(tags)
-        for name, mask in tags.items():
-            np.testing.assert_array_equal(record.particles.tags[name], mask)
+    assert_tags_kept(tmp_path / "run", attrs.evolve(some, tags=tags))
     last = f"t/{MOST_TAGS + 7}"
     with h5py.File(tmp_path / "run", "a") as file:
         del file[f"VTKHDF/PointData/{tag_name(last)}"]

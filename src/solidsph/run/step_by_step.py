@@ -31,13 +31,12 @@ class StepByStep(TimeLoop):
                 # Overflow and invalid values are detected below.
                 with np.errstate(all="ignore"):
                     after = self.integrator.advance(state, self.dynamics, self.dynamics.step_size)
+                    # The sum is finite only if all entries are, and takes a fraction of a step.
+                    finite = np.isfinite(after.accelerations.sum())
             except BuildError as cause:  # moving neighbours may no longer determine a gradient
                 raise StepError(state, cause.problems[0]) from cause
             self._check_progress(state, after)
             state = after
-            # The sum is finite only if all entries are, and takes a fraction of a step.
-            with np.errstate(all="ignore"):
-                finite = np.isfinite(state.accelerations.sum())
             if not finite:
                 raise StepError(state, NOT_FINITE)
         return state
