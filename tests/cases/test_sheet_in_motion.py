@@ -60,13 +60,14 @@ def test_the_edge_moves_as_the_impedance_has_it(records: Mapping[str, Record]) -
     assert low.sum() == 5
     crossings = record.times / COARSE.crossing
     watched = (crossings > 0.29) & (crossings < 0.71)
-    assert watched.sum() == 9
+    assert watched.sum() >= 8
     moved = (record.positions[:][watched][:, low, 0] - X[low, 0]).mean(axis=1)
     ahead = moved - velocity * record.times[watched]
-    # The jump rings with the period of a few spacings, 0.25 W / c_p here, by 0.4 of what the edge
-    # moves while the front passes a particle; what is left over nearly two periods is small.
+    # The jump rings with the period of a few spacings, 0.25 W / c_p here, by 0.5 of what the edge
+    # moves while the front passes a particle, and by 0.4 with filter_above = inf; what is left over
+    # nearly two periods is small.
     passing = velocity * COARSE.spacing / MATERIAL.wave_speed
-    assert np.abs(ahead).max() < 0.5 * passing
+    assert np.abs(ahead).max() < 0.6 * passing
     assert abs(ahead.mean()) < 0.1 * passing
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any
 
 import attrs
@@ -13,6 +14,7 @@ from solidsph.advice import advise
 from solidsph.errors import PluginError
 from solidsph.registry.construct import construct
 from solidsph.scene.scheme import SCHEMES, completed, scheme_of
+from solidsph.testing import example_part
 from solidsph_builtin.discretisations.fitted import Fitted
 from solidsph_builtin.discretisations.lattice import Lattice
 from tests.helpers.scenes import SOFT
@@ -107,7 +109,30 @@ def test_a_gradient_that_the_scene_names_stays() -> None:
         "type": "total-lagrangian",
         "gradient": "corrected",
         "divergence": "plain",
+        "filter_above": 10.0,
     }
+
+
+def test_the_filter_of_the_dilatation_can_be_left_out() -> None:
+    builder = Simulation.builder().body("b", shape=BOX, spacing=0.1)
+    builder = builder.material("neo-hookean", **{**SOFT, "poissons_ratio": 0.49}).duration(1e-3)
+    assert builder.build().model.filters
+    without = builder.formulation("total-lagrangian", filter_above=inf).scene()
+    assert not builder.build().model.filters
+    assert Scene.from_toml(without.to_toml()) == without
+
+
+@pytest.mark.parametrize("reason", ["sleep", "bond-failure", "scheme"])
+def test_no_filter_where_it_does_not_fit(reason: str) -> None:
+    builder = Simulation.builder().body("b", shape=BOX, spacing=0.1)
+    builder = builder.material("neo-hookean", **{**SOFT, "poissons_ratio": 0.49}).duration(1e-3)
+    if reason == "sleep":
+        builder = builder.sleep()
+    elif reason == "scheme":
+        builder = builder.scheme("corrected")
+    else:
+        builder = builder.effect(example_part("effects", reason))
+    assert not builder.build().model.filters
 
 
 @pytest.mark.parametrize(
@@ -166,6 +191,7 @@ def test_a_part_that_the_scene_names_stays() -> None:
         "type": "total-lagrangian",
         "gradient": "quadratic",
         "divergence": "variational",
+        "filter_above": 10.0,
     }
     assert (found.kernel, found.cover) == ("cubic-spline", 3.0)
     assert completed(found) == found

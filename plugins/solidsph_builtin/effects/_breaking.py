@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from solidsph.engines.array_law import ArrayLaw, energy_densities
-from solidsph.engines.history import HistoryForces, with_histories
+from solidsph.engines.law_forces import LawForces, with_laws
 from solidsph.engines.matrix import fixed_forces
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import InternalForces, StressFields
@@ -59,7 +59,7 @@ class BreakingForces(InternalForces):
 
     def __attrs_post_init__(self) -> None:
         bodies = [bonds.body for bonds in self.bonds]
-        self._whole = self._made = with_histories(self.engine, bodies, self.conditions)
+        self._whole = self._made = with_laws(self.engine, bodies, self.conditions)
         self._laws = [self.engine.law(body) or ArrayLaw(body) for body in bodies]
         self._watches = [Watch(bonds) for bonds in self.bonds]
         self._remains = tuple(bonds.none_failed for bonds in self.bonds)
@@ -196,7 +196,7 @@ class BreakingForces(InternalForces):
             [bonds.operators(own) for bonds, own in zip(self.bonds, remains, strict=True)],
             self.conditions,
         )
-        return HistoryForces(sums, laws, self.conditions)
+        return LawForces(sums, laws, self.conditions)
 
 
 _RELEASED = "energy released by bonds"

@@ -17,7 +17,7 @@ from solidsph.assembly.body import make_body
 from solidsph.assembly.initial_state import initial_state, reference_observation
 from solidsph.assembly.shared_holds import shared_once
 from solidsph.assembly.step_size import expected_steps, with_its_step
-from solidsph.engines.history import HistoryFields, modified
+from solidsph.engines.law_forces import HistoryFields, modified
 from solidsph.interfaces.discrete_model import DiscreteModel
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.terms import Constraint, Load, StressTerm, Term

@@ -48,6 +48,8 @@ def numbers(simulation: Simulation) -> list[Row]:
         cover = "the kernel's default, the largest that holds neighbours in a row"
     hidden = sum(len(body.hidden.keys) for body in model.bodies if body.hidden is not None) // 2
     gaps = ("pairs across gaps", hidden, "near, but not neighbours: the line leaves the body")
+    filtered = ", ".join(body.name for body in model.bodies if body.dilatation_filter is not None)
+    smooth = "nearly incompressible: else the pressure would alternate between neighbours"
     return rows(
         ("dimensions", particles.dimension, "1 is uniaxial strain, 2 is plane strain"),
         *sizes(scene),
@@ -60,6 +62,7 @@ def numbers(simulation: Simulation) -> list[Row]:
         ),
         ("cover [spacings]", cover_of(scene), f"support radius, {cover}"),
         *([gaps] if hidden else []),
+        *([("filter of the dilatation", filtered, smooth)] if filtered else []),
         ("confined wave speed [m/s]", speed, "sqrt((lambda + 2 mu) / rho), of the fastest body"),
         ("engine", type(internal).__name__, f'engine = "{scene.engine}"'),
         *(_of_motion(simulation) if scene.statics is None else _of_statics(simulation)),

@@ -11,7 +11,7 @@ from solidsph.costs.count import count_work
 from solidsph.costs.model import predict
 from solidsph.costs.timing import Timings, time_uncounted
 from solidsph.costs.work import Work
-from solidsph.engines.history import modified
+from solidsph.engines.law_forces import modified
 from solidsph.interfaces.forces_modifier import ForcesModifier
 from solidsph.interfaces.terms import StressTerm
 from solidsph.run.cfl_step import cfl_step

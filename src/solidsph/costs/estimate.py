@@ -60,6 +60,7 @@ class BodyEstimate:
     lattice: bool  # whether it has the default discretisation
     remembers: bool  # whether its material has internal variables
     products: int  # with the tangent in a load step, if it is iterated
+    filters: bool  # whether it filters its dilatation
 
 
 def estimate_work(scene: Scene) -> Work:
@@ -70,9 +71,9 @@ def estimate_work(scene: Scene) -> Work:
     """
     scene = completed(scene)
     cover = cover_of(scene)
-    bodies = [_body(scene, body, cover) for body in scene.bodies.values()]
-    d = len(bodies[0].cells)
     formulation: Formulation = construct("formulations", scene.formulation)
+    bodies = [_body(scene, body, cover, formulation) for body in scene.bodies.values()]
+    d = len(bodies[0].cells)
     integrator: Integrator = construct("integrators", scene.integrator)
     effects: list[Effect] = [construct("effects", entry.part) for entry in scene.effects]
     n = round(sum(body.particles for body in bodies))
@@ -83,7 +84,10 @@ def estimate_work(scene: Scene) -> Work:
     steps = max(1, ceil(scene.duration / size)) if statics is None else statics.load_steps
     outputs = (min(scene.outputs, steps) if statics is None else steps) + 1
     moving = formulation.configuration is Configuration.CURRENT
-    sizes = [BodySize(d, body.particles, body.pairs, moving, body.lattice) for body in bodies]
+    sizes = [
+        BodySize(d, body.particles, body.pairs, moving, body.lattice, body.filters)
+        for body in bodies
+    ]
     evaluations = steps + 1 if statics is None else statics.iterations + steps
     engine: Engine = construct("engines", scene.engine)
     plan = engine.expected(sizes, evaluations)
@@ -113,7 +117,7 @@ def estimate_work(scene: Scene) -> Work:
     )
 
 
-def _body(scene: Scene, body: BodyScene, cover: float) -> BodyEstimate:
+def _body(scene: Scene, body: BodyScene, cover: float, formulation: Formulation) -> BodyEstimate:
     shape: Shape = construct("shapes", body.shape)
     wanted = body.material if body.material is not None else scene.material
     material: Material = construct("materials", wanted if wanted is not None else "")
@@ -139,6 +143,7 @@ def _body(scene: Scene, body: BodyScene, cover: float) -> BodyEstimate:
         lattice=lattice,
         remembers=isinstance(material, HistoryMaterial),
         products=expected_products(material),
+        filters=formulation.filtered_modulus(material, d) > 0.0,
     )
 
 

@@ -12,6 +12,7 @@ from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import StressFields
 from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.interfaces.law import Law
+from solidsph.interfaces.material import Material
 from solidsph.maths.arrays import Array, Tensor
 from solidsph.maths.tensors import components_first, particles_first
 
@@ -62,6 +63,18 @@ def energy_densities(body: Body, gradients: Array, history: Array) -> Array:
         if isinstance(material, HistoryMaterial):
             return np.asarray(material.stored(F, tuple(history.T), material.params))
         return np.asarray(material.energy(F, material.params))
+
+
+def stress_and_energy(material: Material, F: Array, history: Array) -> tuple[Array, Array]:
+    """P (n, d, d) [Pa] and psi (n,) [J/m^3] at F (n, d, d) and internal variables (n, k)."""
+    components, params = components_first(F), material.params
+    with np.errstate(all="ignore"):  # as above
+        if isinstance(material, HistoryMaterial):
+            h: History = tuple(history.T)
+            P, psi = material.stress(components, h, params), material.stored(components, h, params)
+        else:
+            P, psi = material.first_piola(components, params), material.energy(components, params)
+        return particles_first(P, len(F)), np.broadcast_to(np.asarray(psi), len(F))
 
 
 def stress_fields(bodies: Sequence[Body], gradients: Array) -> StressFields:

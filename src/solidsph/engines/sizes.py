@@ -21,4 +21,5 @@ def size_of(body: Body) -> BodySize:
         particles=body.particles.count,
         pairs=float(body.particles.count * ball / np.mean(body.particles.volumes)),
         moving=body.formulation.configuration is Configuration.CURRENT,
+        filters=body.dilatation_filter is not None,
     )

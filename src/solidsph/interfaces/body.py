@@ -13,6 +13,7 @@ from solidsph.interfaces.material import Material
 from solidsph.interfaces.shape import Shape
 from solidsph.interfaces.smoothing_kernel import SmoothingKernel
 from solidsph.maths.arrays import Array, Indices
+from solidsph.model.dilatation_filter import DilatationFilter
 from solidsph.model.neighbours import Hidden, Pairs, neighbour_pairs
 from solidsph.model.particles import Particles
 
@@ -32,6 +33,7 @@ class Body:
     material: Material
     formulation: Formulation
     hidden: Hidden | None = None  # near particles that do not see each other
+    dilatation_filter: DilatationFilter | None = None
 
     def pairs(self, radius: float | None = None) -> Pairs:
         """Neighbour pairs in the reference configuration, numbered within the body.
@@ -77,7 +79,10 @@ class Body:
 
 
 def part_of(body: Body, chosen: Indices) -> Body:
-    """The body of the chosen particles (k,) alone, renumbered in order, without faces and tags."""
+    """The body of the chosen particles (k,) alone, renumbered in order, without faces and tags.
+
+    It does not filter its dilatation.
+    """
     names = ("positions", "volumes", "spacings", "area_vectors", "ghosts", "images", "cells")
     particles = Particles(**{name: getattr(body.particles, name)[chosen] for name in names})
     return attrs.evolve(
@@ -86,4 +91,5 @@ def part_of(body: Body, chosen: Indices) -> Body:
         extent=slice(0, len(chosen)),
         smoothing=body.smoothing.of_part(chosen),
         hidden=None if body.hidden is None else body.hidden.part(chosen),
+        dilatation_filter=None,
     )

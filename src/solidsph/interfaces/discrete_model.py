@@ -26,6 +26,11 @@ class DiscreteModel:
     end: float = inf  # end of the duration [s]; formulas in t may have no value beyond it
     conditions: Conditions = attrs.field(factory=dict)  # that define the scene's own tags
 
+    @property
+    def filters(self) -> bool:
+        """Whether a body filters its dilatation."""
+        return any(body.dilatation_filter is not None for body in self.bodies)
+
     def select(self, where: Where) -> Indices:
         """Indices of the particles at `where`, (k,).
 

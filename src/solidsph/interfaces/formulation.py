@@ -10,6 +10,7 @@ import attrs
 
 from solidsph.interfaces.divergence import Divergence
 from solidsph.interfaces.gradient import Gradient
+from solidsph.interfaces.material import Material
 from solidsph.interfaces.part import Part
 from solidsph.maths.arrays import Tensor
 
@@ -40,6 +41,26 @@ class Formulation(Part):
     @abstractmethod
     def divergence(self) -> Divergence:
         """Divergence operator that gives the force."""
+
+    @property
+    def filter_above(self) -> float | None:
+        """Ratio lambda / mu up to which a body resists rough dilatations in full [-].
+
+        Where it is larger, a filter takes the rest. None, the default, for no filter. For forms
+        with F = I + H and the flux P.
+        """
+        return None
+
+    @final
+    def filtered_modulus(self, material: Material, dimension: int) -> float:
+        """The bulk modulus that a filter takes from rough dilatations of a material [Pa].
+
+        In one dimension the volume is all that there is.
+        """
+        if self.filter_above is None or dimension == 1:
+            return 0.0
+        lam, mu = material.lame_parameters
+        return max(0.0, lam - self.filter_above * mu) if mu > 0.0 else 0.0
 
     @final
     def with_gradient(self, gradient: Gradient) -> Formulation:

@@ -91,6 +91,7 @@ class BodySize:
     pairs: float  # ordered pairs within the support, self pairs included
     moving: bool  # True if neighbours are those of the current configuration
     lattice: bool = False  # True if its particles are on the default arrangement
+    filters: bool = False  # True if it filters its dilatation
 
 
 def array_bytes(arrays: Iterable[NDArray[np.generic]]) -> int:

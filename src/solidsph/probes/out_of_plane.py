@@ -23,23 +23,28 @@ _STEP = 1e-3
 _AGREEMENT = 1e-9
 
 
-def whole_stress(body: Body, rows: Indices, F: Array, memory: Memory) -> Array:
+def whole_stress(body: Body, F: Array, rows: Indices, memory: Memory) -> Array:
     """Cauchy stress in three dimensions, (k, 3, 3) [Pa].
 
     Args:
         body: the body.
-        rows: the particles within the body, (k,).
-        F: their deformation gradients, (k, d, d).
+        F: deformation gradients of all its particles, (n, d, d).
+        rows: the particles that are wanted, within the body, (k,).
         memory: `State.memory`.
     """
     material, d = body.material, F.shape[1]
     history: History = ()
     if isinstance(material, HistoryMaterial):
         name = memory_name(body)
-        start = [np.full(len(rows), value) for value in material.initial_history(d).values()]
-        history = tuple(memory[name][rows].T) if name in memory else tuple(start)
-    P, wide = _whole_first_piola(material, F, history), _widened(F)
-    ratios = np.linalg.det(F)[:, None, None]
+        start = [np.full(len(F), value) for value in material.initial_history(d).values()]
+        history = tuple(memory[name].T) if name in memory else tuple(start)
+    own = tuple(values[rows] for values in history)
+    P = _whole_first_piola(material, F[rows], own)
+    if body.dilatation_filter is not None:
+        P[:, :d, :d] += body.dilatation_filter.stress(F)[rows]
+        for across in range(d, 3):  # a stretch across is all of it a change of volume
+            P[:, across, across] += body.dilatation_filter.pressures(F)[rows]
+    wide, ratios = _widened(F[rows]), np.linalg.det(F[rows])[:, None, None]
     return np.asarray(np.einsum("pik,pjk->pij", P, wide) / ratios)
 
 

@@ -73,8 +73,8 @@ class Sampled:
         for body in self.bodies:
             own = (chosen >= body.extent.start) & (chosen < body.extent.stop)
             rows = chosen[own] - body.extent.start
-            F = seen.deformation_gradients[chosen[own]]
-            whole[own] = whole_stress(body, rows, F, seen.state.memory)
+            F = seen.deformation_gradients[body.extent]
+            whole[own] = whole_stress(body, F, rows, seen.state.memory)
         return self.sampling.interpolated(whole)
 
     @property

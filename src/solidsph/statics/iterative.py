@@ -22,7 +22,7 @@ from solidsph.statics.increment import Increment
 from solidsph.statics.lead import Lead
 from solidsph.statics.linearised import Linearised, LinearSolver, UnsolvedError
 from solidsph.statics.lowest import lowest_modes
-from solidsph.statics.tangent import Tangent
+from solidsph.statics.tangent import Moduli, Tangent
 
 # Stiffnesses of a particle alone count as at least this part of the median, if one is not positive.
 _LEAST = 0.1
@@ -126,9 +126,9 @@ class IterativeSolver(LinearSolver):
         return squares - shift, modes
 
     def _linearised(
-        self, moduli: Array, of_loads: csr_array | None, support: float = 0.0
+        self, moduli: Moduli, of_loads: csr_array | None, support: float = 0.0
     ) -> _Iterated:
-        blocks = self.tangent.own_stiffness(moduli)
+        blocks = self.tangent.own_stiffness(moduli.alone)
         whole, of_loads = of_loads, _symmetric(of_loads)
         turns = whole is not None and _turns(whole, np.einsum("pii->pi", blocks))
         if of_loads is not None:
@@ -152,7 +152,7 @@ class IterativeSolver(LinearSolver):
             rises=rises,
         )
 
-    def product(self, moduli: Array, of_loads: csr_array | None) -> Callable[[Array], Array]:
+    def product(self, moduli: Moduli, of_loads: csr_array | None) -> Callable[[Array], Array]:
         """The product of the tangent with motions (n, d)."""
 
         def product(motion: Array) -> Array:
@@ -165,7 +165,7 @@ class IterativeSolver(LinearSolver):
         return product
 
     def _smooth_correction(
-        self, moduli: Array, of_loads: csr_array | None, supporting: csr_array | None
+        self, moduli: Moduli, of_loads: csr_array | None, supporting: csr_array | None
     ) -> tuple[_Correction | None, bool]:
         """The correction by smooth functions, of a positive stiffness, and whether it is that here.
 
@@ -205,7 +205,7 @@ class IterativeSolver(LinearSolver):
         space: CoarseSpace,
         pattern: int,
         factors: Factors,
-        moduli: Array,
+        moduli: Moduli,
         of_loads: csr_array | None,
     ) -> float:
         """Share of the correction by alternating functions, from the energy of a soft one.
@@ -221,13 +221,13 @@ class IterativeSolver(LinearSolver):
         on_grid = float(forces @ values)
         return _SHARE * min(1.0, on_grid / energy) if energy > 0.0 else 0.0
 
-    def _at_rest(self) -> tuple[Array, csr_array | None]:
+    def _at_rest(self) -> tuple[Moduli, csr_array | None]:
         """Moduli, and the symmetric stiffness of loads."""
         rest = np.zeros(self.freedoms.free.shape)
         return self.tangent.moduli(rest), _symmetric(self.tangent.of_loads(rest))
 
     def _factorised(
-        self, space: CoarseSpace, pattern: int, moduli: Array, of_loads: csr_array | None
+        self, space: CoarseSpace, pattern: int, moduli: Moduli, of_loads: csr_array | None
     ) -> Factors:
         """Factors of the stiffness of one pattern's functions.
 
@@ -235,7 +235,9 @@ class IterativeSolver(LinearSolver):
             SingularError: with a free displacement that a motion without stiffness moves.
         """
         n, d = self.freedoms.free.shape
-        each = (self.volumes[:, None, None, None, None] * moduli).reshape(n, d * d, d * d)
+        # A filter leaves smooth functions as they are, and takes most of what alternates.
+        known = moduli.local if space is self.smooth_space else moduli.alone
+        each = (self.volumes[:, None, None, None, None] * known).reshape(n, d * d, d * d)
         matrix = space.stiffness(pattern, each)
         if of_loads is not None:
             P = space.matrix(pattern)
@@ -320,13 +322,16 @@ class _Iterated(Linearised):
     ) -> Array:
         """Solution by a method for other tangents than positive ones."""
         shape = (len(forces), len(forces))
-        values, code = method(
-            LinearOperator(shape, matvec=self.product, dtype=np.float64),
-            forces,
-            rtol=tolerance,
-            M=LinearOperator(shape, matvec=self._preconditioned, dtype=np.float64),
-            **limits,
-        )
+        try:
+            values, code = method(
+                LinearOperator(shape, matvec=self.product, dtype=np.float64),
+                forces,
+                rtol=tolerance,
+                M=LinearOperator(shape, matvec=self._preconditioned, dtype=np.float64),
+                **limits,
+            )
+        except ValueError:  # rounding, of a tangent that is nearly singular
+            raise UnsolvedError(1.0, _MOST) from None
         if code != 0:
             left = np.linalg.norm(forces - self.product(values)) / np.linalg.norm(forces)
             raise UnsolvedError(float(left), _MOST)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import attrs
 
-from solidsph.engines.history import with_histories
+from solidsph.engines.law_forces import with_laws
 from solidsph.errors import SceneError
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.terms import StressTerm
 from solidsph.run.built_scene import BuiltScene
 from solidsph.scene.static_solver import ITERATIVE, iterates
 from solidsph.statics.direct import DirectSolver
+from solidsph.statics.filtered_solver import FilteredSolver
 from solidsph.statics.freedoms import Freedoms, freedoms
 from solidsph.statics.linearised import LinearSolver
 from solidsph.statics.sums import sums_by_matrices, sums_of_engine
@@ -45,7 +46,9 @@ def linear_system(simulation: BuiltScene, solver: str) -> LinearSystem:
     if hindrance or not iterates(solver, simulation.particles.dimension, free.count):
         sums: InternalForces = sums_by_matrices(simulation)
         tangent = Tangent.of(simulation, sums)
-        direct = DirectSolver(tangent, free, symmetric)
+        direct: LinearSolver = DirectSolver(tangent, free, symmetric)
+        if symmetric and simulation.model.filters:
+            direct = FilteredSolver(tangent, free)
         return LinearSystem(_whole(simulation, sums), tangent, free, symmetric, direct)
     from solidsph.statics.iterative import IterativeSolver  # brings the compiler with it
 
@@ -57,7 +60,7 @@ def linear_system(simulation: BuiltScene, solver: str) -> LinearSystem:
 
 def _whole(simulation: BuiltScene, sums: InternalForces) -> InternalForces:
     conditions = [term for term in simulation.terms if isinstance(term, StressTerm)]
-    return with_histories(sums, simulation.model.bodies, conditions)
+    return with_laws(sums, simulation.model.bodies, conditions)
 
 
 def _hindrance(simulation: BuiltScene, free: Freedoms, symmetric: bool) -> str | None:

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 
-from solidsph.engines.history import HistoryForces
+from solidsph.engines.law_forces import LawForces
 from solidsph.engines.matrix import MatrixEngine, MatrixForces
 from solidsph.interfaces.engine import InternalForces
 from solidsph.interfaces.terms import StressTerm
@@ -40,4 +40,4 @@ def sums_of_engine(simulation: BuiltScene) -> InternalForces:
 def _own_sums(simulation: BuiltScene) -> InternalForces:
     """The scene's own internal forces, without the internal variables that they advance."""
     internal = simulation.dynamics.internal
-    return internal.sums if isinstance(internal, HistoryForces) else internal
+    return internal.sums if isinstance(internal, LawForces) else internal

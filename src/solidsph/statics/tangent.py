@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import attrs
@@ -18,6 +19,7 @@ from solidsph.interfaces.terms import Load, StressTerm
 from solidsph.maths.arrays import Array
 from solidsph.maths.tensors import components_first
 from solidsph.run.built_scene import BuiltScene
+from solidsph.statics.filtered_tangent import Coupling, add_filter
 from solidsph.statics.increment import AT_REST, Increment
 from solidsph.statics.lead import Lead
 from solidsph.statics.linear_part import linear_part
@@ -30,6 +32,39 @@ _MOST_GROWTH = 2.0
 
 
 @attrs.frozen(eq=False)
+class Moduli:
+    """dT_ik / dF_jl of all particles: the part of each alone, and what couples them."""
+
+    local: Array  # (n, d, d, d, d) [Pa]
+    couplings: Sequence[tuple[slice, Coupling]] = ()  # with the particles of the body
+
+    def times(self, dF: Array) -> Array:
+        """dT (n, d, d) [Pa] of dF (n, d, d)."""
+        n, d = dF.shape[:2]
+        local = self.local.reshape(n, d * d, d * d)
+        changes = (local @ dF.reshape(n, d * d, 1)).reshape(n, d, d)
+        for extent, coupling in self.couplings:
+            changes[extent] += coupling.change(dF[extent])
+        return changes
+
+    def of(self, extent: slice) -> Moduli:
+        """Those of the particles of one body."""
+        couplings = [coupling for own, coupling in self.couplings if own == extent]
+        own = slice(0, extent.stop - extent.start)
+        return Moduli(self.local[extent], [(own, coupling) for coupling in couplings])
+
+    @cached_property
+    def alone(self) -> Array:
+        """About the moduli of every particle alone, (n, d, d, d, d) [Pa]."""
+        if not self.couplings:
+            return self.local
+        alone = self.local.copy()
+        for extent, coupling in self.couplings:
+            alone[extent] += coupling.alone
+        return alone
+
+
+@attrs.frozen(eq=False)
 class _BodyTangent:
     """What the tangent of one body needs besides its sums."""
 
@@ -37,25 +72,33 @@ class _BodyTangent:
     law: LocalLaw
     stresses: csr_array | None  # (d d n, d d n) extends stresses of real particles to ghosts
 
-    def moduli(self, F: Array, lead: Lead | None) -> Array:
-        """dT_ik / dF_jl of all particles, (n, d, d, d, d) [Pa], at F (n, d, d)."""
+    def moduli(self, F: Array, lead: Lead | None) -> Moduli:
+        """dT/dF of all particles at F (n, d, d)."""
         F = self._real(F)
-        if lead is None or not self._leads:
-            A = self.law.moduli(F)
-        else:
-            stretched = F * lead.stretch[:, None, None]
-            A = self.law.moduli(stretched)
+        leads = lead is not None and self._leads
+        stretched = F * lead.stretch[:, None, None] if lead is not None and leads else F
+        A, couplings = self.law.moduli(stretched), []
+        added = self.body.dilatation_filter
+        if added is not None:
+            couplings.append((slice(0, len(F)), add_filter(added, stretched, A)))
+        if lead is not None and leads:
             S = lead.stress + self._second_piola(F) - self._second_piola(stretched)
             A += np.einsum("ij,pkl->pikjl", np.eye(F.shape[1]), S)
         A[self.body.particles.ghosts] = 0.0
-        return A
+        return Moduli(A, couplings)
 
-    def matrix(self, constant: Operators, A: Array) -> csr_array:
-        """(d n, d n) [N/m] with moduli (n, d, d, d, d)."""
+    def matrix(self, constant: Operators, moduli: Moduli) -> csr_array:
+        """(d n, d n) [N/m]."""
         ghosts = self.body.particles.ghosts
         nothing_on_them = self.body.formulation.divergence.uses_ghost_stress
         forces = constant.of_stresses(ghosts if nothing_on_them else None)
-        return csr_array(-(forces @ self._extended(constant.stress_changes(A))))
+        changes: Any = constant.stress_changes(moduli.local)
+        if moduli.couplings:
+            gradients = constant.stress_changes(_itself(moduli.local))
+            changes = csr_array(changes)
+            for _, coupling in moduli.couplings:
+                changes = changes + coupling.matrix(gradients)
+        return csr_array(-(forces @ self._extended(changes)))
 
     def stress(self, stresses: Array) -> Array:
         """Stresses (n, d, d) at real particles, extended to ghosts."""
@@ -71,7 +114,7 @@ class _BodyTangent:
             return Lead(np.zeros((n, d, d)), np.ones(n))
         before, after = self._real(before), self._real(after)
         S = self._second_piola(before)
-        predicted = S + np.linalg.solve(before, self.law.change(before, dF) - dF @ S)
+        predicted = S + np.linalg.solve(before, self._change(before, dF) - dF @ S)
         stress = predicted - self._second_piola(after)
         growth = 1.0 + np.trace(np.linalg.solve(before, dF), axis1=1, axis2=2)
         volumes = growth * np.linalg.det(before) / np.linalg.det(after)
@@ -90,7 +133,15 @@ class _BodyTangent:
 
     def _second_piola(self, F: Array) -> Array:
         """Second Piola-Kirchhoff stress S = F^-1 P, (n, d, d) [Pa]."""
-        return np.asarray(np.linalg.solve(F, self.law.stress(F)), dtype=np.float64)
+        P, added = self.law.stress(F), self.body.dilatation_filter
+        if added is not None:
+            P = P + added.stress(F)
+        return np.asarray(np.linalg.solve(F, P), dtype=np.float64)
+
+    def _change(self, F: Array, dF: Array) -> Array:
+        """dP (n, d, d) [Pa] of dF (n, d, d)."""
+        dP, added = self.law.change(F, dF), self.body.dilatation_filter
+        return dP if added is None else dP + added.change(F, dF)
 
     def _real(self, F: Array) -> Array:
         """F (n, d, d) with that of ghosts replaced by the identity."""
@@ -100,6 +151,12 @@ class _BodyTangent:
     def _extended(self, stresses: Any) -> Any:
         """Stresses of real particles, or their derivative, extended to ghosts."""
         return stresses if self.stresses is None else self.stresses @ stresses
+
+
+def _itself(moduli: Array) -> Array:
+    """Moduli (n, d, d, d, d) that give a gradient itself."""
+    d = moduli.shape[1]
+    return np.broadcast_to(np.einsum("ij,kl->ikjl", np.eye(d), np.eye(d)), moduli.shape)
 
 
 @attrs.frozen(eq=False)
@@ -140,8 +197,8 @@ class Tangent:
         bodies = [attrs.evolve(b, law=b.law.during(increment)) for b in self.bodies]
         return attrs.evolve(self, bodies=bodies, increment=increment)
 
-    def moduli(self, displacements: Array, lead: Lead | None = None) -> Array:
-        """dT_ik / dF_jl of all particles, (n, d, d, d, d) [Pa], at displacements (n, d).
+    def moduli(self, displacements: Array, lead: Lead | None = None) -> Moduli:
+        """dT/dF of all particles at displacements (n, d).
 
         With a lead the volume and the stress are those that the last step predicted.
         """
@@ -150,20 +207,27 @@ class Tangent:
         for part in self.bodies:
             extent = part.body.extent
             parts.append(part.moduli(F[extent], None if lead is None else lead.of(extent)))
-        return np.concatenate(parts)
+        couplings = [
+            (body.body.extent, coupling)
+            for body, part in zip(self.bodies, parts, strict=True)
+            for _, coupling in part.couplings
+        ]
+        return Moduli(np.concatenate([part.local for part in parts]), couplings)
 
     def matrix(self, displacements: Array, lead: Lead | None = None) -> csr_array:
         """K, (d n, d n) [N/m], at displacements u = x - X (n, d) of all particles.
 
         Rows and columns include ghosts.
         """
-        A = self.moduli(displacements, lead)
+        return self.assembled(self.moduli(displacements, lead), self.of_loads(displacements))
+
+    def assembled(self, moduli: Moduli, of_loads: csr_array | None) -> csr_array:
+        """K, (d n, d n) [N/m], with these moduli and this part of the loads."""
         parts = [
-            part.matrix(constant, A[part.body.extent])
+            part.matrix(constant, moduli.of(part.body.extent))
             for part, constant in zip(self.bodies, self._constant(), strict=True)
         ]
         total = parts[0] if len(parts) == 1 else csr_array(block_diag(parts, format="csr"))
-        of_loads = self.of_loads(displacements)
         return total if of_loads is None else csr_array(total + of_loads)
 
     def of_loads(self, displacements: Array) -> csr_array | None:
@@ -180,11 +244,9 @@ class Tangent:
             return own.stiffness_of_step(now.time, now.step, displacements, velocities, now.memory)
         return own.stiffness(displacements, now.time) if is_stiff(own) else None
 
-    def product(self, moduli: Array, motion: Array) -> Array:
+    def product(self, moduli: Moduli, motion: Array) -> Array:
         """K motion without the part of the loads, (n, d) [N], with these moduli."""
-        n, d = motion.shape
-        H = self.internal.gradients(motion).reshape(n, d * d, 1)
-        return -self._forces(motion, (moduli.reshape(n, d * d, d * d) @ H).reshape(n, d, d))
+        return -self._forces(motion, moduli.times(self.internal.gradients(motion)))
 
     def own_stiffness(self, moduli: Array) -> Array:
         """Blocks of K at each particle without the part of the loads, (n, d, d) [N/m]."""

@@ -10,7 +10,7 @@ import pytest
 
 from solidsph import Record, Simulation, resume
 from solidsph.engines.array_law import ArrayLaw
-from solidsph.engines.history import HistoryForces
+from solidsph.engines.law_forces import LawForces
 from solidsph.errors import BuildError
 from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.law import memory_name
@@ -92,7 +92,7 @@ def test_the_compiled_law_is_that_of_arrays(name: str, d: int) -> None:
     """Where a law compiles, its loop over points is the array formula to rounding."""
     simulation = block(d, example_part("materials", name)).engine("compiled").build()
     internal = simulation.dynamics.internal
-    assert isinstance(internal, HistoryForces)
+    assert isinstance(internal, LawForces)
     (law,) = internal.laws
     array = ArrayLaw(law.body)
     rng = np.random.default_rng(d)

@@ -9,7 +9,7 @@ import pytest
 
 from solidsph import Simulation
 from solidsph.engines.compiled.history_law import CompiledLaw
-from solidsph.engines.history import HistoryForces
+from solidsph.engines.law_forces import LawForces
 from solidsph.errors import BuildError, SceneError
 from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.maths.tensors import cauchy_stress
@@ -223,7 +223,7 @@ def test_the_laws_compile(name: str) -> None:
         .build()
     )
     internal = simulation.dynamics.internal
-    assert isinstance(internal, HistoryForces)
+    assert isinstance(internal, LawForces)
     assert [type(law) for law in internal.laws] == [CompiledLaw]
     simulation.start()  # the loop, too: what it returns has the types of what it is given
 

@@ -59,7 +59,8 @@ def of_steps(
 def _law(part: ReferenceBody | MovingBody) -> object:
     body = part.body
     precision = _precision([part]) if isinstance(part, ReferenceBody) else None
-    return type(body.material), type(body.formulation), precision
+    filters = body.dilatation_filter is not None
+    return type(body.material), type(body.formulation), precision, filters
 
 
 def _precision(parts: Sequence[ReferenceBody]) -> int:

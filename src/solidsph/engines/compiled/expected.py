@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from solidsph.engines.compiled.constants import STRIDE, WORTH_A_THREAD
+from solidsph.engines.compiled.filter_operations import filter_operations
 from solidsph.engines.compiled.notes import looked_up
 from solidsph.interfaces.plan import (
     BodySize,
@@ -45,6 +46,8 @@ def _operations(size: BodySize, precision: int) -> Iterator[Operations]:
     # Factors, flat displacements, and buffers for the forces.
     own = precision * n * (1 + 2 * STRIDE[d])
     threaded = m > WORTH_A_THREAD
+    if size.filters:
+        yield filter_operations(n, m, d, 0 if size.lattice else m, threaded=threaded)
     if size.lattice:
         yield Operations(SumMethod.STENCILS, m, n, own + both, own, precision, threaded)
         return

@@ -47,8 +47,8 @@ def check_sleep(simulation: BuiltScene) -> None:
     if dynamics.internal.part(np.empty(0, dtype=np.intp)) is None:
         raise SceneError(
             f"sleep: {type(dynamics.internal).__name__} cannot form the forces of some particles "
-            "alone; use one body of the total Lagrangian form whose material has no history, "
-            "without ghosts, or leave [sleep] out"
+            "alone; use one body of the total Lagrangian form, without filter_above, whose "
+            "material has no history, without ghosts, or leave [sleep] out"
         )
     empty, awake = Subset.of(np.empty(0, dtype=np.intp), count), np.zeros(count, bool)
     constraints = [(term, term.part(empty, awake)) for term in dynamics.constraints]

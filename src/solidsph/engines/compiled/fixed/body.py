@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from solidsph.engines.compiled.filter_operations import filter_operations
 from solidsph.engines.compiled.fixed.block_law import block_law
 from solidsph.engines.compiled.fixed.blocks import group
 from solidsph.engines.compiled.fixed.chunks import in_chunks, weighted_chunks
@@ -120,15 +121,28 @@ class ReferenceBody:
         touched = stencil_bytes + self.factors.nbytes + 2 * self.u.nbytes + vectors(n, d)
         held = self.bytes - row_bytes
         kind = self.u.itemsize, self.gradient_partition.threaded
-        return (
+        sums = (
             Operations(SumMethod.STENCILS, run_pairs, ran, touched, held, *kind),
             Operations(SumMethod.ROWS, row_pairs, n - ran, row_bytes, row_bytes, *kind),
         )
+        return sums if self.body.dilatation_filter is None else (*sums, self._filter_operations())
+
+    def _filter_operations(self) -> Operations:
+        n, d = self.body.particles.positions.shape
+        assert self.body.dilatation_filter is not None
+        entries = self.body.dilatation_filter.smooth_part.rows.nnz
+        own = round(entries * (1.0 - self.gradient.run_particles / n))
+        return filter_operations(n, entries, d, own, threaded=self.gradient_partition.threaded)
 
     @property
     def fused(self) -> bool:
         """True if both passes are one call where no term changes the stress between them."""
         return self.force is self.gradient and not self._ghosts_act
+
+    @property
+    def filters(self) -> bool:
+        """True if it filters its dilatation, which the compiled loop does between both passes."""
+        return self.body.dilatation_filter is not None
 
     @property
     def remembers(self) -> bool:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from solidsph.engines.compiled.fixed.growing import Growing
 from solidsph.engines.compiled.jit import njit
@@ -200,6 +201,15 @@ def compressed(
         matters[pairs.self_pairs] = True
         counts = np.add.reduceat(matters, pairs.starts[:-1], dtype=np.intp)
         compressor.add(int(pairs.rows[0]), counts, pairs.columns[matters], weights[matters])
+    return compressor.rows()
+
+
+def compressed_matrix(matrix: csr_array, shortest_run: int) -> Rows:
+    """Rows of a matrix (n, n): its entries are weights (m, 1)."""
+    compressor = _Compressor(1, matrix.dtype.name, shortest_run)
+    matrix.sort_indices()
+    counts, columns = np.diff(matrix.indptr), matrix.indices.astype(np.intp)
+    compressor.add(0, counts, columns, matrix.data[:, None])
     return compressor.rows()
 
 

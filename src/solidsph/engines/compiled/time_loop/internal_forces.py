@@ -14,6 +14,7 @@ from solidsph.engines.compiled.jit import njit
 from solidsph.engines.compiled.pointwise import NotCompilableError
 from solidsph.engines.compiled.time_loop.call_each import call_each
 from solidsph.engines.compiled.time_loop.constraints import following
+from solidsph.engines.compiled.time_loop.filtered import filtered_data, filtered_forces
 from solidsph.engines.compiled.time_loop.merged import MergedLoad
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.compilable_terms import LinearExtension
@@ -64,8 +65,11 @@ def internal_forces(
     """
     if all(part.fused for part in parts) and not conditions:
         if merged is None:
-            functions = tuple(_fused(part.force_pass) for part in parts)
-            data: tuple[Any, ...] = tuple(_data(part, step, staged=False) for part in parts)
+            functions = tuple(map(_function, parts))
+            data: tuple[Any, ...] = tuple(
+                filtered_data(part, step) if part.filters else _data(part, step, staged=False)
+                for part in parts
+            )
         else:
             functions, data = merged.functions, merged.data
         histories = [
@@ -88,6 +92,10 @@ def internal_forces(
     return Internal(
         forces, (_data(part, step, staged=True), tuple(following(c, c.stress) for c in extensions))
     )
+
+
+def _function(part: ReferenceBody) -> Any:
+    return filtered_forces(part) if part.filters else _fused(part.force_pass)
 
 
 @cache

@@ -73,6 +73,7 @@ def are_compilable(
     fused &= not (remember and ghosts)  # ghosts have no rows, and would forget
     extended = all(isinstance(term, LinearExtension) for term in conditions)
     alone = len(bodies) == 1 and extended and not remember
+    alone &= not any(body.filters for body in bodies)
     return (
         isinstance(integrator, PointwiseIntegrator)
         and (fused or alone)

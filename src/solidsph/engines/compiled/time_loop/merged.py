@@ -62,7 +62,7 @@ def merged_load(
     step: float,
 ) -> MergedLoad | None:
     """The first load that can be merged, in steps of `step` [s]; others have their own passes."""
-    if conditions or not all(part.fused for part in parts):
+    if conditions or not all(part.fused and not part.filters for part in parts):
         return None
     double = all(part.u.dtype == np.float64 for part in parts)
     for load in loads:

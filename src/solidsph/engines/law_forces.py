@@ -1,4 +1,5 @@
-"""Internal forces of bodies whose materials have internal variables."""
+"""Internal forces with laws between their passes: of materials with internal variables, and of
+bodies that filter their dilatation."""
 
 from __future__ import annotations
 
@@ -8,12 +9,14 @@ from typing import ClassVar, final
 import attrs
 import numpy as np
 
-from solidsph.engines.array_law import ArrayLaw
+from solidsph.engines.array_law import ArrayLaw, stress_and_energy
+from solidsph.engines.filtered_law import FilteredLaw
+from solidsph.errors import SceneError
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.engine import InternalForces, StressFields
 from solidsph.interfaces.equation_of_motion import EquationOfMotion
 from solidsph.interfaces.forces_modifier import ForcesModifier
-from solidsph.interfaces.history import History, HistoryMaterial
+from solidsph.interfaces.history import HistoryMaterial
 from solidsph.interfaces.integrator import Integrator
 from solidsph.interfaces.law import Law, memory_name
 from solidsph.interfaces.memory import Memory
@@ -21,7 +24,6 @@ from solidsph.interfaces.plan import Compilation, Operations, Plan
 from solidsph.interfaces.terms import FieldTerm, Observation, StressTerm, Term
 from solidsph.interfaces.time_loop import TimeLoop
 from solidsph.maths.arrays import Array
-from solidsph.maths.tensors import components_first, particles_first
 
 
 def modified(
@@ -43,24 +45,47 @@ def modified(
     """
     for term in terms:
         if isinstance(term, ForcesModifier):
+            _check_whole(bodies, term)
             internal = term.modified(internal, conditions)
-    return internal if internal.advances_histories else with_histories(internal, bodies, conditions)
+    return internal if internal.advances_histories else with_laws(internal, bodies, conditions)
 
 
-def with_histories(
+def _check_whole(bodies: Sequence[Body], term: Term) -> None:
+    """Raise SceneError if a body whose forces a term changes filters its dilatation."""
+    filtered = [body.name for body in bodies if body.dilatation_filter is not None]
+    if filtered:
+        raise SceneError(
+            f"{term.label!r} changes the forces inside bodies, and does not know that body "
+            f"{filtered[0]!r} filters its dilatation; give the formulation filter_above = inf"
+        )
+
+
+def with_laws(
     internal: InternalForces, bodies: Sequence[Body], conditions: Sequence[StressTerm]
 ) -> InternalForces:
-    """Internal forces by an engine, which advance the histories of materials that have some."""
-    if not any(isinstance(body.material, HistoryMaterial) for body in bodies):
+    """Internal forces by an engine, with laws of their own between its passes where bodies need it:
+    they advance the histories of materials, and filter dilatations."""
+    if not any(map(_needs_law, bodies)):
         return internal
-    return HistoryForces(
-        internal, tuple(internal.law(body) or ArrayLaw(body) for body in bodies), tuple(conditions)
-    )
+    return LawForces(internal, tuple(_law(internal, body) for body in bodies), tuple(conditions))
+
+
+def _needs_law(body: Body) -> bool:
+    return isinstance(body.material, HistoryMaterial) or body.dilatation_filter is not None
+
+
+def _own(law: Law) -> Law:
+    return law.own if isinstance(law, FilteredLaw) else law
+
+
+def _law(internal: InternalForces, body: Body) -> Law:
+    own, added = internal.law(body) or ArrayLaw(body), body.dilatation_filter
+    return own if added is None else FilteredLaw(body, own, added)
 
 
 @final
 @attrs.frozen(eq=False)
-class HistoryForces(InternalForces):
+class LawForces(InternalForces):
     """Internal forces by the two passes of an engine, with the laws between them."""
 
     advances_histories: ClassVar[bool] = True
@@ -98,11 +123,9 @@ class HistoryForces(InternalForces):
 
     @property
     def _engine_has_laws(self) -> bool:
-        """Whether the engine has its own form of all laws with internal variables."""
-        return not any(
-            isinstance(law, ArrayLaw) and isinstance(law.body.material, HistoryMaterial)
-            for law in self.laws
-        )
+        """Whether the engine has its own form of all laws that need one."""
+        needed = [_own(law) for law in self.laws if _needs_law(law.body)]
+        return not any(isinstance(law, ArrayLaw) for law in needed)
 
     def forces(self, time: float, displacements: Array) -> Array:
         return self.advance(time, 0.0, displacements, {})[0]
@@ -141,16 +164,25 @@ class HistoryForces(InternalForces):
         dissipated = np.zeros(len(displacements))
         for law in self.laws:
             body, material = law.body, law.body.material
-            if not isinstance(material, HistoryMaterial):
+            if not _needs_law(body):
                 continue
-            extent, n = body.extent, body.particles.count
-            h: History = tuple(law.history_of(memory).T)
-            F = components_first(virgin.deformation_gradients[extent])
-            with np.errstate(all="ignore"):
-                virgin.stresses[extent] = particles_first(material.stress(F, h, material.params), n)
-                virgin.energy_densities[extent] = material.stored(F, h, material.params)
-            dissipated[extent] = np.where(body.particles.ghosts, 0.0, material.dissipated(h))
-        return attrs.evolve(virgin, dissipated_densities=dissipated)
+            extent = body.extent
+            history = law.history_of(memory)
+            P, psi = law_fields(body, virgin.deformation_gradients[extent], history)
+            virgin.stresses[extent], virgin.energy_densities[extent] = P, psi
+            if isinstance(material, HistoryMaterial):
+                own = material.dissipated(tuple(history.T))
+                dissipated[extent] = np.where(body.particles.ghosts, 0.0, own)
+        remembers = any(isinstance(law.body.material, HistoryMaterial) for law in self.laws)
+        return attrs.evolve(virgin, dissipated_densities=dissipated if remembers else None)
+
+
+def law_fields(body: Body, F: Array, history: Array) -> tuple[Array, Array]:
+    """P (n, d, d) [Pa] and psi (n,) [J/m^3] of all particles of a body, from F (n, d, d) and
+    internal variables (n, k)."""
+    P, psi = stress_and_energy(body.material, F, history)
+    added = body.dilatation_filter
+    return (P, psi) if added is None else (P + added.stress(F), psi + added.energy_densities(F))
 
 
 @final
