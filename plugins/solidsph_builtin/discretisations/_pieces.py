@@ -41,26 +41,28 @@ def _divided(
     dimension = len(steps)
     corners = np.array(list(itertools.product((-0.5, 0.5), repeat=dimension)))
     cells = np.arange(len(centres))
+    cut, distance = np.ones(len(centres), dtype=np.bool_), np.zeros(len(centres))
     settled: list[tuple[Indices, Array, Array]] = []
     halvings = _HALVINGS[dimension] if halvings is None else halvings
     for level in range(1, halvings + 1):
         steps = 0.5 * steps
         centres = (centres[:, np.newaxis, :] + corners * steps).reshape(-1, dimension)
-        cells = np.repeat(cells, len(corners))
+        cells, cut, distance = (np.repeat(x, len(corners)) for x in (cells, cut, distance))
+        # Parts of what the boundary does not reach are on the same side.
+        distance[cut] = shape.signed_distance(centres[cut])
+        reach = 0.5 * float(np.linalg.norm(steps))
+        cut &= np.abs(distance) <= reach
         if level == halvings:
-            shares = _tiny(shape, centres, steps, corners, shape.signed_distance(centres))
+            shares = _tiny(shape, centres, steps, corners, distance)
         elif all_tiny:
             continue
         else:
             # A piece that the boundary does not reach is settled; the others are halved again.
-            distance = shape.signed_distance(centres)
-            reach = 0.5 * float(np.linalg.norm(steps))
             shares = (distance < -reach).astype(np.float64)
         kept = shares > 0.0
         settled.append((cells[kept], centres[kept], shares[kept] / len(corners) ** level))
         if level < halvings:
-            cut = np.abs(distance) <= reach
-            centres, cells = centres[cut], cells[cut]
+            centres, cells, cut, distance = (x[cut] for x in (centres, cells, cut, distance))
     return Pieces(*(np.concatenate(parts) for parts in zip(*settled, strict=True)))
 
 

@@ -62,7 +62,7 @@ def relaxed(
             BUILD.debug("spreading %d of %d, step %d of %d", moves.sum(), len(X), step, steps)
             sizes = spacing_at(x)
             slack = _SLACK * REACH * float(sizes.min())
-            near = sums(x, sizes)
+            near = sums(x, sizes, moves)
         way = near(x)[moves]
         length = np.linalg.norm(way, axis=1, keepdims=True)
         before = x[moves]
@@ -77,9 +77,11 @@ def pull(q: Any) -> Any:
     return (1.0 - q) ** 2 / ((q + _SOFT) * np.maximum(q, _SOFT))
 
 
-def _sums_by_arrays(x: Array, sizes: Array) -> Callable[[Array], Array]:
-    """The sum of forces on each particle (n, d) at positions (n, d) that are near to `x` (n, d)."""
+def _sums_by_arrays(x: Array, sizes: Array, moves: Mask) -> Callable[[Array], Array]:
+    """The sum of forces on each particle that `moves` (n,), (n, d), at positions (n, d) that are
+    near to `x` (n, d)."""
     pairs = _pairs(x, sizes)
+    pairs = pairs[:, moves[pairs].any(axis=0)]
     reaches = 0.5 * REACH * sizes[pairs].sum(axis=0)
 
     def sums(x: Array) -> Array:
@@ -107,7 +109,7 @@ def _pairs(x: Array, sizes: Array) -> Indices:
     return pairs
 
 
-def _sums_by_loops(x: Array, sizes: Array) -> Callable[[Array], Array]:
+def _sums_by_loops(x: Array, sizes: Array, moves: Mask) -> Callable[[Array], Array]:
     """The same by compiled loops."""
     from solidsph.engines.compiled.moving.search import candidates  # loads the compiler
     from solidsph_builtin.discretisations._relaxation_loop import add_forces
@@ -116,7 +118,7 @@ def _sums_by_loops(x: Array, sizes: Array) -> Callable[[Array], Array]:
 
     def sums(x: Array) -> Array:
         way = np.zeros_like(x)
-        add_forces(x, sizes, starts, columns, way)
+        add_forces(x, sizes, moves, starts, columns, way)
         return way
 
     return sums

@@ -5,20 +5,25 @@ from __future__ import annotations
 import numpy as np
 
 from solidsph.engines.compiled.jit import njit
-from solidsph.maths.arrays import Array, Indices
+from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph_builtin.discretisations._relaxation import REACH, pull
 
 _pull = njit(pull)
 
 
 @njit
-def add_forces(x: Array, sizes: Array, starts: Indices, columns: Indices, way: Array) -> None:
-    """Add the forces between pairs in rows to those on each particle, `way` (n, d)."""
+def add_forces(
+    x: Array, sizes: Array, moves: Mask, starts: Indices, columns: Indices, way: Array
+) -> None:
+    """Add the forces between pairs in rows to those on each particle, `way` (n, d), but for pairs of
+    which none `moves` (n,)."""
     n, d = x.shape
     away = np.empty(d)
     for p in range(n):
         for k in range(starts[p], starts[p + 1]):
             q = columns[k]
+            if not (moves[p] or moves[q]):
+                continue
             square = 0.0
             for c in range(d):
                 away[c] = x[q, c] - x[p, c]
