@@ -15,8 +15,8 @@ _pull = njit(pull)
 def add_forces(
     x: Array, sizes: Array, moves: Mask, starts: Indices, columns: Indices, way: Array
 ) -> None:
-    """Add the forces between pairs in rows to those on each particle, `way` (n, d), but for pairs of
-    which none `moves` (n,)."""
+    """Add the forces between pairs in rows to those on each particle, `way` (n, d), where one of a
+    pair `moves` (n,)."""
     n, d = x.shape
     away = np.empty(d)
     for p in range(n):

@@ -44,7 +44,7 @@ class BodyGradient:
         """Minus the derivative (d n, d n) [N/m] of these forces, with moduli (n, d, d, d, d) [Pa]
         of the stress: dP_ik / dF_jl."""
         real = np.where(self.body.particles.ghosts[:, None, None, None, None], 0.0, moduli)
-        return csr_array(-(self.matrices.of_stresses() @ self.matrices.stress_changes(real)))
+        return csr_array(self.matrices.stiffness(real))
 
 
 def in_the_reference(model: DiscreteModel, effect: str) -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 from typing import final
 
 import attrs
 import numpy as np
-from scipy.sparse import csc_array, csr_array, diags_array, hstack, vstack
+from scipy.sparse import bsr_array, csc_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import SuperLU, splu
 
@@ -230,27 +231,36 @@ class _Change:
         return fits.of_pairs(own[:, None, None] * fits.weights * rest)
 
     def matrix(self) -> csr_array:
-        """From the multipliers of one component, l of all particles and then each row of L, to
-        what the sums gain, (n (1 + d), n (1 + d)); of all rows only."""
+        """From the multipliers of one component, l and a row of L of each particle in turn, to what
+        the sums gain, (n (1 + d), n (1 + d)); of all rows only."""
         pairs = self.fits.pairs
         V, s = pairs.spread(self.volumes), pairs.spread(self.freedom)
         w = self.fits.of_pairs(self.fits.weights)[:, 0]
         tests = self.fits.of_pairs(self.root.transpose(0, 2, 1) @ self.fits.basis)
-        n, m = pairs.row_count, pairs.count
-        every = np.arange(m + 1)
-        there = csr_array((np.ones(m), pairs.columns, every), shape=(m, n))
-        here = csr_array((np.ones(m), pairs.rows, every), shape=(m, n))
-        arms = [
-            csr_array((-offset / self.length, pairs.columns, every), shape=(m, n))
-            for offset in pairs.offsets.T
+        # The change of a pair is a sum over those of q, times these, less l_p.
+        of_q = np.column_stack([np.ones(pairs.count), -pairs.offsets / self.length])
+        size = pairs.row_count * of_q.shape[1]
+
+        def blocks(values: Array) -> bsr_array:
+            shape = pairs.row_count * values.shape[1], size
+            return bsr_array((values, pairs.columns, pairs.starts), shape=shape)
+
+        fitted = (V * np.sqrt(s) * w)[:, None] * tests
+        kept = fitted[:, :, None] * of_q[:, None]
+        kept[pairs.self_pairs, :, 0] -= pairs.row_sums(fitted)
+        strength = V**2 * s * w
+        across = np.zeros((pairs.count, of_q.shape[1], of_q.shape[1]))
+        across[:, 0] = -strength[:, None] * of_q
+        # At the pair (q, q), that of the pair's column.
+        at = pairs.self_pairs[pairs.columns]
+        own = [
+            np.bincount(at, strength * f * g, minlength=pairs.count)
+            for f, g in product(of_q.T, repeat=2)
         ]
-        y = csr_array(hstack([there - here, *arms], format="csr"))
-        rows = [
-            csr_array((V * np.sqrt(s) * w * b, every[:-1], pairs.starts), shape=(n, m))
-            for b in tests.T
-        ]
-        kept = csr_array(csr_array(vstack(rows, format="csr")) @ y)
-        return csr_array(y.T @ (diags_array(V**2 * s * w) @ y) - kept.T @ kept)
+        both = np.stack(own, axis=1).reshape(across.shape)
+        both[pairs.self_pairs, 0, 0] += pairs.row_sums(strength)
+        plain = blocks(both + across) + blocks(across).T
+        return csr_array(plain - blocks(kept).T @ blocks(kept))
 
 
 def _pieces(pairs: Pairs) -> Iterator[Indices]:
@@ -286,14 +296,14 @@ def _possible(missing: Array, positions: Array, allowed: Sequence[Mask], degree:
 def _solved(matrix: csr_array, missing: Array, surface: Mask, sizes: Array) -> Array:
     """Multipliers (n, 1 + d, d) whose change of the weights adds `missing` (n, 1 + d, d)."""
     n, kinds, d = missing.shape
-    diagonal = matrix.diagonal().reshape(kinds, n)
-    if not diagonal[0].any():
+    diagonal = matrix.diagonal().reshape(n, kinds)
+    if not diagonal[:, 0].any():
         raise _unsolved(1.0)
-    size = float(np.median(diagonal[0][diagonal[0] > 0.0]))
-    soft = softening(diagonal.T, surface, sizes).T.ravel()
+    size = float(np.median(diagonal[:, 0][diagonal[:, 0] > 0.0]))
+    soft = softening(diagonal, surface, sizes).ravel()
     softened = csr_array(matrix + diags_array(soft))
     factors = _factors(csr_array(softened + diags_array(np.full(n * kinds, _REGULAR * size))))
-    wanted = missing.transpose(1, 0, 2).reshape(n * kinds, d)
+    wanted = missing.reshape(n * kinds, d)
     multipliers, left, unsolved = np.zeros_like(wanted), wanted, 1.0
     for _ in range(_REFINEMENTS):
         multipliers = multipliers + factors.solve(left)
@@ -306,7 +316,7 @@ def _solved(matrix: csr_array, missing: Array, surface: Mask, sizes: Array) -> A
             break
     if not unsolved <= _USELESS:
         raise _unsolved(unsolved)
-    result: Array = multipliers.reshape(kinds, n, d).transpose(1, 0, 2)
+    result: Array = multipliers.reshape(missing.shape)
     return result
 
 

@@ -58,11 +58,8 @@ class Operators:
         dP_ik / dF_jl (n, d, d, d, d) [Pa].
         """
         n, d = moduli.shape[:2]
-        blocks = [self.gradient[k * n : (k + 1) * n] for k in range(d)]
-        g = np.stack([block.data for block in blocks], axis=1)
-        starts, columns = blocks[0].indptr, blocks[0].indices
-        changes = np.einsum("mikjl,ml->mikj", np.repeat(moduli, np.diff(starts), axis=0), g)
-        values = changes.reshape(-1, d * d, d)
+        starts, columns, changes = self._changes(moduli)
+        values = changes.transpose(0, 2, 1, 3).reshape(-1, d * d, d)
         return bsr_array((values, columns, starts), shape=(d * d * n, d * n))
 
     def of_stresses(self, left_out: Mask | None = None) -> bsr_array:
@@ -70,14 +67,45 @@ class Operators:
 
         There are no forces on the particles `left_out` (n,).
         """
+        starts, columns, f = self._weights(left_out)
+        n, d = len(starts) - 1, f.shape[1]
+        weights = np.einsum("ij,mk->mijk", np.eye(d), f).reshape(-1, d, d * d)
+        return bsr_array((weights, columns, starts), shape=(d * n, d * d * n))
+
+    def stiffness(self, moduli: Array, left_out: Mask | None = None) -> bsr_array:
+        """Minus `of_stresses` times `stress_changes`, (d n, d n) [N/m]."""
+        n, d = moduli.shape[:2]
+        starts, columns, f = self._weights(left_out)
+        forces = bsr_array((-f[:, None], columns, starts), shape=(n, d * n))
+        starts, columns, changes = self._changes(moduli)
+        # Components i and j of a block in one row: sums over k alone take a third of the time.
+        values = changes.reshape(-1, d, d * d)
+        whole = forces @ bsr_array((values, columns, starts), shape=(d * n, d * d * n))
+        blocks = whole.data.reshape(-1, d, d)
+        return bsr_array((blocks, whole.indices, whole.indptr), shape=(d * n, d * n))
+
+    def _changes(self, moduli: Array) -> tuple[Indices, Indices, Array]:
+        """Where rows begin, columns, and by the pair (m, k, i, j) the change of P_ik by u_j."""
+        n, d = moduli.shape[:2]
+        blocks = [self.gradient[k * n : (k + 1) * n] for k in range(d)]
+        starts, columns = blocks[0].indptr, blocks[0].indices
+        g = np.stack([block.data for block in blocks], axis=1)[:, :, None]
+        gradient = bsr_array((g, columns, starts), shape=(d * n, n))
+        # A product of blocks: no moduli of pairs.
+        A = moduli.transpose(0, 2, 1, 3, 4).reshape(n, d**3, d)
+        every = bsr_array((A, np.arange(n), np.arange(n + 1)), shape=(d**3 * n, d * n))
+        changes = every @ gradient
+        return changes.indptr, changes.indices, changes.data.reshape(-1, d, d, d)
+
+    def _weights(self, left_out: Mask | None) -> tuple[Indices, Indices, Array]:
+        """Where rows begin, columns, and by the pair the weights (m, d) of the divergence."""
         n = self.force.shape[0]
-        d = self.force.shape[1] // n
-        blocks = [self.force[:, k * n : (k + 1) * n] for k in range(d)]
+        blocks = [self.force[:, k * n : (k + 1) * n] for k in range(self.force.shape[1] // n)]
+        starts, columns = blocks[0].indptr, blocks[0].indices
         f = np.stack([block.data for block in blocks], axis=1)
         if left_out is not None:
-            f[np.repeat(left_out, np.diff(blocks[0].indptr))] = 0.0
-        weights = np.einsum("ij,mk->mijk", np.eye(d), f).reshape(-1, d, d * d)
-        return bsr_array((weights, blocks[0].indices, blocks[0].indptr), shape=(d * n, d * d * n))
+            f[np.repeat(left_out, np.diff(starts))] = 0.0
+        return starts, columns, f
 
     def part(self, chosen: Indices) -> Operators:
         """The matrices of the chosen particles; rows that reach beyond these are left out."""

@@ -10,6 +10,7 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from solidsph.maths.arrays import Array
+from solidsph.maths.band import LastLayout
 from solidsph.statics.factors import Factors, SingularError, factorise
 from solidsph.statics.freedoms import Freedoms
 from solidsph.statics.increment import Increment
@@ -30,6 +31,7 @@ class DirectSolver(LinearSolver):
     tangent: Tangent  # by matrices
     freedoms: Freedoms
     symmetric: bool
+    last: LastLayout = attrs.field(factory=LastLayout, init=False)
 
     def linearised(
         self, displacements: Array, lead: Lead | None, increment: Increment, support: float = 0.0
@@ -39,7 +41,7 @@ class DirectSolver(LinearSolver):
         added = support * np.abs(reduced.diagonal())
         if support:
             reduced = csr_array(reduced + diags_array(added, format="csr"))
-        factors = factorise(reduced, symmetric=self.symmetric)
+        factors = factorise(reduced, symmetric=self.symmetric, last=self.last)
         return _Factorised(matrix, self.freedoms, reduced.diagonal(), added, factors)
 
     def lowest_modes(

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from solidsph.errors import PortableError
 from solidsph.maths.arrays import Array
-from solidsph.maths.band import BandFactors, band_factors
+from solidsph.maths.band import BandFactors, LastLayout, band_factors
 
 # Smaller eigenvalues of the matrix scaled to a unit diagonal are rounding.
 _SINGULAR = 1e-13
@@ -46,8 +46,8 @@ class Factors:
         return solution
 
 
-def factorise(matrix: csr_array, *, symmetric: bool) -> Factors:
-    """Factorise `matrix` (k, k).
+def factorise(matrix: csr_array, *, symmetric: bool, last: LastLayout | None = None) -> Factors:
+    """Factorise `matrix` (k, k), whose layout is kept in `last` for the next one.
 
     A `symmetric` matrix is factorised in a band if it is positive definite and the band is not too
     wide. Else SuperLU orders it by minimum degree with pivots on its diagonal: half the time of the
@@ -66,7 +66,9 @@ def factorise(matrix: csr_array, *, symmetric: bool) -> Factors:
     scaling = 1.0 / np.sqrt(diagonal)
     both = np.repeat(scaling, np.diff(matrix.indptr)) * scaling[matrix.indices]
     scaled = csr_array((matrix.data * both, matrix.indices, matrix.indptr), shape=matrix.shape)
-    factors = (band_factors(scaled) if symmetric else None) or _sparse_factors(scaled, symmetric)
+    factors = (band_factors(scaled, last) if symmetric else None) or _sparse_factors(
+        scaled, symmetric
+    )
     # The response to a random force is largest along the softest eigenvector.
     probe = np.random.default_rng(0).standard_normal(len(scaling))
     softest = factors.solve(probe)

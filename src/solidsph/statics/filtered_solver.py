@@ -11,6 +11,7 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import LinearOperator, gmres, minres
 
 from solidsph.maths.arrays import Array
+from solidsph.maths.band import LastLayout
 from solidsph.maths.conjugate_gradients import Solution, conjugate_gradients
 from solidsph.statics.factors import Factors, SingularError, factorise
 from solidsph.statics.freedoms import Freedoms
@@ -45,6 +46,7 @@ class FilteredSolver(LinearSolver):
 
     tangent: Tangent  # by matrices
     freedoms: Freedoms
+    last: LastLayout = attrs.field(factory=LastLayout, init=False)
 
     def linearised(
         self, displacements: Array, lead: Lead | None, increment: Increment, support: float = 0.0
@@ -80,7 +82,7 @@ class FilteredSolver(LinearSolver):
             added = support_of_each
         if added.any():
             reduced = csr_array(reduced + diags_array(added, format="csr"))
-        factors = factorise(reduced, symmetric=True)
+        factors = factorise(reduced, symmetric=True, last=self.last)
         return _Preconditioned(
             self.freedoms, tangent, moduli, of_loads, reduced.diagonal(), added, factors
         )

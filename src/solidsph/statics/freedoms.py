@@ -31,6 +31,9 @@ class Freedoms:
 
     def reduced(self, matrix: csr_array) -> csr_array:
         """R A E, (k, k), from A (d n, d n)."""
+        if self.expansion.nnz == self.count:  # nothing follows
+            kept = np.flatnonzero(self.free)
+            return csr_array(matrix[kept][:, kept])
         return csr_array(self.reduction @ matrix @ self.expansion)
 
     def expanded(self, values: Array) -> Array:

@@ -136,13 +136,13 @@ class Newton:
         Each step applies the same fraction of the missing imposed motion and of the change of the
         free displacements, so that a large imposed motion does not crush the particles beside it.
         """
-        at = self._arrived(start, None, increment)
+        at = self._at(start, None, self.path.forces(start, increment), increment)
         residuals, adrift = [self._relative(at.forces)], True
         if not (at.missing.any() or self._imbalance(at.forces).any()):
             return at.u, tuple(residuals)
         for _ in range(self.max_iterations):
             try:
-                at = self._arrived(*self._iterated(at, increment), increment)
+                at = self._iterated(at, increment)
             except LoadStepError:
                 if self._cannot_improve(at):
                     return at.u, tuple(residuals)
@@ -164,13 +164,12 @@ class Newton:
             at.u,
         )
 
-    def _arrived(self, u: Array, lead: Lead | None, increment: Increment) -> _Iterate:
-        """The iterate at displacements (n, d) [m]."""
-        missing = self.path.placed(u, increment.factor) - u
-        return _Iterate(u, lead, missing, self.path.forces(u, increment))
+    def _at(self, u: Array, lead: Lead | None, forces: Forces, increment: Increment) -> _Iterate:
+        """The iterate at displacements (n, d) [m], with the `forces` there."""
+        return _Iterate(u, lead, self.path.placed(u, increment.factor) - u, forces)
 
-    def _iterated(self, at: _Iterate, increment: Increment) -> tuple[Array, Lead]:
-        """Displacements after an iteration, and the lead of its step.
+    def _iterated(self, at: _Iterate, increment: Increment) -> _Iterate:
+        """Where an iteration leads.
 
         A body that only others hold, or a wall, may touch none, or so few particles that a step
         throws it far: forces that begin at once are not in the tangent. Support then keeps the step
@@ -231,10 +230,8 @@ class Newton:
         enough = _SAFETY * max(self.tolerance * forces.scale, self.rounding) / norm if norm else 1.0
         return min(max(enough, _LEAST_LEFT), _MOST_LEFT)
 
-    def _advanced(
-        self, at: _Iterate, increment: Increment, newton: _Correction
-    ) -> tuple[Array, Lead]:
-        """Displacements after the largest acceptable fraction of a step, and its lead."""
+    def _advanced(self, at: _Iterate, increment: Increment, newton: _Correction) -> _Iterate:
+        """Where the largest acceptable fraction of a step leads."""
         u, missing = at.u, at.missing
         laws = self.tangent.during(increment)
         direction = self.freedoms.expanded(newton.values) + missing
@@ -246,22 +243,31 @@ class Newton:
             if np.all(self.path.volume_ratios(trial) > 0.0):
                 lead = laws.lead(u, length * direction, trial)
                 forces = self.path.forces(trial, increment)
-                predicted = self.tangent.forces_ahead(trial, lead).ravel()
-                missed = self._imbalance(forces) - (1.0 - length) * newton.pull
-                missed -= length * newton.tangent.support * newton.values
-                # With the stress that is there, and with the one that the step predicted.
-                both = missed, missed + self.freedoms.reduction @ predicted
-                # Deuflhard (2004), section 3.3: the restricted natural monotonicity test.
-                allowed = (1.0 - 0.25 * length) * newton.size
-                if self._converged(forces) or min(map(newton.next_size, both)) <= allowed:
-                    return trial, lead
+                there = self._at(trial, lead, forces, increment)
+                if self._converged(forces) or self._smaller(there, newton, length):
+                    return there
                 if length == 1.0:
-                    whole = trial, lead
+                    whole = there
             length *= 0.5
         if whole is not None and newton.tangent.support.any():
             return whole  # it has met what will hold it, and forces begin at once
         cause = "no fraction of the Newton step reduces the imbalance"
         raise LoadStepError(cause, self._remedy(at.forces), u)
+
+    def _smaller(self, there: _Iterate, newton: _Correction, length: float) -> bool:
+        """Whether the next correction with the same tangent is smaller, after a fraction of a step.
+
+        Deuflhard (2004), section 3.3: the restricted natural monotonicity test, with the stress
+        that is there or with the one that the step predicted.
+        """
+        allowed = (1.0 - 0.25 * length) * newton.size
+        missed = self._imbalance(there.forces) - (1.0 - length) * newton.pull
+        missed -= length * newton.tangent.support * newton.values
+        if newton.next_size(missed) <= allowed:
+            return True
+        assert there.lead is not None, "a step has led there"
+        predicted = self.tangent.forces_ahead(there.u, there.lead).ravel()
+        return newton.next_size(missed + self.freedoms.reduction @ predicted) <= allowed
 
     def stable(self) -> bool | None:
         """Whether the last tangent resists every motion; None if the forces have no energy.

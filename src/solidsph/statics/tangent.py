@@ -91,14 +91,16 @@ class _BodyTangent:
         """(d n, d n) [N/m]."""
         ghosts = self.body.particles.ghosts
         nothing_on_them = self.body.formulation.divergence.uses_ghost_stress
-        forces = constant.of_stresses(ghosts if nothing_on_them else None)
+        left_out = ghosts if nothing_on_them else None
+        if self.stresses is None and not moduli.couplings:
+            return csr_array(constant.stiffness(moduli.local, left_out))
         changes: Any = constant.stress_changes(moduli.local)
         if moduli.couplings:
             gradients = constant.stress_changes(_itself(moduli.local))
             changes = csr_array(changes)
             for _, coupling in moduli.couplings:
                 changes = changes + coupling.matrix(gradients)
-        return csr_array(-(forces @ self._extended(changes)))
+        return csr_array(-(constant.of_stresses(left_out) @ self._extended(changes)))
 
     def stress(self, stresses: Array) -> Array:
         """Stresses (n, d, d) at real particles, extended to ghosts."""
