@@ -47,7 +47,8 @@ def _divided(
     for level in range(1, halvings + 1):
         steps = 0.5 * steps
         centres = (centres[:, np.newaxis, :] + corners * steps).reshape(-1, dimension)
-        cells, cut, distance = (np.repeat(x, len(corners)) for x in (cells, cut, distance))
+        cells, cut = np.repeat(cells, len(corners)), np.repeat(cut, len(corners))
+        distance = np.repeat(distance, len(corners))
         # Parts of what the boundary does not reach are on the same side.
         distance[cut] = shape.signed_distance(centres[cut])
         reach = 0.5 * float(np.linalg.norm(steps))
@@ -62,7 +63,7 @@ def _divided(
         kept = shares > 0.0
         settled.append((cells[kept], centres[kept], shares[kept] / len(corners) ** level))
         if level < halvings:
-            centres, cells, cut, distance = (x[cut] for x in (centres, cells, cut, distance))
+            centres, cells, distance, cut = centres[cut], cells[cut], distance[cut], cut[cut]
     return Pieces(*(np.concatenate(parts) for parts in zip(*settled, strict=True)))
 
 

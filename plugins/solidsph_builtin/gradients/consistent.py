@@ -257,7 +257,7 @@ class _Change:
             np.bincount(at, strength * f * g, minlength=pairs.count)
             for f, g in product(of_q.T, repeat=2)
         ]
-        both = np.stack(own, axis=1).reshape(across.shape)
+        both = np.stack(own, axis=1, dtype=np.float64).reshape(across.shape)
         both[pairs.self_pairs, 0, 0] += pairs.row_sums(strength)
         plain = blocks(both + across) + blocks(across).T
         return csr_array(plain - blocks(kept).T @ blocks(kept))

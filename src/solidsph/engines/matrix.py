@@ -10,6 +10,7 @@ from typing import final
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, diags_array, hstack, vstack
 
 from solidsph.engines.array_law import flux, stress_fields
@@ -20,6 +21,9 @@ from solidsph.interfaces.plan import BodySize, Operations, Plan, SumMethod, arra
 from solidsph.interfaces.terms import StressTerm
 from solidsph.maths.arrays import Array, Indices, Mask
 from solidsph.model.neighbours import Pairs, neighbour_pairs
+
+# Of rows and columns in a sparse matrix.
+_Numbers = NDArray[np.int32]
 
 
 @attrs.frozen(eq=False)
@@ -84,7 +88,7 @@ class Operators:
         blocks = whole.data.reshape(-1, d, d)
         return bsr_array((blocks, whole.indices, whole.indptr), shape=(d * n, d * n))
 
-    def _changes(self, moduli: Array) -> tuple[Indices, Indices, Array]:
+    def _changes(self, moduli: Array) -> tuple[_Numbers, _Numbers, Array]:
         """Where rows begin, columns, and by the pair (m, k, i, j) the change of P_ik by u_j."""
         n, d = moduli.shape[:2]
         blocks = [self.gradient[k * n : (k + 1) * n] for k in range(d)]
@@ -97,7 +101,7 @@ class Operators:
         changes = every @ gradient
         return changes.indptr, changes.indices, changes.data.reshape(-1, d, d, d)
 
-    def _weights(self, left_out: Mask | None) -> tuple[Indices, Indices, Array]:
+    def _weights(self, left_out: Mask | None) -> tuple[_Numbers, _Numbers, Array]:
         """Where rows begin, columns, and by the pair the weights (m, d) of the divergence."""
         n = self.force.shape[0]
         blocks = [self.force[:, k * n : (k + 1) * n] for k in range(self.force.shape[1] // n)]

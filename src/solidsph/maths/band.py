@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg.lapack import dpbtrf, dpbtrs
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
@@ -55,10 +56,11 @@ class BandLayout:
         count = matrix.shape[0]
         order, place = _cuthill_mckee(matrix), np.empty(count, dtype=np.intp)
         place[order] = np.arange(count)
-        own = np.repeat(np.arange(count), np.diff(matrix.indptr)), matrix.indices
-        rows, columns = place[own[0]], place[own[1]]
-        if _width(*own) < _width(rows, columns):
-            order, (rows, columns) = np.arange(count), own
+        own_rows: Indices = np.repeat(np.arange(count), np.diff(matrix.indptr))
+        own_columns: Indices = matrix.indices.astype(np.intp)
+        rows, columns = place[own_rows], place[own_columns]
+        if _width(own_rows, own_columns) < _width(rows, columns):
+            order, rows, columns = np.arange(count), own_rows, own_columns
         down, width = rows - columns, _width(rows, columns)
         if width * count > MOST_IN_BAND:
             return None
@@ -97,14 +99,14 @@ def _width(rows: Indices, columns: Indices) -> int:
 class LastLayout:
     """The layout of the matrices whose pattern was met last."""
 
-    pattern: tuple[Indices, Indices] | None = None
+    pattern: tuple[NDArray[np.integer], NDArray[np.integer]] | None = None
     layout: BandLayout | None = None
 
     def of(self, matrix: csr_array) -> BandLayout | None:
         """That of `matrix`, or None, as of `BandLayout.of`."""
-        pattern = matrix.indptr, matrix.indices
-        if self.pattern is None or not all(map(np.array_equal, pattern, self.pattern)):
-            self.pattern, self.layout = pattern, BandLayout.of(matrix)
+        starts, columns = self.pattern or (np.empty(0), np.empty(0))
+        if not (np.array_equal(starts, matrix.indptr) and np.array_equal(columns, matrix.indices)):
+            self.pattern, self.layout = (matrix.indptr, matrix.indices), BandLayout.of(matrix)
         return self.layout
 
 
