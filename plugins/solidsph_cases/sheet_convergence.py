@@ -22,7 +22,6 @@ from solidsph_cases._sheet import (
     EXTENSION,
     PEAK,
     SOURCE,
-    STUDIES,
     check_hole,
     extensions,
     is_known,
@@ -55,7 +54,6 @@ class SheetConvergence(Case):
     source = "Ismail & Reddy, section 5.4: a convergence analysis should be completed"
     figures = ("section-5.4-convergence",)
     studies = {
-        **STUDIES,
         "discretisation": "arrangements of particles are what is compared",
         "gradient": "the recommended one for all of them: particles that a scene arranges by "
         "itself would get a linear one",

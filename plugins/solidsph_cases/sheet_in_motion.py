@@ -26,7 +26,6 @@ from solidsph_cases._sheet import (
     MATERIAL,
     PEAK,
     SOURCE,
-    STUDIES,
     at_hole,
     check_hole,
     extensions,
@@ -81,7 +80,6 @@ class SheetInMotion(Case):
     title = "A sheet with a hole, in motion"
     source = "Ismail & Reddy, section 5.4, Figs. 16 to 18"
     figures = ("fig-16", "fig-17", "fig-18")
-    studies = STUDIES
     sweep = {
         "spacing": (0.2, 0.1, 1.0 / 15.0, 0.05),
         "gradient": ("consistent", "quadratic", "corrected"),

@@ -22,7 +22,6 @@ from solidsph_cases._sheet import (
     MATERIAL,
     PEAK,
     SOURCE,
-    STUDIES,
     at_hole,
     check_hole,
     extensions,
@@ -51,7 +50,6 @@ class SheetWithHole(Case):
 
     title = "A sheet with a hole, pulled"
     source = "Ismail & Reddy, section 5.4, at rest; Kirsch (1898) for small loads"
-    studies = STUDIES
     sweep = {
         "spacing": (0.2, 0.1, 0.05, 1.0 / 30.0),
         "gradient": ("consistent", "quadratic", "corrected"),
