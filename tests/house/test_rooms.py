@@ -32,7 +32,7 @@ MAY_IMPORT = {
     "advice conformance",
     "simulation": "errors interfaces scene run statics results watch assembly",
     "resumption": "errors system scene run results simulation",
-    "costs": "errors system maths model interfaces registry engines scene run simulation",
+    "costs": "errors system maths interfaces registry engines scene run simulation",
     "studies": "errors system maths model interfaces registry scene run results conformance "
     "simulation costs",
     "testing": "errors maths interfaces registry engines run statics conformance assembly "

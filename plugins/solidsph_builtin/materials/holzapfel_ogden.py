@@ -11,6 +11,7 @@ import numpy as np
 from solidsph.errors import SceneError
 from solidsph.interfaces.material import Material
 from solidsph.maths.arrays import Scalar, Tensor, Vector
+from solidsph.maths.dilatation import POWER, Dilatation
 from solidsph.maths.tensors import (
     add,
     contraction,
@@ -85,6 +86,7 @@ class HolzapfelOgden(Material):
 
     # Fibres of the stiffness of rubber: real ones stiffen so fast that at the 40 % of strain of the
     # conformance kit their stress would be a million times its scale.
+    dilatation: ClassVar[Dilatation | None] = POWER
     example: ClassVar[Mapping[str, Any]] = {
         "matrix_stiffness": 3e5,
         "matrix_exponent": 0.5,

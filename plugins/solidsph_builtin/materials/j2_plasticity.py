@@ -11,6 +11,7 @@ import numpy as np
 from solidsph.errors import SceneError
 from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.dilatation import POWER, Dilatation
 from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.materials import _plastic
 from solidsph_builtin.materials._flow import (
@@ -61,6 +62,7 @@ class J2Plasticity(HistoryMaterial):
     saturation_exponent: float = number(default=1.0)  # [-]
 
     # The conformance kit strains by ten times the strain of first yield and more.
+    dilatation: ClassVar[Dilatation | None] = POWER
     example: ClassVar[Mapping[str, Any]] = {
         **RUBBER,
         "yield_stress": 1e4,

@@ -11,6 +11,7 @@ import numpy as np
 from solidsph.errors import SceneError
 from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.dilatation import POWER, Dilatation
 from solidsph.registry.parameters import check_positive, number
 from solidsph_builtin.materials import _plastic
 from solidsph_builtin.materials._flow import (
@@ -71,6 +72,7 @@ class JohnsonCook(HistoryMaterial):
     temperature: float = number(default=293.0)  # at the start [K]
     heat_share: float = number(default=0.9)  # of the plastic work [-]
 
+    dilatation: ClassVar[Dilatation | None] = POWER
     example: ClassVar[Mapping[str, Any]] = {
         **RUBBER,
         "yield_stress": 1e4,

@@ -9,6 +9,7 @@ import attrs
 
 from solidsph.interfaces.material import Material
 from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.dilatation import SMALL, Dilatation
 from solidsph.maths.tensors import add, contraction, identity, scale, small_strain, trace, transpose
 from solidsph.registry.parameters import number
 from solidsph_builtin.materials._lame import RUBBER, check_elastic, lame
@@ -26,6 +27,7 @@ class LinearElastic(Material):
     poissons_ratio: float = number()  # nu [-]
     density: float = number()  # rho_0 [kg/m^3]
 
+    dilatation: ClassVar[Dilatation | None] = SMALL
     example: ClassVar[Mapping[str, Any]] = RUBBER
 
     objective: ClassVar[bool] = False

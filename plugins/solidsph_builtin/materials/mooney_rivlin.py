@@ -10,6 +10,7 @@ import attrs
 from solidsph.errors import SceneError
 from solidsph.interfaces.material import Material
 from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.dilatation import POWER, Dilatation
 from solidsph.maths.tensors import (
     add,
     contraction,
@@ -45,6 +46,7 @@ class MooneyRivlin(Material):
     bulk_modulus: float = number()  # kappa [Pa]
     density: float = number()  # rho_0 [kg/m^3]
 
+    dilatation: ClassVar[Dilatation | None] = POWER
     example: ClassVar[Mapping[str, Any]] = {
         "c10": 1.5e5,
         "c01": 0.4e5,

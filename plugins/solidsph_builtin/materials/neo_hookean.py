@@ -10,6 +10,7 @@ import numpy as np
 
 from solidsph.interfaces.material import Material
 from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.dilatation import LOGARITHMIC, Dilatation
 from solidsph.maths.tensors import (
     add,
     contraction,
@@ -35,6 +36,7 @@ class NeoHookean(Material):
     poissons_ratio: float = number()  # nu [-]
     density: float = number()  # rho_0 [kg/m^3]
 
+    dilatation: ClassVar[Dilatation | None] = LOGARITHMIC
     example: ClassVar[Mapping[str, Any]] = RUBBER
 
     def __attrs_post_init__(self) -> None:

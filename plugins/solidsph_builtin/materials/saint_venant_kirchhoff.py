@@ -9,6 +9,7 @@ import attrs
 
 from solidsph.interfaces.material import Material
 from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.dilatation import GREEN, Dilatation
 from solidsph.maths.tensors import (
     add,
     contraction,
@@ -36,6 +37,7 @@ class SaintVenantKirchhoff(Material):
     poissons_ratio: float = number()  # nu [-]
     density: float = number()  # rho_0 [kg/m^3]
 
+    dilatation: ClassVar[Dilatation | None] = GREEN
     example: ClassVar[Mapping[str, Any]] = RUBBER
 
     def __attrs_post_init__(self) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from solidsph.errors import SceneError
 from solidsph.interfaces.history import History, HistoryMaterial
 from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.dilatation import LOGARITHMIC, Dilatation
 from solidsph.maths.tensors import (
     add,
     green_lagrange,
@@ -96,6 +97,7 @@ class Viscoelastic(HistoryMaterial):
     poissons_ratio: float = number()  # instantaneous, nu [-]
     density: float = number()  # rho_0 [kg/m^3]
 
+    dilatation: ClassVar[Dilatation | None] = LOGARITHMIC
     example: ClassVar[Mapping[str, Any]] = {
         **RUBBER,
         "prony": [{"share": 0.4, "time": 1e-2}, {"share": 0.2, "time": 1.0}],  # [-], [s]

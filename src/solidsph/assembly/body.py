@@ -9,7 +9,6 @@ from solidsph.errors import BuildError
 from solidsph.interfaces.body import Body
 from solidsph.interfaces.formulation import Configuration
 from solidsph.interfaces.smoothing_kernel import smoothing_kernel
-from solidsph.maths.dilatation import FINITE, SMALL
 from solidsph.model.dilatation_filter import DilatationFilter
 from solidsph.model.smooth_part import REACH, SmoothPart
 from solidsph.registry.registry import entry_of
@@ -73,11 +72,11 @@ def _dilatation_filter(body: Body) -> DilatationFilter | None:
     """The filter of a body's dilatation, if its formulation has one for its material."""
     particles, material = body.particles, body.material
     modulus = body.formulation.filtered_modulus(material, particles.dimension)
-    if modulus <= 0.0:
+    if modulus <= 0.0 or material.dilatation is None:
         return None
     BUILD.info("body %r: filter of the dilatation", body.name)
     reach = min(REACH * float(particles.spacings.max()), body.smoothing.support_radius)
     smooth_part = SmoothPart.of(
         body.pairs(reach), particles.spacings, particles.volumes, ~particles.ghosts
     )
-    return DilatationFilter(FINITE if material.objective else SMALL, smooth_part, modulus)
+    return DilatationFilter(material.dilatation, smooth_part, modulus)

@@ -57,7 +57,7 @@ class Formulation(Part):
 
         In one dimension the volume is all that there is.
         """
-        if self.filter_above is None or dimension == 1:
+        if self.filter_above is None or material.dilatation is None or dimension == 1:
             return 0.0
         lam, mu = material.lame_parameters
         return max(0.0, lam - self.filter_above * mu) if mu > 0.0 else 0.0

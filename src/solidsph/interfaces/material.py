@@ -8,6 +8,7 @@ from typing import ClassVar
 
 from solidsph.interfaces.part import Part
 from solidsph.maths.arrays import Scalar, Tensor
+from solidsph.maths.dilatation import Dilatation
 
 
 class Material(Part):
@@ -24,6 +25,10 @@ class Material(Part):
     isotropic: ClassVar[bool] = True
     """True if all directions are alike at small strain. False for a law with fibres, whose Lame
     parameters are then those of an isotropic law that is nowhere less stiff."""
+
+    dilatation: ClassVar[Dilatation | None] = None
+    """The measure theta of a change of volume whose energy in this law is lambda theta^2 / 2, up to
+    the third order. Nearly incompressible bodies are filtered in it; none with None."""
 
     smooth: ClassVar[bool] = True
     """True if the tangent is continuous. False for a law with fibres that go slack."""

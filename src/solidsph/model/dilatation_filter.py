@@ -50,7 +50,7 @@ class DilatationFilter:
     def change(self, F: Array, dF: Array) -> Array:
         """Change of that stress by dF (n, d, d)."""
         g = self.slopes(F)
-        turned = self.pressures(F)[:, None, None] * self.bends(g, dF)
+        turned = self.pressures(F)[:, None, None] * self.bends(F, dF)
         return np.asarray(turned + self.coupled(g, dF))
 
     def coupled(self, g: Array, dF: Array) -> Array:
@@ -58,10 +58,10 @@ class DilatationFilter:
         changes = self._pressures(np.einsum("pik,pik->p", g, dF))
         return np.asarray(changes[:, None, None] * g)
 
-    def bends(self, g: Array, dF: Array) -> Array:
-        """Change of slopes (n, d, d) by dF (n, d, d)."""
+    def bends(self, F: Array, dF: Array) -> Array:
+        """Change of the slopes (n, d, d) by dF (n, d, d)."""
         return particles_first(
-            self.dilatation.bend(components_first(g), components_first(dF)), len(g)
+            self.dilatation.bend(components_first(F), components_first(dF)), len(F)
         )
 
     @cached_property

@@ -41,9 +41,8 @@ def whole_stress(body: Body, F: Array, rows: Indices, memory: Memory) -> Array:
     own = tuple(values[rows] for values in history)
     P = _whole_first_piola(material, F[rows], own)
     if body.dilatation_filter is not None:
-        P[:, :d, :d] += body.dilatation_filter.stress(F)[rows]
-        for across in range(d, 3):  # a stretch across is all of it a change of volume
-            P[:, across, across] += body.dilatation_filter.pressures(F)[rows]
+        added = body.dilatation_filter
+        P += added.pressures(F)[rows, None, None] * added.slopes(_widened(F[rows]))
     wide, ratios = _widened(F[rows]), np.linalg.det(F[rows])[:, None, None]
     return np.asarray(np.einsum("pik,pjk->pij", P, wide) / ratios)
 

@@ -43,7 +43,7 @@ def add_filter(filter: DilatationFilter, F: Array, moduli: Array) -> Coupling:
     rest."""
     g, q = filter.slopes(F), filter.pressures(F)
     for j, k, unit in _units(F):
-        moduli[..., j, k] += q[:, None, None] * filter.bends(g, unit)
+        moduli[..., j, k] += q[:, None, None] * filter.bends(F, unit)
     return Coupling(filter, g)
 
 
