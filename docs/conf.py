@@ -41,7 +41,6 @@ INTERNAL = "|".join(
         r"registry\.registry\.Entry",
         r"run\.restart_point\.RestartPoint",
         r"errors\.PortableError",
-        r"maths\.dilatation\.Dilatation",
         r"model\.neighbours\.Hidden",
         r"model\.surface\.Pieces",
         r"scene\.scene_data\.\w+",

@@ -67,6 +67,7 @@ from solidsph.interfaces.terms import (
 )
 from solidsph.interfaces.time_loop import StepError, TimeLoop
 from solidsph.maths.arrays import Array, Indices, Mask, Scalar, Tensor, Vector
+from solidsph.maths.dilatation import GREEN, LOGARITHMIC, POWER, SMALL, Dilatation
 from solidsph.maths.tensors import (
     add,
     cauchy_stress,
@@ -109,6 +110,10 @@ from solidsph.system.files import content, located
 __all__ = [
     "AXES",
     "EVERYWHERE",
+    "GREEN",
+    "LOGARITHMIC",
+    "POWER",
+    "SMALL",
     "Array",
     "Arrows",
     "Body",
@@ -124,6 +129,7 @@ __all__ = [
     "Constraint",
     "Curves",
     "DeformationLoad",
+    "Dilatation",
     "DiscreteModel",
     "Discretisation",
     "Divergence",
