@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from solidsph import Simulation
@@ -62,16 +63,21 @@ class Step:
         return forces
 
     def error(self) -> float:
-        """Of the stiffness along a random motion, by differences of the forces."""
+        """Of the stiffness along a random motion, by differences of the forces.
+
+        A particle may begin to touch or to slide within the first difference; hardly within both.
+        """
         load: Load | object = self.load
         assert is_stiff_in_steps(load)
         v = (self.end - self.start) / self.step
         K = load.stiffness_of_step(self.time, self.step, self.end, v, self.memory)
         du = self.any()
-        change = self.forces(self.end + 1e-7 * du) - self.forces(self.end - 1e-7 * du)
-        measured = -change / 2e-7
-        assert measured.any()
         assert K is not None
+        return min(self._missed(K, du, h) for h in (1e-7, 1e-8))
+
+    def _missed(self, K: Any, du: Array, h: float) -> float:
+        measured = (self.forces(self.end - h * du) - self.forces(self.end + h * du)) / (2.0 * h)
+        assert measured.any()
         wrong = (K @ du.ravel()).reshape(du.shape) - measured
         return float(np.linalg.norm(wrong) / np.linalg.norm(measured))
 
@@ -85,6 +91,7 @@ def test_normal_stiffness_is_minus_the_derivative(d: int, wall: bool, seed: int)
 
 @settings(max_examples=12, deadline=None)
 @given(d=st.integers(2, 3), friction=st.sampled_from([0.01, 0.5, 50.0]), seed=st.integers(0, 10**6))
+@example(d=2, friction=0.01, seed=3879)  # one begins to slide within 1e-7
 def test_stiffness_of_friction_is_minus_the_derivative(d: int, friction: float, seed: int) -> None:
     assert Step(pressed(d, friction, True), seed, 0.01).error() < 1e-5
     # Beside another body normals count as constant, which is as wrong as springs are stretched.
