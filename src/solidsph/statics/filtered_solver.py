@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import final
 
 import attrs
 import numpy as np
 from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import LinearOperator, gmres, minres
 
 from solidsph.maths.arrays import Array
 from solidsph.maths.band import LastLayout
-from solidsph.maths.conjugate_gradients import Solution, conjugate_gradients
 from solidsph.statics.factors import Factors, SingularError, factorise
 from solidsph.statics.freedoms import Freedoms
 from solidsph.statics.increment import Increment
+from solidsph.statics.krylov import Krylov
 from solidsph.statics.lead import Lead
-from solidsph.statics.linearised import Linearised, LinearSolver, UnsolvedError
+from solidsph.statics.linearised import Linearised, LinearSolver
 from solidsph.statics.lowest import lowest_modes
 from solidsph.statics.tangent import Moduli, Tangent
 
 # Iterations of one solution. The stiffness without the filter is up to lambda / (lambda - kappa)
 # times as large: Cook's plate takes some 10 at Poisson's ratio 0.49, some 70 at 0.4999.
 _MOST = 1000
-
-# Those after which one for a tangent that is not positive begins anew.
-_KEPT = 100
 
 # What a solution leaves of its forces: little, for Newton's method to converge as with factors.
 _LEFT = 1e-4
@@ -119,13 +114,8 @@ class _Preconditioned(Linearised):
     def solve(self, forces: Array, tolerance: float) -> Array:
         tolerance = min(tolerance, _LEFT)
         if not self.factors.positive:
-            return self._by(gmres, forces, tolerance, restart=_KEPT, maxiter=_MOST // _KEPT)
-        found = self._iterated(forces, tolerance)
-        if found.falls:  # a tangent that lets some motions fall
-            return self._by(minres, forces, tolerance, maxiter=_MOST)
-        if found.left > tolerance:
-            raise UnsolvedError(found.left, _MOST)
-        return found.values
+            return self._krylov.of_any(forces, tolerance)
+        return self._krylov.of_symmetric(forces, tolerance)
 
     def roughly(self, forces: Array) -> Array:
         return self.factors.solve(forces)
@@ -134,32 +124,12 @@ class _Preconditioned(Linearised):
         if not self.factors.positive:  # what the filter takes makes it no more so
             return False
         random = np.random.default_rng(0).standard_normal(len(self.own_diagonal))
-        return not self._iterated(self.own_diagonal * random, _LOOK).falls
+        return not self._krylov.iterated(self.own_diagonal * random, _LOOK).falls
 
     def product(self, values: Array) -> Array:
         """Forces (k,) [N] that resist a motion (k,) [m]."""
         return self.pull(self.freedoms.expanded(values)) + self.added * values
 
-    def _by(
-        self,
-        method: Callable[..., tuple[Array, int]],
-        forces: Array,
-        tolerance: float,
-        **limits: int,
-    ) -> Array:
-        """Solution by a method for other tangents than positive ones."""
-        shape = (len(forces), len(forces))
-        solution, code = method(
-            LinearOperator(shape, matvec=self.product, dtype=np.float64),
-            forces,
-            rtol=tolerance,
-            M=LinearOperator(shape, matvec=self.factors.solve, dtype=np.float64),
-            **limits,
-        )
-        if code != 0:
-            left = np.linalg.norm(forces - self.product(solution)) / np.linalg.norm(forces)
-            raise UnsolvedError(float(left), _MOST)
-        return solution
-
-    def _iterated(self, forces: Array, tolerance: float) -> Solution:
-        return conjugate_gradients(self.product, self.factors.solve, forces, tolerance, _MOST)
+    @property
+    def _krylov(self) -> Krylov:
+        return Krylov(self.product, self.factors.solve, _MOST)

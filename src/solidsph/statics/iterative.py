@@ -8,10 +8,8 @@ from typing import final
 import attrs
 import numpy as np
 from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import LinearOperator, gmres, minres
 
 from solidsph.maths.arrays import Array, Mask
-from solidsph.maths.conjugate_gradients import Solution, conjugate_gradients
 from solidsph.run.built_scene import BuiltScene
 from solidsph.statics.alternation import alternating_signs
 from solidsph.statics.coarse_space import CoarseSpace, Fineness
@@ -19,8 +17,9 @@ from solidsph.statics.factors import Factors, SingularError, factorise
 from solidsph.statics.freedoms import Freedoms
 from solidsph.statics.held_in_body import held_in_body
 from solidsph.statics.increment import Increment
+from solidsph.statics.krylov import Krylov
 from solidsph.statics.lead import Lead
-from solidsph.statics.linearised import Linearised, LinearSolver, UnsolvedError
+from solidsph.statics.linearised import Linearised, LinearSolver
 from solidsph.statics.lowest import lowest_modes
 from solidsph.statics.tangent import Moduli, Tangent
 
@@ -35,8 +34,7 @@ _ALTERNATING = Fineness(3.0, {1: 10_000, 2: 10_000, 3: 1_500})
 # small, because it leaves out how the functions bend.
 _SHARE = 0.4
 
-# Iterations of one solution, and those after which one for a tangent without symmetry begins anew.
-_MOST, _KEPT = 5000, 100
+_MOST = 5000  # iterations of one solution
 
 # A load's stiffness is made symmetric if what it loses is below this part of that of particles.
 _SKEW = 0.01
@@ -287,13 +285,8 @@ class _Iterated(Linearised):
 
     def solve(self, forces: Array, tolerance: float) -> Array:
         if self.turns:
-            return self._by(gmres, forces, tolerance, restart=_KEPT, maxiter=_MOST // _KEPT)
-        found = self._iterated(forces, tolerance)
-        if found.falls:  # a tangent that lets some motions fall
-            return self._by(minres, forces, tolerance, maxiter=_MOST)
-        if found.left > tolerance:
-            raise UnsolvedError(found.left, _MOST)
-        return found.values
+            return self._krylov.of_any(forces, tolerance)
+        return self._krylov.of_symmetric(forces, tolerance)
 
     def roughly(self, forces: Array) -> Array:
         return self._preconditioned(forces)
@@ -308,35 +301,11 @@ class _Iterated(Linearised):
             smooth = random.standard_normal(len(self.own_diagonal))
         else:
             smooth = (space.interpolation @ random.standard_normal(space.kept.shape))[free]
-        return not self._iterated(self.own_diagonal * smooth, _LOOK).falls
+        return not self._krylov.iterated(self.own_diagonal * smooth, _LOOK).falls
 
-    def _iterated(self, forces: Array, tolerance: float) -> Solution:
-        return conjugate_gradients(self.product, self._preconditioned, forces, tolerance, _MOST)
-
-    def _by(
-        self,
-        method: Callable[..., tuple[Array, int]],
-        forces: Array,
-        tolerance: float,
-        **limits: int,
-    ) -> Array:
-        """Solution by a method for other tangents than positive ones."""
-        shape = (len(forces), len(forces))
-        try:
-            values, code = method(
-                LinearOperator(shape, matvec=self.product, dtype=np.float64),
-                forces,
-                rtol=tolerance,
-                M=LinearOperator(shape, matvec=self._preconditioned, dtype=np.float64),
-                **limits,
-            )
-        except ValueError:  # rounding, of a tangent that is nearly singular
-            raise UnsolvedError(1.0, _MOST) from None
-        if code != 0:
-            left = np.linalg.norm(forces - self.product(values)) / np.linalg.norm(forces)
-            raise UnsolvedError(float(left), _MOST)
-        solution: Array = values
-        return solution
+    @property
+    def _krylov(self) -> Krylov:
+        return Krylov(self.product, self._preconditioned, _MOST)
 
     def product(self, values: Array) -> Array:
         """Forces (k,) [N] that resist a motion (k,) [m]."""
